@@ -1,0 +1,208 @@
+//! Range errors of the scanner: Cooper, Eqs. (3)–(5), with the tables that the equations need.
+//!
+//! A bias is *measured − true* and is subtracted to correct.
+
+use crate::range::{CorrectedRange, RawRange};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// The three error terms of Eq. 3, in metres, each by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct BiasTerms {
+    /// Error that depends on the target's distance.
+    #[doc(alias = "E_r")]
+    pub distance: f64,
+    /// Error that depends on the beam's incidence on the target.
+    #[doc(alias = "E_a")]
+    pub angle: f64,
+    /// Error that depends on the target's color.
+    #[doc(alias = "E_c")]
+    pub color: f64,
+}
+
+impl BiasTerms {
+    /// E_a + E_c + E_r.
+    pub fn total(&self) -> f64 {
+        self.distance + self.angle + self.color
+    }
+}
+
+/// Everything Eq. 3 subtracts, as a table of distances, a cosine law and a line per color.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RangeBias {
+    /// E_r.
+    #[serde(default)]
+    pub distance: DistanceBias,
+    /// E_a.
+    #[serde(default)]
+    pub angle: AngleBias,
+    /// E_c by the name of the color; a color that is not listed has none.
+    #[serde(default)]
+    pub color: BTreeMap<String, ColorBias>,
+}
+
+/// E_r as a table over distance, interpolated linearly and constant outside (Cooper, Table 2).
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DistanceBias {
+    /// Distances in metres, strictly increasing.
+    pub range_m: Vec<f64>,
+    /// Errors in millimetres at those distances.
+    pub error_mm: Vec<f64>,
+}
+
+/// E_a = A_a·cos θ_N + B_a — Cooper, Eq. (4).
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AngleBias {
+    /// A_a, in millimetres.
+    #[doc(alias = "A_a")]
+    pub gain_mm: f64,
+    /// B_a, in millimetres.
+    #[doc(alias = "B_a")]
+    pub offset_mm: f64,
+}
+
+/// E_c = A_c·R + B_c — Cooper, Eq. (5).
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ColorBias {
+    /// A_c, in millimetres per metre.
+    #[doc(alias = "A_c")]
+    pub slope_mm_per_m: f64,
+    /// B_c, in millimetres.
+    #[doc(alias = "B_c")]
+    pub offset_mm: f64,
+}
+
+impl DistanceBias {
+    /// Weight of each table node in the interpolated value: (index, weight) of at most two nodes.
+    ///
+    /// The derivative of E_r with respect to its nodes, which an error budget needs.
+    pub fn weights(&self, range: f64) -> [(usize, f64); 2] {
+        let n = self.range_m.len();
+        if n == 0 {
+            return [(0, 0.0), (0, 0.0)];
+        }
+        let above = self.range_m.partition_point(|&r| r <= range);
+        if above == 0 {
+            return [(0, 1.0), (0, 0.0)];
+        }
+        if above == n {
+            return [(n - 1, 1.0), (n - 1, 0.0)];
+        }
+        let t = (range - self.range_m[above - 1]) / (self.range_m[above] - self.range_m[above - 1]);
+        [(above - 1, 1.0 - t), (above, t)]
+    }
+
+    /// Range error caused by the target's distance, in metres.
+    ///
+    /// Unlike the paper, which fits a line that misses its own Table 2 by up to 5 mm, this is the table itself.
+    #[doc(alias = "E_r")]
+    pub fn error(&self, range: f64) -> f64 {
+        self.weights(range)
+            .iter()
+            .map(|&(i, w)| w * self.error_mm.get(i).copied().unwrap_or(0.0) * 1e-3)
+            .sum()
+    }
+}
+
+impl AngleBias {
+    /// Range error caused by the beam's incidence on the target, in metres: E_a = A_a·cos θ_N + B_a — Eq. (4).
+    ///
+    /// Takes cos θ_N, `0 ≤ cos θ_N ≤ 1`.
+    #[doc(alias = "E_a")]
+    pub fn error(&self, cos_incidence: f64) -> f64 {
+        (self.gain_mm * cos_incidence + self.offset_mm) * 1e-3
+    }
+}
+
+impl ColorBias {
+    /// Range error caused by the target's color, in metres: E_c = A_c·R + B_c — Eq. (5).
+    #[doc(alias = "E_c")]
+    pub fn error(&self, range: f64) -> f64 {
+        (self.slope_mm_per_m * range + self.offset_mm) * 1e-3
+    }
+}
+
+impl RangeBias {
+    /// The three terms for a target at `range` metres under a given incidence and color.
+    pub fn terms(&self, range: f64, cos_incidence: f64, color: &str) -> BiasTerms {
+        BiasTerms {
+            distance: self.distance.error(range),
+            angle: self.angle.error(cos_incidence),
+            color: self.color.get(color).map_or(0.0, |c| c.error(range)),
+        }
+    }
+
+    /// The corrected range r − E_a − E_c − E_r — Eq. (3).
+    ///
+    /// `range` and `cos_incidence` describe the target as it is believed to be; the errors vary slowly enough that
+    /// a range good to centimetres is good to micrometres here.
+    pub fn correct(&self, raw: RawRange, range: f64, cos_incidence: f64, color: &str) -> CorrectedRange {
+        CorrectedRange(raw.0 - self.terms(range, cos_incidence, color).total())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table_2() -> DistanceBias {
+        DistanceBias {
+            range_m: vec![0.5, 2.0, 4.0],
+            error_mm: vec![-2.8, 6.1, -0.1],
+        }
+    }
+
+    #[test]
+    fn the_table_is_met_at_its_nodes_and_held_outside() {
+        for (range, mm) in [
+            (0.5, -2.8),
+            (2.0, 6.1),
+            (4.0, -0.1),
+            (0.1, -2.8),
+            (9.0, -0.1),
+            (3.0, 3.0),
+        ] {
+            assert!((table_2().error(range) - mm * 1e-3).abs() < 1e-15, "at {range} m");
+        }
+        assert_eq!(DistanceBias::default().error(1.0), 0.0);
+    }
+
+    #[test]
+    fn equations_4_and_5_as_printed() {
+        let angle = AngleBias {
+            gain_mm: -70.3,
+            offset_mm: 86.1,
+        };
+        assert!((angle.error(1.0) - 0.0158).abs() < 1e-15);
+        let color = ColorBias {
+            slope_mm_per_m: 0.5,
+            offset_mm: -1.0,
+        };
+        assert!((color.error(4.0) - 0.001).abs() < 1e-15);
+    }
+
+    #[test]
+    fn correction_undoes_the_terms() {
+        let bias = RangeBias {
+            distance: table_2(),
+            angle: AngleBias {
+                gain_mm: -70.3,
+                offset_mm: 70.3,
+            },
+            color: BTreeMap::from([(
+                "white".to_owned(),
+                ColorBias {
+                    slope_mm_per_m: 0.5,
+                    offset_mm: 1.0,
+                },
+            )]),
+        };
+        let terms = bias.terms(1.3, 0.8, "white");
+        let corrected = bias.correct(RawRange(1.3 + terms.total()), 1.3, 0.8, "white");
+        assert!((corrected.0 - 1.3).abs() < 1e-15);
+    }
+}

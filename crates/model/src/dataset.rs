@@ -1,0 +1,212 @@
+//! A recorded experiment in memory: the session and, for every pose of a board, its scans and tracked poses.
+
+use crate::error::ModelError;
+use crate::frame::Pose;
+use crate::session::Session;
+use serde::{Deserialize, Serialize};
+
+/// What a stretch of scans was recorded for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PoseKind {
+    /// Step 3: the structure before its mirrors were attached.
+    Bare,
+    /// Step 4: the known room, no board in it.
+    Room,
+    /// Step 5: a board before beams that no mirror deflects.
+    Direct,
+    /// Steps 7–10: a board in the fan of a facet.
+    Facet,
+}
+
+/// What the experimenter noted about a stretch of scans: one message of `/session/pose`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PoseLabel {
+    /// Number of the pose, from 0.
+    pub pose: usize,
+    /// What it was recorded for.
+    pub kind: PoseKind,
+    /// Scans in the stretch.
+    pub scans: usize,
+    /// Board that was set up.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub board: Option<String>,
+    /// Color of that board.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub color: Option<String>,
+    /// Facet whose fan the board stands in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub facet: Option<String>,
+    /// First and last beam that the board was set up for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beams: Option<[usize; 2]>,
+}
+
+/// One stretch of scans with nothing moving, and where motion capture saw rig and board.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PoseRecord {
+    /// What the experimenter noted.
+    pub label: PoseLabel,
+    /// Rig as tracked, mean over the stretch.
+    pub room_from_rig: Pose,
+    /// Board as tracked, mean over the stretch; `None` where none was set up.
+    pub room_from_board: Option<Pose>,
+    /// Beams of a scan.
+    pub beams: usize,
+    /// Readings in metres, scan after scan; −∞ too close, +∞ no return, NaN invalid (REP-117).
+    pub ranges: Vec<f64>,
+}
+
+/// Statistics of one beam over a stretch.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Summary {
+    /// Readings that are ranges.
+    pub count: usize,
+    /// Readings that are not.
+    pub missing: usize,
+    /// Mean of the ranges, in metres; 0 without any.
+    pub mean: f64,
+    /// Sample standard deviation, in metres; 0 for fewer than two.
+    pub sd: f64,
+}
+
+/// A recorded experiment: what a calibration is made from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dataset {
+    /// What the experimenter knows.
+    pub session: Session,
+    /// The stretches, in the order they were recorded.
+    pub poses: Vec<PoseRecord>,
+}
+
+impl PoseRecord {
+    /// The readings of one beam, scan after scan.
+    pub fn readings(&self, beam: usize) -> impl Iterator<Item = f64> + '_ {
+        self.ranges.iter().skip(beam).step_by(self.beams).copied()
+    }
+
+    /// Mean and spread of every beam.
+    pub fn summarize(&self) -> Vec<Summary> {
+        (0..self.beams)
+            .map(|beam| {
+                // Welford's recurrence: the naive sum of squares loses the noise under the range.
+                let mut s = Summary::default();
+                let mut sum_squares = 0.0;
+                for r in self.readings(beam) {
+                    if r.is_finite() {
+                        s.count += 1;
+                        let step = r - s.mean;
+                        s.mean += step / s.count as f64;
+                        sum_squares += step * (r - s.mean);
+                    } else {
+                        s.missing += 1;
+                    }
+                }
+                if s.count > 1 {
+                    s.sd = (sum_squares / (s.count - 1) as f64).sqrt();
+                }
+                s
+            })
+            .collect()
+    }
+}
+
+impl Dataset {
+    /// Checks that the parts fit together.
+    ///
+    /// # Errors
+    /// [`ModelError::Inconsistent`] names the first pose whose board is not in the session, that has no board where
+    /// it needs one, or whose number of readings is not scans × beams.
+    pub fn check(&self) -> Result<(), ModelError> {
+        let fail = |pose: &PoseRecord, what: String| {
+            Err(ModelError::Inconsistent(format!(
+                "pose {}: {what}",
+                pose.label.pose
+            )))
+        };
+        for pose in &self.poses {
+            if pose.beams != self.session.scanner.beams {
+                return fail(
+                    pose,
+                    format!(
+                        "{} beams, the scanner has {}",
+                        pose.beams, self.session.scanner.beams
+                    ),
+                );
+            }
+            let expected = pose.label.scans * pose.beams;
+            if pose.ranges.len() != expected {
+                return fail(
+                    pose,
+                    format!("{} readings, {expected} expected", pose.ranges.len()),
+                );
+            }
+            let needs_board = matches!(pose.label.kind, PoseKind::Direct | PoseKind::Facet);
+            match &pose.label.board {
+                Some(name) if self.session.board(name).is_none() => {
+                    return fail(pose, format!("board {name:?} is not in session.toml"));
+                }
+                None if needs_board => return fail(pose, "no board named".to_owned()),
+                _ => {}
+            }
+            if needs_board && pose.room_from_board.is_none() {
+                return fail(pose, "its board was never tracked".to_owned());
+            }
+        }
+        Ok(())
+    }
+
+    /// The first stretch of a kind.
+    pub fn first(&self, kind: PoseKind) -> Option<&PoseRecord> {
+        self.of_kind(kind).next()
+    }
+
+    /// The stretches of a kind, in order.
+    pub fn of_kind(&self, kind: PoseKind) -> impl Iterator<Item = &PoseRecord> + '_ {
+        self.poses.iter().filter(move |p| p.label.kind == kind)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_summary_leaves_codes_out() {
+        let pose = PoseRecord {
+            label: PoseLabel {
+                pose: 0,
+                kind: PoseKind::Room,
+                scans: 3,
+                board: None,
+                color: None,
+                facet: None,
+                beams: None,
+            },
+            room_from_rig: Pose::identity(),
+            room_from_board: None,
+            beams: 2,
+            ranges: vec![1.0, f64::INFINITY, 2.0, f64::NAN, 3.0, 5.0],
+        };
+        let s = pose.summarize();
+        assert_eq!(
+            s[0],
+            Summary {
+                count: 3,
+                missing: 0,
+                mean: 2.0,
+                sd: 1.0
+            }
+        );
+        assert_eq!(
+            s[1],
+            Summary {
+                count: 1,
+                missing: 2,
+                mean: 5.0,
+                sd: 0.0
+            }
+        );
+    }
+}

@@ -1,0 +1,95 @@
+//! Frames and poses: how they are named, written to files, and turned about small angles.
+//!
+//! `room_from_sensor * sensor_from_board` is `room_from_board`: the inner names cancel.
+
+use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// A rigid transform named `a_from_b`: it takes coordinates in frame b to coordinates in frame a.
+pub type Pose = Isometry3<f64>;
+
+/// A pose as files write it: metres and a unit quaternion, scalar last (the order of ROS messages).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PoseData {
+    /// Origin of b in frame a, in metres.
+    pub translation_m: [f64; 3],
+    /// Rotation from b to a as a unit quaternion (x, y, z, w).
+    pub rotation_xyzw: [f64; 4],
+}
+
+impl From<&Pose> for PoseData {
+    fn from(pose: &Pose) -> Self {
+        let q = pose.rotation.quaternion();
+        Self {
+            translation_m: pose.translation.vector.into(),
+            rotation_xyzw: [q.i, q.j, q.k, q.w],
+        }
+    }
+}
+
+impl From<&PoseData> for Pose {
+    /// The quaternion is normalised, since files round it.
+    fn from(data: &PoseData) -> Self {
+        let [x, y, z, w] = data.rotation_xyzw;
+        Isometry3::from_parts(
+            Translation3::from(Vector3::from(data.translation_m)),
+            UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z)),
+        )
+    }
+}
+
+/// The turn by yaw about z, then pitch about the new y, then roll about the new x (3-2-1), angles in radians.
+///
+/// Positive pitch lowers the x axis.
+pub fn yaw_pitch_roll(yaw: f64, pitch: f64, roll: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_euler_angles(roll, pitch, yaw)
+}
+
+/// Two unit vectors `(across, up)` that span the plane perpendicular to a direction.
+///
+/// `across` is horizontal and points to growing azimuth, `up` to growing elevation; `(direction, across, up)` is
+/// right-handed. Direction errors are counted along them: (cos φ·δθ, δφ). Straight up and down, where azimuth
+/// means nothing, `across` is the y axis.
+pub fn tangent_basis(direction: &Unit<Vector3<f64>>) -> (Unit<Vector3<f64>>, Unit<Vector3<f64>>) {
+    let horizontal = libm::hypot(direction.x, direction.y);
+    let across = if horizontal > 0.0 {
+        Vector3::new(-direction.y / horizontal, direction.x / horizontal, 0.0)
+    } else {
+        Vector3::y()
+    };
+    let across = Unit::new_normalize(across);
+    (across, Unit::new_normalize(direction.cross(&across)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point3;
+
+    #[test]
+    fn pose_survives_its_file_form() {
+        let pose = Pose::from_parts(Translation3::new(0.1, -2.0, 3.5), yaw_pitch_roll(0.3, -0.2, 1.1));
+        let back = Pose::from(&PoseData::from(&pose));
+        let p = Point3::new(4.0, 5.0, -6.0);
+        assert!((pose * p - back * p).norm() < 1e-14);
+    }
+
+    #[test]
+    fn tangent_basis_is_right_handed_and_orthonormal() {
+        for v in [
+            Vector3::new(0.3, -0.8, 0.2),
+            Vector3::z(),
+            -Vector3::z(),
+            Vector3::x(),
+        ] {
+            let v = Unit::new_normalize(v);
+            let (across, up) = tangent_basis(&v);
+            assert!(
+                across.dot(&v).abs() < 1e-15 && up.dot(&v).abs() < 1e-15 && across.dot(&up).abs() < 1e-15
+            );
+            assert!((v.cross(&across) - up.into_inner()).norm() < 1e-15);
+            assert!(across.z == 0.0);
+        }
+    }
+}

@@ -1,0 +1,236 @@
+//! What the experimenter knows: everything a calibration may use besides the recorded readings.
+//!
+//! This is `session.toml`. It holds the nominal design, not the structure as built; the noise and bias the
+//! experimenter believes in, not the ones the sensor has. The truth is never here.
+
+use crate::bias::RangeBias;
+use crate::board::{BoardPlane, Rectangle};
+use crate::frame::PoseData;
+use nalgebra::{Point3, Unit, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Version of `session.toml`.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// Everything known before the first reading is looked at.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Session {
+    /// Version of this file's format.
+    pub schema_version: u32,
+    /// Name of the experiment.
+    pub name: String,
+    /// The scanner's data sheet.
+    pub scanner: ScannerSheet,
+    /// Where the drawing puts the sensor in the rig body.
+    pub nominal_rig_from_sensor: PoseData,
+    /// How far the sensor may be from where the drawing puts it.
+    pub mount_tolerance: MountTolerance,
+    /// The room the experiment stands in.
+    pub room: RoomSurvey,
+    /// What is believed about the errors.
+    pub believed: Beliefs,
+    /// Step 3: the bare structure, measured before the mirrors were attached.
+    pub bare_structure: BareStructure,
+    /// Markers of the rig, in the rig frame.
+    pub rig_markers: Vec<Marker>,
+    /// The mirrors as drawn, in the sensor frame of the drawing.
+    #[serde(default)]
+    pub facets: Vec<NominalFacet>,
+    /// The target boards.
+    #[serde(default)]
+    pub boards: Vec<BoardSheet>,
+}
+
+/// What the scanner's data sheet says.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScannerSheet {
+    /// Name of the preset.
+    pub preset: String,
+    /// Beams of a scan; beam i points to (i − (beams − 1)/2)·step.
+    pub beams: usize,
+    /// Azimuth between neighbouring beams, in degrees.
+    pub step_deg: f64,
+    /// Scans per second.
+    pub scan_rate_hz: f64,
+    /// Shortest range, in metres.
+    pub range_min_m: f64,
+    /// Longest range, in metres.
+    pub range_max_m: f64,
+    /// Full 1/e² divergence of a beam along the longer axis of its spot, in milliradians.
+    pub divergence_full_mrad: f64,
+}
+
+/// How far the optical frame may stand from its nominal place, 1σ of each axis.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MountTolerance {
+    /// Turn about x, y and z, in degrees.
+    pub rotation_sd_deg: [f64; 3],
+    /// Shift along x, y and z, in millimetres.
+    pub translation_sd_mm: [f64; 3],
+}
+
+/// A box-shaped room, in the room frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RoomSurvey {
+    /// Corner with the smallest coordinates, in metres.
+    pub min_m: [f64; 3],
+    /// Corner with the largest coordinates, in metres.
+    pub max_m: [f64; 3],
+    /// Color of walls, floor and ceiling.
+    pub color: String,
+}
+
+/// What the experimenter believes about the errors, from step 1 and from data sheets. Standard deviations are 1σ.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Beliefs {
+    /// White noise of one reading, in millimetres.
+    pub range_noise_sd_mm: f64,
+    /// Drift constant of one pose, in millimetres.
+    pub drift_sd_mm: f64,
+    /// Constant error of one marker coordinate, in millimetres.
+    pub marker_sd_mm: f64,
+    /// The biases of step 1, as they were characterized.
+    pub bias: RangeBias,
+    /// Uncertainty of E_r at each node of its table, in millimetres.
+    pub distance_bias_sd_mm: f64,
+    /// Uncertainty of A_a, in millimetres, with B_a + A_a (the error at normal incidence) held.
+    pub angle_gain_sd_mm: f64,
+    /// Uncertainty of E_c, in millimetres.
+    pub color_bias_sd_mm: f64,
+}
+
+/// Step 3: ranges to the structure before the mirrors were glued on.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BareStructure {
+    /// Thickness of the mirrors, in millimetres, along their normals.
+    pub mirror_thickness_mm: f64,
+    /// Uncertainty of a bare distance, in millimetres.
+    pub distance_sd_mm: f64,
+    /// First beam of `distance_m`.
+    pub first_beam: usize,
+    /// Mean bias-corrected range of each beam to the bare structure, in metres; 0 where there is none.
+    pub distance_m: Vec<f64>,
+}
+
+/// A labelled marker.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Marker {
+    /// Label.
+    pub name: String,
+    /// Place in its body's frame, in millimetres.
+    pub position_mm: [f64; 3],
+}
+
+/// A mirror as drawn.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NominalFacet {
+    /// Name.
+    pub name: String,
+    /// Corners in the nominal sensor frame, in millimetres, counter-clockwise seen from the reflecting side.
+    pub corners_mm: Vec<[f64; 3]>,
+    /// First and last beam that the drawing sends to this facet.
+    pub beams: [usize; 2],
+}
+
+/// A target board.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoardSheet {
+    /// Name, which is also the motion-capture subject.
+    pub name: String,
+    /// Extent along the board's x axis, in millimetres.
+    pub width_mm: f64,
+    /// Extent along the board's y axis, in millimetres.
+    pub height_mm: f64,
+    /// Color.
+    pub color: String,
+    /// Markers on the face, in the board frame; the first three are P_p1…P_p3.
+    pub markers: Vec<Marker>,
+}
+
+impl Marker {
+    /// Place in its body's frame, in metres.
+    pub fn position(&self) -> Point3<f64> {
+        Point3::from(Vector3::from(self.position_mm) * 1e-3)
+    }
+}
+
+impl NominalFacet {
+    /// Corners in the nominal sensor frame, in metres.
+    pub fn corners(&self) -> Vec<Point3<f64>> {
+        self.corners_mm
+            .iter()
+            .map(|c| Point3::from(Vector3::from(*c) * 1e-3))
+            .collect()
+    }
+
+    /// Normal on the reflecting side and centre of the corners; `None` for fewer than three corners or a line.
+    pub fn plane(&self) -> Option<BoardPlane> {
+        let corners = self.corners();
+        // Newell's sum: exact for a plane polygon, the best plane's normal for one that is nearly so.
+        let mut normal = Vector3::zeros();
+        for (a, b) in corners.iter().zip(corners.iter().cycle().skip(1)) {
+            normal += a.coords.cross(&b.coords);
+        }
+        let centre = corners.iter().map(|c| c.coords).sum::<Vector3<f64>>() / corners.len() as f64;
+        Some(BoardPlane::new(
+            Point3::from(centre),
+            Unit::try_new(normal, f64::MIN_POSITIVE)?,
+        ))
+    }
+}
+
+impl BoardSheet {
+    /// The board's outline, in metres.
+    pub fn outline(&self) -> Rectangle {
+        Rectangle {
+            width: self.width_mm * 1e-3,
+            height: self.height_mm * 1e-3,
+        }
+    }
+}
+
+impl RoomSurvey {
+    /// Distance along a ray from inside the room to its shell, and the normal met; `None` from outside.
+    pub fn cast(&self, origin: &Point3<f64>, direction: &Unit<Vector3<f64>>) -> Option<(f64, BoardPlane)> {
+        let mut nearest: Option<(f64, BoardPlane)> = None;
+        for axis in 0..3 {
+            let wall = if direction[axis] > 0.0 {
+                self.max_m[axis]
+            } else {
+                self.min_m[axis]
+            };
+            let s = (wall - origin[axis]) / direction[axis];
+            if direction[axis] != 0.0 && s > 0.0 && nearest.as_ref().is_none_or(|(best, _)| s < *best) {
+                let mut normal = Vector3::zeros();
+                normal[axis] = -direction[axis].signum();
+                let point = origin + direction.into_inner() * s;
+                nearest = Some((s, BoardPlane::new(point, Unit::new_unchecked(normal))));
+            }
+        }
+        nearest
+    }
+}
+
+impl BareStructure {
+    /// Bare distance of a beam, in metres; `None` where the structure was not met.
+    pub fn distance(&self, beam: usize) -> Option<f64> {
+        let d = *self.distance_m.get(beam.checked_sub(self.first_beam)?)?;
+        (d > 0.0).then_some(d)
+    }
+}
+
+impl Session {
+    /// The board of that name.
+    pub fn board(&self, name: &str) -> Option<&BoardSheet> {
+        self.boards.iter().find(|b| b.name == name)
+    }
+}
