@@ -1,8 +1,11 @@
-//! A recorded experiment in memory: the session and, for every pose of a board, its scans and tracked poses.
+//! A recorded experiment: the session and, for every pose of a board, its scans and tracked bodies.
+//!
+//! A [`Stretch`] is what the laboratory records, frame by frame; a [`PoseRecord`] is what a calibration needs of it.
 
 use crate::error::ModelError;
 use crate::frame::Pose;
 use crate::session::Session;
+use nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// What a stretch of scans was recorded for.
@@ -43,6 +46,46 @@ pub struct PoseLabel {
     pub beams: Option<[usize; 2]>,
 }
 
+/// Name of the rig as a motion-capture subject.
+pub const RIG_SUBJECT: &str = "rig";
+
+/// One motion-capture frame of one body, in the room frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackedFrame {
+    /// Time since the recording began, in seconds.
+    pub time_s: f64,
+    /// `room_from_body` as solved from the markers; `None` where too few were seen.
+    pub pose: Option<Pose>,
+    /// The markers in the order of the body's template, in metres; `None` where one was not seen.
+    pub markers: Vec<Option<Point3<f64>>>,
+}
+
+/// What motion capture recorded of one body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Track {
+    /// Name of the body: [`RIG_SUBJECT`] or a board.
+    pub subject: String,
+    /// Its frames, in order of time.
+    pub frames: Vec<TrackedFrame>,
+}
+
+/// One stretch of scans with nothing moving, as it was recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stretch {
+    /// What the experimenter noted.
+    pub label: PoseLabel,
+    /// Time at which the first scan began, in seconds since the recording began.
+    pub start_s: f64,
+    /// Time from the start of one scan to the start of the next, in seconds.
+    pub scan_period_s: f64,
+    /// Beams of a scan.
+    pub beams: usize,
+    /// Readings in metres, scan after scan; −∞ too close, +∞ no return, NaN invalid (REP-117).
+    pub ranges: Vec<f64>,
+    /// The tracked bodies, the rig first.
+    pub tracks: Vec<Track>,
+}
+
 /// One stretch of scans with nothing moving, and where motion capture saw rig and board.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseRecord {
@@ -78,6 +121,56 @@ pub struct Dataset {
     pub session: Session,
     /// The stretches, in the order they were recorded.
     pub poses: Vec<PoseRecord>,
+}
+
+impl Track {
+    /// Mean of the solved poses; `None` if the body was never seen.
+    ///
+    /// Positions are averaged, and quaternions after bringing them to one sign: exact to second order in the spread,
+    /// which is far below a milliradian here.
+    pub fn mean_pose(&self) -> Option<Pose> {
+        let mut poses = self.frames.iter().filter_map(|f| f.pose);
+        let first = poses.next()?;
+        let (mut translation, mut rotation) = (first.translation.vector, first.rotation.into_inner());
+        let mut count = 1.0;
+        for pose in poses {
+            translation += pose.translation.vector;
+            let q = pose.rotation.into_inner();
+            rotation += if q.dot(&first.rotation) < 0.0 { -q } else { q };
+            count += 1.0;
+        }
+        let rotation: Quaternion<f64> = rotation / count;
+        Some(Pose::from_parts(
+            Translation3::from(Vector3::from(translation / count)),
+            UnitQuaternion::new_normalize(rotation),
+        ))
+    }
+}
+
+impl Stretch {
+    /// What a calibration needs of the stretch.
+    ///
+    /// # Errors
+    /// [`ModelError::Inconsistent`] if motion capture never saw the rig.
+    pub fn into_record(self) -> Result<PoseRecord, ModelError> {
+        let mean = |subject: &str| {
+            self.tracks
+                .iter()
+                .find(|t| t.subject == subject)
+                .and_then(Track::mean_pose)
+        };
+        let room_from_rig = mean(RIG_SUBJECT).ok_or_else(|| {
+            ModelError::Inconsistent(format!("pose {}: the rig was never tracked", self.label.pose))
+        })?;
+        let room_from_board = self.label.board.as_deref().and_then(mean);
+        Ok(PoseRecord {
+            room_from_rig,
+            room_from_board,
+            beams: self.beams,
+            ranges: self.ranges,
+            label: self.label,
+        })
+    }
 }
 
 impl PoseRecord {

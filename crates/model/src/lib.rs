@@ -43,7 +43,7 @@ pub use beam::Deflection;
 pub use bias::{AngleBias, BiasTerms, ColorBias, DistanceBias, RangeBias};
 pub use board::{BoardPlane, Rectangle};
 pub use calibration::{BeamEstimate, Calibration, Status};
-pub use dataset::{Dataset, PoseKind, PoseLabel, PoseRecord, Summary};
+pub use dataset::{Dataset, PoseKind, PoseLabel, PoseRecord, Stretch, Summary, Track, TrackedFrame};
 pub use error::ModelError;
 pub use frame::{Pose, PoseData};
 pub use mirror::MirrorPlane;
