@@ -1,0 +1,121 @@
+//! From a facet as a person describes it to its corners in the nominal sensor frame.
+
+use crate::scene::{FacetShape, RectangleShape, Wedge};
+use catoptric_model::beam;
+use catoptric_model::mirror;
+use nalgebra::{Point3, Unit, Vector3};
+
+/// Corners of a facet as drawn, in metres, counter-clockwise seen from the reflecting side.
+///
+/// `None` if the description spans no mirror: a beam that is not deflected, a plane that one of the two azimuths
+/// does not meet, a normal of zero length.
+pub fn corners(shape: &FacetShape) -> Option<Vec<Point3<f64>>> {
+    match shape {
+        FacetShape::Wedge(wedge) => wedge_corners(wedge),
+        FacetShape::Rectangle(rectangle) => rectangle_corners(rectangle),
+        FacetShape::Polygon(polygon) => Some(
+            polygon
+                .corners_mm
+                .iter()
+                .map(|c| Point3::from(Vector3::from(*c) * 1e-3))
+                .collect(),
+        ),
+    }
+}
+
+/// The plane mirror that sends the middle beam where it is wanted, cut where the two azimuths and heights meet it.
+fn wedge_corners(wedge: &Wedge) -> Option<Vec<Point3<f64>>> {
+    let [first, last] = wedge.azimuth_deg.map(f64::to_radians);
+    let u = beam::direction(0.5 * (first + last));
+    let v = beam::spherical(
+        wedge.exit_azimuth_deg.to_radians(),
+        wedge.exit_elevation_deg.to_radians(),
+    );
+    let m = mirror::normal_between(&u, &v)?;
+    let offset = m.dot(&u) * wedge.distance_mm * 1e-3;
+    let corner = |azimuth: f64, z: f64| {
+        let u = beam::direction(azimuth);
+        let radius = (offset - m.z * z) / m.dot(&u);
+        (radius.is_finite() && radius > 0.0).then(|| Point3::from(u.into_inner() * radius + Vector3::z() * z))
+    };
+    let z = 0.5e-3 * wedge.height_mm;
+    let mut corners = vec![
+        corner(first, -z)?,
+        corner(last, -z)?,
+        corner(last, z)?,
+        corner(first, z)?,
+    ];
+    if area_vector(&corners).dot(&m) < 0.0 {
+        corners.reverse();
+    }
+    Some(corners)
+}
+
+fn rectangle_corners(rectangle: &RectangleShape) -> Option<Vec<Point3<f64>>> {
+    let m = Unit::try_new(Vector3::from(rectangle.normal), f64::MIN_POSITIVE)?;
+    // A mirror parallel to the scan plane has no horizontal side of its own; x will do.
+    let across = Unit::try_new(Vector3::z().cross(&m), 1e-9).unwrap_or(Vector3::x_axis());
+    let along = m.cross(&across);
+    let center = Point3::from(Vector3::from(rectangle.center_mm) * 1e-3);
+    let (x, y) = (
+        across.into_inner() * (0.5e-3 * rectangle.width_mm),
+        along * (0.5e-3 * rectangle.height_mm),
+    );
+    Some(vec![
+        center - x - y,
+        center + x - y,
+        center + x + y,
+        center - x + y,
+    ])
+}
+
+/// Twice the vector area of a polygon (Newell): its direction is the normal seen counter-clockwise.
+pub fn area_vector(corners: &[Point3<f64>]) -> Vector3<f64> {
+    let closed = corners.iter().zip(corners.iter().cycle().skip(1));
+    closed.map(|(a, b)| a.coords.cross(&b.coords)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use catoptric_model::MirrorPlane;
+
+    #[test]
+    fn a_wedge_sends_its_middle_beam_where_it_is_wanted() {
+        let wedge = Wedge {
+            azimuth_deg: [62.0, 77.0],
+            distance_mm: 70.0,
+            exit_azimuth_deg: 60.0,
+            exit_elevation_deg: -50.0,
+            height_mm: 12.0,
+        };
+        let corners = wedge_corners(&wedge).expect("it is a mirror");
+        let plane = MirrorPlane::through(corners[0], Unit::new_normalize(area_vector(&corners)));
+        let middle = 69.5_f64.to_radians();
+        let deflection = plane
+            .deflect(beam::direction(middle))
+            .expect("it faces the scanner");
+        let wanted = beam::spherical(60.0_f64.to_radians(), -50.0_f64.to_radians());
+        assert!(beam::angle_between(&deflection.exit_direction(middle), &wanted) < 1e-14);
+        assert!((deflection.distance - 0.07).abs() < 1e-15);
+        for c in &corners {
+            assert!((plane.normal.dot(&c.coords) - plane.offset).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn a_rectangle_faces_along_its_normal() {
+        let shape = RectangleShape {
+            center_mm: [0.0, 94.0, 0.0],
+            normal: [0.45, -0.33, -0.4036],
+            width_mm: 68.0,
+            height_mm: 20.0,
+        };
+        let corners = rectangle_corners(&shape).expect("it is a mirror");
+        let m = Unit::new_normalize(Vector3::from(shape.normal));
+        let area = area_vector(&corners);
+        assert!((area.norm() * 0.5 - 0.068 * 0.02).abs() < 1e-12);
+        assert!(beam::angle_between(&Unit::new_normalize(area), &m) < 1e-12);
+        assert!((corners[0].z - corners[1].z).abs() < 1e-15);
+    }
+}

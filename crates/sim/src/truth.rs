@@ -1,0 +1,125 @@
+//! The truth: what was really simulated, kept apart from what was observed.
+
+use catoptric_model::beam::{self, Deflection};
+use catoptric_model::{PoseData, PoseKind, RangeBias};
+use nalgebra::{Unit, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Version of `truth.json`.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// Everything a score is counted against.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Truth {
+    /// Version of this file's format.
+    pub schema_version: u32,
+    /// Name of the scene.
+    pub name: String,
+    /// Seed of the run.
+    pub seed: u64,
+    /// Where the rig stood.
+    pub room_from_rig: PoseData,
+    /// Where the sensor sat in the rig.
+    pub rig_from_sensor: PoseData,
+    /// The biases the sensor had.
+    pub bias: RangeBias,
+    /// The mirrors as built.
+    pub facets: Vec<TrueFacet>,
+    /// What became of every beam's light at the structure, boards aside.
+    pub beams: Vec<TrueBeam>,
+    /// What was true of every stretch.
+    pub poses: Vec<TruePose>,
+}
+
+/// A mirror as built, in the true sensor frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrueFacet {
+    /// Name.
+    pub name: String,
+    /// Unit normal m of its plane, on the reflecting side.
+    pub normal: [f64; 3],
+    /// h of the plane m·x = h, in metres.
+    pub offset_m: f64,
+    /// Corners, in metres.
+    pub corners_m: Vec<[f64; 3]>,
+}
+
+/// What the structure does to a beam.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BeamClass {
+    /// All of it passes by.
+    Direct,
+    /// All of it leaves by one facet.
+    Deflected,
+    /// Its parts take different ways.
+    Split,
+    /// All of it leaves after more than one facet.
+    MultiBounce,
+    /// All of it ends on the structure.
+    Blocked,
+    /// All of it is still between mirrors after the last bounce allowed.
+    Lost,
+}
+
+/// What became of a beam's light at the structure. Angles are those of the chief ray.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrueBeam {
+    /// Index of the beam.
+    pub beam: usize,
+    /// What the structure does to it.
+    pub status: BeamClass,
+    /// Facets the chief ray meets, in order.
+    pub facets: Vec<String>,
+    /// Where it meets them, in the sensor frame, in metres.
+    pub points_m: Vec<[f64; 3]>,
+    /// θ_a, in radians; absent where the chief ray does not leave.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub azimuth_rad: Option<f64>,
+    /// φ, in radians.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub elevation_rad: Option<f64>,
+    /// d: distance to the first facet, in metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distance_m: Option<f64>,
+    /// Share of the beam's energy that goes the chief ray's way.
+    pub chief_energy: f64,
+}
+
+/// What was true of a stretch.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TruePose {
+    /// Number of the pose.
+    pub pose: usize,
+    /// What it was recorded for.
+    pub kind: PoseKind,
+    /// Where the board stood.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub room_from_board: Option<PoseData>,
+    /// Drift of all its readings, in metres.
+    pub drift_m: f64,
+}
+
+impl TrueBeam {
+    /// θ_a, φ and d of a beam whose chief ray is deflected once.
+    pub fn deflection(&self) -> Option<Deflection> {
+        (self.facets.len() == 1).then_some(())?;
+        Some(Deflection {
+            azimuth: self.azimuth_rad?,
+            elevation: self.elevation_rad?,
+            distance: self.distance_m?,
+        })
+    }
+
+    /// Direction in which the chief ray leaves, in the sensor frame.
+    pub fn exit_direction(&self) -> Option<Unit<Vector3<f64>>> {
+        Some(beam::spherical(
+            beam::azimuth(self.beam) + self.azimuth_rad?,
+            self.elevation_rad?,
+        ))
+    }
+}
