@@ -1,8 +1,14 @@
 //! The virtual laboratory: a 2D LiDAR with mirrors, target boards and motion capture, simulated ray by ray.
 
+pub mod cast;
+pub mod error;
+pub mod footprint;
 pub mod layout;
+pub mod noise;
+pub mod scanner;
 pub mod scene;
 pub mod truth;
 
+pub use error::SimError;
 pub use scene::Scene;
 pub use truth::Truth;
