@@ -1,12 +1,17 @@
 //! The virtual laboratory: a 2D LiDAR with mirrors, target boards and motion capture, simulated ray by ray.
 
 pub mod cast;
+pub mod color;
+pub mod detect;
 pub mod error;
 pub mod footprint;
 pub mod layout;
 pub mod noise;
+pub mod optics;
+pub mod power;
 pub mod scanner;
 pub mod scene;
+pub mod structure;
 pub mod truth;
 
 pub use error::SimError;
