@@ -711,6 +711,4 @@ impl NoiseTable {
     pub fn sd(&self, range: f64) -> f64 {
         interpolate(&self.range_m, &self.sd_mm, range) * 1e-3
     }
-        .error(range)
-    }
 }
