@@ -11,8 +11,9 @@ pub(crate) const AGREEMENT_FLOOR: f64 = 0.02;
 pub(crate) struct Ahead {
     pub(crate) distance: f64,
     pub(crate) plane: BoardPlane,
-    /// Whether the whole beam falls on that surface.
-    pub(crate) whole: bool,
+    /// How much the range changes where part of the beam meets another surface, in metres: nothing on one surface, the
+    /// difference of two walls in a corner of the room, without limit at the edge of a board.
+    pub(crate) spread: f64,
 }
 
 /// What a ray in the sensor frame meets, board or room, and the surface's color.
@@ -40,15 +41,19 @@ pub(crate) fn ahead<'s>(
             let ahead = Ahead {
                 distance: hit.distance,
                 plane: board.plane,
-                whole,
+                spread: if whole { 0.0 } else { f64::INFINITY },
             };
             return Some((ahead, &board.color));
         }
     }
     let (across, up) = frame::tangent_basis(direction);
-    let whole = [across, -across, up, -up].iter().all(|side| {
+    let spread = [across, -across, up, -up].iter().fold(0.0, |spread: f64, side| {
         let near = Unit::new_normalize(direction.into_inner() + side.into_inner() * cone);
-        wall(&near).is_some_and(|(_, other)| other.normal == plane.normal)
+        match wall(&near) {
+            Some((_, other)) if other.normal == plane.normal => spread,
+            Some((there, _)) => spread.max((there - distance).abs()),
+            None => f64::INFINITY,
+        }
     });
     let sensor_from_room = room_from_sensor.inverse();
     let plane = BoardPlane::new(
@@ -58,7 +63,7 @@ pub(crate) fn ahead<'s>(
     let ahead = Ahead {
         distance,
         plane,
-        whole,
+        spread,
     };
     Some((ahead, &session.room.color))
 }

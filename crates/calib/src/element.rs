@@ -439,9 +439,6 @@ impl<'a> Attempt<'a> {
             let Some((wall, color)) = ahead(self.session, &room_from_sensor, None, &origin, &v) else {
                 continue;
             };
-            if !wall.whole {
-                continue;
-            }
             let observation = [Observation {
                 board: BoardView {
                     plane: wall.plane,
@@ -456,7 +453,7 @@ impl<'a> Attempt<'a> {
             let residuals = self.element(&observation).residuals(found).unwrap_or_default();
             let variance = budget.covariance[(0, 0)]
                 + (&budget.jacobian * covariance * budget.jacobian.transpose())[(0, 0)];
-            let limit = AGREEMENT_FLOOR + GATE_FLOOR + GATE_SIGMAS * variance.sqrt();
+            let limit = AGREEMENT_FLOOR + GATE_FLOOR + wall.spread + GATE_SIGMAS * variance.sqrt();
             if let Some(residual) = residuals.first().filter(|r| r.abs() > limit) {
                 return Err(rejected(format!(
                     "contradicts the known room: expected {:.3} m, found {:.3} m",

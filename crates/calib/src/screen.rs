@@ -219,7 +219,7 @@ impl<'a> Screen<'a> {
         let Some((ahead, color)) = ahead else {
             return Expected::Unclear;
         };
-        if !ahead.whole || ahead.distance > session.scanner.range_max_m {
+        if ahead.spread.is_infinite() || ahead.distance > session.scanner.range_max_m {
             return Expected::Unclear;
         }
         let beliefs = &session.believed;
@@ -242,7 +242,7 @@ impl<'a> Screen<'a> {
         let smear = 0.1 * ahead.distance * tan * cone_half_angle(session);
         Expected::Range(
             ahead.distance + bias,
-            AGREEMENT_FLOOR + smear + AGREEMENT_SIGMAS * variance.sqrt(),
+            AGREEMENT_FLOOR + smear + ahead.spread + AGREEMENT_SIGMAS * variance.sqrt(),
         )
     }
 }

@@ -1,0 +1,120 @@
+//! No element disappears: what is wrong with each is said.
+
+use crate::synthetic::World;
+use catoptric_calib::{CalibError, Method, Options, calibrate, pose};
+use catoptric_model::{BeamEstimate, Calibration, Dataset, PoseKind, Status};
+use nalgebra::Matrix6;
+
+fn solve(dataset: &Dataset) -> Calibration {
+    calibrate(dataset, Method::Beam, &Options::default()).expect("a sound dataset")
+}
+
+/// Rewrites every reading of a beam in every stretch.
+fn rewrite(dataset: &mut Dataset, beam: usize, with: impl Fn(PoseKind, usize, f64) -> f64) {
+    for pose in &mut dataset.poses {
+        let (kind, beams) = (pose.label.kind, pose.beams);
+        for (scan, r) in pose.ranges.iter_mut().skip(beam).step_by(beams).enumerate() {
+            *r = with(kind, scan, *r);
+        }
+    }
+}
+
+fn assert_rejected(estimate: &BeamEstimate, word: &str) {
+    assert_eq!(estimate.status, Status::Rejected, "{:?}", estimate.reason);
+    let reason = estimate.reason.as_deref().expect("a rejection says why");
+    assert!(reason.contains(word), "{reason:?} does not say {word:?}");
+}
+
+#[test]
+fn every_fault_has_its_reason() {
+    let mut made = World::noisy(11).make();
+    let data = &mut made.dataset;
+    rewrite(data, 20, |_, _, _| 0.09);
+    rewrite(data, 21, |_, _, _| f64::INFINITY);
+    rewrite(data, 22, |_, _, _| f64::NEG_INFINITY);
+    rewrite(data, 65, |_, scan, r| if scan % 2 == 0 { r } else { r + 0.3 });
+    rewrite(data, 23, |_, _, r| r - 0.4);
+    rewrite(
+        data,
+        66,
+        |kind, _, r| if kind == PoseKind::Room { r + 0.5 } else { r },
+    );
+    let calibration = solve(data);
+    assert_rejected(&calibration.beams[20], "structure");
+    assert_rejected(&calibration.beams[21], "no return");
+    assert_rejected(&calibration.beams[22], "too close");
+    assert_rejected(&calibration.beams[65], "spread");
+    assert_rejected(&calibration.beams[23], "expected");
+    assert_rejected(&calibration.beams[66], "contradicts the known room");
+    for estimate in &calibration.beams {
+        assert!(estimate.status == Status::Solved || estimate.reason.is_some());
+    }
+}
+
+#[test]
+fn one_reading_of_the_wall_does_not_lose_the_element() {
+    let mut made = World::noisy(12).make();
+    let clean = solve(&made.dataset).beams[66].clone();
+    let beams = made.dataset.session.scanner.beams;
+    let pose = made
+        .dataset
+        .poses
+        .iter_mut()
+        .find(|p| p.label.kind == PoseKind::Facet)
+        .expect("there are boards for facets");
+    for r in pose.ranges.iter_mut().skip(66).step_by(beams) {
+        *r += 0.12;
+    }
+    let found = &solve(&made.dataset).beams[66];
+    assert_eq!(found.status, Status::Solved, "{:?}", found.reason);
+    assert_eq!(found.poses, clean.poses.map(|p| p - 1));
+}
+
+#[test]
+fn good_elements_survive_honest_noise() {
+    let mut lost = 0;
+    for seed in 0..20 {
+        let made = World::noisy(500 + seed).make();
+        let calibration = solve(&made.dataset);
+        lost += calibration
+            .beams
+            .iter()
+            .filter(|b| {
+                let expected = if made.deflections.contains_key(&b.beam) {
+                    Status::Solved
+                } else {
+                    Status::Direct
+                };
+                b.status != expected
+            })
+            .count();
+    }
+    // 5420 elements: 0.1 % would be five.
+    assert!(lost <= 5, "{lost} of 5420");
+}
+
+#[test]
+fn without_boards_for_it_the_mounting_is_the_drawing_s_and_says_so() {
+    let mut made = World::noisy(13).make();
+    made.dataset.poses.retain(|p| p.label.kind != PoseKind::Direct);
+    let mount = solve(&made.dataset).rig_from_sensor.expect("it is always given");
+    let covariance = Matrix6::from(mount.covariance.expect("it is always given"));
+    let nominal = catoptric_model::Pose::from(&made.dataset.session.nominal_rig_from_sensor);
+    assert!(pose::motion_between(&nominal, &mount.pose()).norm() < 1e-14);
+    assert!((covariance[(5, 5)].sqrt().to_degrees() - 1.0).abs() < 1e-9);
+    assert!((covariance[(0, 0)].sqrt() - 5e-3).abs() < 1e-12);
+}
+
+#[test]
+fn a_dataset_that_cannot_be_is_refused() {
+    let mut made = World::noisy(14).make();
+    made.dataset.session.facets[0].corners_mm.truncate(2);
+    let refused = calibrate(&made.dataset, Method::Beam, &Options::default());
+    assert!(matches!(refused, Err(CalibError::Facet { corners: 2, .. })));
+    made.dataset.session.believed.drift_sd_mm = -1.0;
+    let refused = calibrate(&made.dataset, Method::Beam, &Options::default());
+    assert!(matches!(refused, Err(CalibError::Session { found, .. }) if found == -1.0));
+    made.dataset.poses[0].ranges.pop();
+    let refused = calibrate(&made.dataset, Method::Beam, &Options::default());
+    assert!(matches!(refused, Err(CalibError::Dataset(_))));
+}
