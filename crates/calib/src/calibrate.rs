@@ -60,7 +60,11 @@ pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result
         options,
     };
     // The drawing decides which boards an element can hit only until its neighbors tell how the facet was built.
-    let first = estimates(&work, &candidates, &drawn);
+    let by_batch = Workspace {
+        method: Method::Beam,
+        ..work
+    };
+    let first = estimates(&by_batch, &candidates, &drawn);
     let built: Vec<MirrorPlane> = session
         .facets
         .iter()

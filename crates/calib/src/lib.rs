@@ -14,12 +14,14 @@
 
 mod ahead;
 mod calibrate;
+mod choose;
 pub mod common;
 pub mod covariance;
 mod element;
 pub mod error;
 pub mod initial;
 pub mod jacobian;
+mod judge;
 mod mount_data;
 pub mod observability;
 pub mod observations;

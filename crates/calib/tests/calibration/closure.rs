@@ -86,3 +86,38 @@ fn recursion_ends_at_the_batch_s_answer() {
     }
     assert_eq!(compared, made.deflections.len());
 }
+
+#[test]
+fn a_wide_facet_is_solved_group_by_group_on_the_boards_that_are_hit() {
+    // Boards of half a metre, seen by a third of the fan each: most beams miss most boards and read the wall there.
+    let world = World {
+        served: vec![[480, 600]],
+        groups: 3,
+        board_mm: 400.0,
+        ..World::exact()
+    };
+    let made = world.make();
+    let calibration = calibrate(&made.dataset, Method::Beam, &Options::default()).expect("a sound dataset");
+    let mut solved = 0;
+    for (index, truth) in &made.deflections {
+        let estimate = &calibration.beams[*index];
+        let Some(found) = estimate.deflection() else {
+            assert_eq!(
+                estimate.status,
+                Status::TooFewPoses,
+                "beam {index}: {:?}",
+                estimate.reason
+            );
+            continue;
+        };
+        let azimuth = world.azimuth(*index);
+        let angle = beam::angle_between(&found.exit_direction(azimuth), &truth.exit_direction(azimuth));
+        assert!(
+            angle < 1e-9,
+            "beam {index}: off by {angle:e} rad on {:?} boards",
+            estimate.poses
+        );
+        solved += 1;
+    }
+    assert!(solved >= 80, "{solved} of {}", made.deflections.len());
+}

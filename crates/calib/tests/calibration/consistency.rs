@@ -46,12 +46,6 @@ fn angles_and_mounting_err_as_much_as_they_say() {
         mount_nees += (off.transpose() * covariance.try_inverse().expect("it is positive definite") * off)[0];
     }
     let runs = SEEDS as f64;
-    eprintln!(
-        "{:?} {} {}",
-        nees.map(|s| s / 2.0 / runs),
-        mount_nees / 6.0 / runs,
-        noise_only / 6.0 / runs
-    );
     for sum in nees {
         let mean = sum / (2.0 * runs);
         assert!(

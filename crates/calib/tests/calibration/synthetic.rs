@@ -7,10 +7,10 @@ use nalgebra::{ComplexField, Matrix3, Point3, Translation3, Unit, UnitQuaternion
 use std::collections::BTreeMap;
 
 /// A small deterministic generator: SplitMix64 and Box–Muller.
-pub struct Draw(pub u64);
+pub(crate) struct Draw(pub(crate) u64);
 
 impl Draw {
-    pub fn uniform(&mut self) -> f64 {
+    pub(crate) fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -18,7 +18,7 @@ impl Draw {
         ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    pub fn normal(&mut self) -> f64 {
+    pub(crate) fn normal(&mut self) -> f64 {
         let radius = (-2.0 * ComplexField::ln(1.0 - self.uniform())).sqrt();
         radius * beam::direction(std::f64::consts::TAU * self.uniform()).x
     }
@@ -26,13 +26,13 @@ impl Draw {
 
 /// A board relative to the ray it is set up for: distance after the mirror, tilt and direction of tilt.
 #[derive(Clone, Copy)]
-pub struct Placement {
-    pub s: f64,
-    pub tilt_deg: f64,
-    pub psi_deg: f64,
+pub(crate) struct Placement {
+    pub(crate) s: f64,
+    pub(crate) tilt_deg: f64,
+    pub(crate) psi_deg: f64,
 }
 
-pub fn placements(list: &[(f64, f64, f64)]) -> Vec<Placement> {
+pub(crate) fn placements(list: &[(f64, f64, f64)]) -> Vec<Placement> {
     list.iter()
         .map(|&(s, tilt_deg, psi_deg)| Placement { s, tilt_deg, psi_deg })
         .collect()
@@ -40,48 +40,51 @@ pub fn placements(list: &[(f64, f64, f64)]) -> Vec<Placement> {
 
 /// What to record, and with which errors.
 #[derive(Clone)]
-pub struct World {
-    pub seed: u64,
-    pub beams: usize,
-    pub step_deg: f64,
-    pub scans: usize,
+pub(crate) struct World {
+    pub(crate) seed: u64,
+    pub(crate) beams: usize,
+    pub(crate) step_deg: f64,
+    pub(crate) scans: usize,
     /// Served beams of each facet.
-    pub served: Vec<[usize; 2]>,
-    /// Boards of each facet.
-    pub facet_boards: Vec<Placement>,
+    pub(crate) served: Vec<[usize; 2]>,
+    /// Groups of neighboring beams of each facet, each with its own boards.
+    pub(crate) groups: usize,
+    /// Boards of each group.
+    pub(crate) facet_boards: Vec<Placement>,
     /// Azimuths, in degrees, at which boards for the mounting stand.
-    pub direct_boards: Vec<(f64, Placement)>,
-    pub board_mm: f64,
-    pub thickness_mm: f64,
+    pub(crate) direct_boards: Vec<(f64, Placement)>,
+    pub(crate) board_mm: f64,
+    pub(crate) thickness_mm: f64,
     /// True motion of the sensor against the drawing.
-    pub mount_motion: [f64; 6],
-    pub facet_tilt_deg: f64,
-    pub facet_shift_mm: f64,
-    pub noise_mm: f64,
-    pub drift_mm: f64,
-    pub marker_mm: f64,
-    pub distance_bias_sd_mm: f64,
-    pub angle_gain_sd_mm: f64,
-    pub color_bias_sd_mm: f64,
-    pub distance_sd_mm: f64,
+    pub(crate) mount_motion: [f64; 6],
+    pub(crate) facet_tilt_deg: f64,
+    pub(crate) facet_shift_mm: f64,
+    pub(crate) noise_mm: f64,
+    pub(crate) drift_mm: f64,
+    pub(crate) marker_mm: f64,
+    pub(crate) distance_bias_sd_mm: f64,
+    pub(crate) angle_gain_sd_mm: f64,
+    pub(crate) color_bias_sd_mm: f64,
+    pub(crate) distance_sd_mm: f64,
 }
 
 /// A dataset and what it was made from.
-pub struct Made {
-    pub dataset: Dataset,
-    pub deflections: BTreeMap<usize, Deflection>,
-    pub rig_from_sensor: Pose,
+pub(crate) struct Made {
+    pub(crate) dataset: Dataset,
+    pub(crate) deflections: BTreeMap<usize, Deflection>,
+    pub(crate) rig_from_sensor: Pose,
 }
 
 impl World {
     /// The whole scanner, no noise: mounting off by 1°, facets off by 1° and half a millimetre.
-    pub fn exact() -> Self {
+    pub(crate) fn exact() -> Self {
         Self {
             seed: 1,
             beams: 1081,
             step_deg: 0.25,
             scans: 2,
             served: vec![[240, 300], [510, 570], [780, 840]],
+            groups: 1,
             facet_boards: placements(&[
                 (1.3, 40.0, 10.0),
                 (1.6, 35.0, 100.0),
@@ -120,7 +123,7 @@ impl World {
     }
 
     /// A coarse scanner with every error that a session can believe in.
-    pub fn noisy(seed: u64) -> Self {
+    pub(crate) fn noisy(seed: u64) -> Self {
         Self {
             seed,
             beams: 271,
@@ -138,7 +141,7 @@ impl World {
         }
     }
 
-    pub fn azimuth(&self, beam: usize) -> f64 {
+    pub(crate) fn azimuth(&self, beam: usize) -> f64 {
         (beam as f64 - 0.5 * (self.beams as f64 - 1.0)) * self.step_deg.to_radians()
     }
 
@@ -157,7 +160,7 @@ impl World {
         MirrorPlane::through(Point3::from(u.into_inner() * distance), normal)
     }
 
-    pub fn make(&self) -> Made {
+    pub(crate) fn make(&self) -> Made {
         let mut draw = Draw(self.seed);
         let believed = RangeBias {
             distance: DistanceBias {
@@ -199,10 +202,10 @@ impl World {
         let mut bare = vec![0.0; self.beams];
         for (facet, served) in self.served.iter().enumerate() {
             let mirror = self.mirror(facet, true);
-            for beam in served[0]..=served[1] {
+            for (beam, bare) in bare.iter_mut().enumerate().take(served[1] + 1).skip(served[0]) {
                 let u = beam::direction(self.azimuth(beam));
                 let deflection = mirror.deflect(u).expect("the facet faces its beams");
-                bare[beam] = deflection.distance
+                *bare = deflection.distance
                     + 1e-3 * self.thickness_mm / mirror.normal.dot(&u).abs()
                     + 1e-3 * self.distance_sd_mm * draw.normal();
                 deflections.insert(beam, deflection);
@@ -224,13 +227,15 @@ impl World {
             poses.push(lab.record(PoseKind::Direct, None, Some(board), &mut draw));
         }
         for (facet, served) in self.served.iter().enumerate() {
-            let middle = usize::midpoint(served[0], served[1]);
-            let (azimuth, deflection) = (self.azimuth(middle), deflections[&middle]);
-            for placement in &self.facet_boards {
-                let v = deflection.exit_direction(azimuth);
-                let board = set_up(&deflection.deflection_point(azimuth), &v, placement);
-                let name = Some(format!("facet {facet}"));
-                poses.push(lab.record(PoseKind::Facet, name, Some(board), &mut draw));
+            for group in 0..self.groups {
+                let middle = served[0] + (served[1] - served[0]) * (2 * group + 1) / (2 * self.groups);
+                let (azimuth, deflection) = (self.azimuth(middle), deflections[&middle]);
+                for placement in &self.facet_boards {
+                    let v = deflection.exit_direction(azimuth);
+                    let board = set_up(&deflection.deflection_point(azimuth), &v, placement);
+                    let name = Some(format!("facet {facet}"));
+                    poses.push(lab.record(PoseKind::Facet, name, Some(board), &mut draw));
+                }
             }
         }
         for (i, pose) in poses.iter_mut().enumerate() {
