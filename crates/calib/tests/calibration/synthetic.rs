@@ -53,6 +53,10 @@ pub(crate) struct World {
     pub(crate) facet_boards: Vec<Placement>,
     /// Azimuths, in degrees, at which boards for the mounting stand.
     pub(crate) direct_boards: Vec<(f64, Placement)>,
+    /// Full width of a beam along the scan, in radians: its light is spread over it evenly. 0 for a pencil.
+    pub(crate) width: f64,
+    /// Beams by which the mirrors as built reach less far (first) or farther (last) than drawn, at either end.
+    pub(crate) edges: [i64; 2],
     pub(crate) board_mm: f64,
     pub(crate) thickness_mm: f64,
     /// True motion of the sensor against the drawing.
@@ -107,6 +111,8 @@ impl World {
                     )
                 })
                 .collect(),
+            width: 0.0,
+            edges: [0, 0],
             board_mm: 1000.0,
             thickness_mm: 2.0,
             mount_motion: [0.004, -0.003, 0.002, 0.015, -0.012, 0.01],
@@ -145,7 +151,8 @@ impl World {
         (beam as f64 - 0.5 * (self.beams as f64 - 1.0)) * self.step_deg.to_radians()
     }
 
-    fn mirror(&self, facet: usize, as_built: bool) -> MirrorPlane {
+    /// The plane of a facet, as built or as drawn.
+    pub(crate) fn mirror(&self, facet: usize, as_built: bool) -> MirrorPlane {
         let [first, last] = self.served[facet];
         let middle = 0.5 * (self.azimuth(first) + self.azimuth(last));
         let u = beam::direction(middle);
@@ -158,6 +165,17 @@ impl World {
             distance += 1e-3 * self.facet_shift_mm;
         }
         MirrorPlane::through(Point3::from(u.into_inner() * distance), normal)
+    }
+
+    /// What the mirrors as built do to a ray.
+    fn mirrored(&self, azimuth: f64) -> Option<Deflection> {
+        let step = self.step_deg.to_radians();
+        let facet = self.served.iter().position(|s| {
+            let first = self.azimuth(s[0]) + step * (self.edges[0] as f64 - 0.5);
+            let last = self.azimuth(s[1]) + step * (self.edges[1] as f64 + 0.5);
+            (first..=last).contains(&azimuth)
+        })?;
+        self.mirror(facet, true).deflect(beam::direction(azimuth))
     }
 
     pub(crate) fn make(&self) -> Made {
@@ -395,10 +413,30 @@ impl Lab<'_> {
         room_from_board * Pose::from_parts(Translation3::new(0.0, 0.0, fit.x), tilt)
     }
 
-    /// Range of a beam with its biases.
+    /// Range of a beam: the mean over what its light meets first, whatever lies within a pulse of the nearest.
     fn range(&self, beam: usize, sensor_from_board: Option<&Pose>) -> f64 {
-        let azimuth = self.world.azimuth(beam);
-        let deflection = self.deflections.get(&beam).copied().unwrap_or(Deflection::NONE);
+        const PARTS: usize = 9;
+        const PULSE: f64 = 0.45;
+        let world = self.world;
+        if world.width == 0.0 {
+            let deflection = self.deflections.get(&beam).copied();
+            return self.part(world.azimuth(beam), deflection, sensor_from_board);
+        }
+        let parts: Vec<f64> = (0..PARTS)
+            .map(|k| {
+                let off = (k as f64 + 0.5) / PARTS as f64 - 0.5;
+                let azimuth = world.azimuth(beam) + off * world.width;
+                self.part(azimuth, world.mirrored(azimuth), sensor_from_board)
+            })
+            .collect();
+        let nearest = parts.iter().copied().fold(f64::INFINITY, f64::min);
+        let merged: Vec<f64> = parts.into_iter().filter(|r| r - nearest < PULSE).collect();
+        merged.iter().sum::<f64>() / merged.len() as f64
+    }
+
+    /// Range of a ray with its biases.
+    fn part(&self, azimuth: f64, deflection: Option<Deflection>, sensor_from_board: Option<&Pose>) -> f64 {
+        let deflection = deflection.unwrap_or(Deflection::NONE);
         let (origin, v) = (
             deflection.deflection_point(azimuth),
             deflection.exit_direction(azimuth),
