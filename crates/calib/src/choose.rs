@@ -1,6 +1,6 @@
 //! Which boards an element hits: those that hold its spot where the estimate puts it, and whose range agrees.
 
-use crate::covariance::{self, Budget};
+use crate::covariance::{self, Budget, MountUncertainty};
 use crate::element::{LEAST_BOARDS, Workspace};
 use crate::observations::{BoardView, Observation, azimuth, cone_half_angle};
 use crate::solve::{BareDistance, Element};
@@ -106,6 +106,12 @@ impl<'a> Attempt<'a> {
             distance: self.distance,
             bias: &self.session.believed.bias,
         }
+    }
+
+    /// The budget as if the mounting were known: what the boards themselves determine.
+    pub(crate) fn boards_alone(&self, at: &Deflection, observations: &[Observation]) -> Option<Budget> {
+        let views: Vec<BoardView> = observations.iter().map(|o| o.board).collect();
+        covariance::budget(self.session, &MountUncertainty::none(), self.azimuth, at, &views)
     }
 
     pub(crate) fn budget(&self, at: &Deflection, observations: &[Observation]) -> Option<Budget> {

@@ -180,8 +180,8 @@ impl Attempt<'_> {
         fits.min_by(|a, b| a.rms().total_cmp(&b.rms()))
     }
 
-    fn weakness(&self, at: &Deflection, poses: &[usize]) -> Option<Weakness> {
-        let budget = self.budget(at, &self.observations(poses))?;
+    pub(crate) fn weakness(&self, at: &Deflection, poses: &[usize]) -> Option<Weakness> {
+        let budget = self.boards_alone(at, &self.observations(poses))?;
         observability::weakness(&budget, at.elevation)
     }
 

@@ -3,7 +3,6 @@
 use crate::ahead::{AGREEMENT_FLOOR, ahead};
 use crate::choose::{Attempt, GATE_FLOOR, GATE_SIGMAS};
 use crate::element::{Failure, Fit, lost, rejected};
-use crate::observability;
 use crate::observations::{BoardView, Observation};
 use crate::spread;
 use catoptric_model::{BeamEstimate, Deflection, PoseKind, RawRange, Status};
@@ -48,7 +47,7 @@ impl Attempt<'_> {
         let budget = self
             .budget(&solution.deflection, &observations)
             .ok_or_else(lost)?;
-        if let Some(weakness) = observability::weakness(&budget, solution.deflection.elevation) {
+        if let Some(weakness) = self.weakness(&solution.deflection, &fit.poses) {
             return Ok(BeamEstimate {
                 status: Status::Unobservable,
                 reason: Some(weakness.reason),

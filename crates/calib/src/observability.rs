@@ -26,6 +26,8 @@ pub struct Weakness {
 }
 
 /// The open direction of an element's boards, if there is one.
+///
+/// The budget should leave the mounting out: what is not known of it turns all beams alike, whatever the boards.
 pub fn weakness(budget: &Budget, elevation: f64) -> Option<Weakness> {
     let cos_elevation = libm_cos(elevation);
     let by_board = budget.jacobian.transpose() * &budget.jacobian;

@@ -106,6 +106,46 @@ fn without_boards_for_it_the_mounting_is_the_drawing_s_and_says_so() {
 }
 
 #[test]
+fn one_board_determines_some_motions_and_the_tolerance_stands_in_for_the_rest() {
+    let mut made = World::noisy(15).make();
+    made.dataset.session.mount_tolerance.rotation_sd_deg = [3.0; 3];
+    let mut boards = 0;
+    made.dataset.poses.retain(|p| {
+        boards += usize::from(p.label.kind == PoseKind::Direct);
+        p.label.kind != PoseKind::Direct || boards == 1
+    });
+    let calibration = solve(&made.dataset);
+    let mount = calibration.rig_from_sensor.expect("it is always given");
+    let covariance = Matrix6::from(mount.covariance.expect("it is always given"));
+    let scale = Matrix6::from_diagonal(
+        &[
+            5e-3,
+            5e-3,
+            5e-3,
+            3.0_f64.to_radians(),
+            3.0_f64.to_radians(),
+            3.0_f64.to_radians(),
+        ]
+        .map(|sd| 1.0 / sd)
+        .into(),
+    );
+    let values = (scale * covariance * scale).symmetric_eigenvalues();
+    assert!(
+        values.max() > 0.99 && values.max() < 2.0,
+        "as unknown as the tolerance: {values}"
+    );
+    assert!(
+        values.min() > 0.0 && values.min() < 0.1,
+        "one board says something: {values}"
+    );
+    // A poorly known mounting is not the boards' fault: elements are solved, with a covariance to match.
+    let estimate = &calibration.beams[66];
+    assert_eq!(estimate.status, Status::Solved, "{:?}", estimate.reason);
+    let variance = estimate.covariance_rad2.expect("it is solved")[1][1];
+    assert!(variance.sqrt().to_degrees() > 0.3);
+}
+
+#[test]
 fn a_dataset_that_cannot_be_is_refused() {
     let mut made = World::noisy(14).make();
     made.dataset.session.facets[0].corners_mm.truncate(2);
