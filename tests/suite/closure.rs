@@ -9,6 +9,7 @@ use catoptric::model::{Status, beam};
 use catoptric::sim::truth::BeamClass;
 use catoptric::sim::{Laboratory, Scene, Truth};
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 
 /// Largest error of θ_a and φ over all deflected beams, or what is wrong with the first that did not come back.
 fn worst_error(truth: &Truth, calibration: &catoptric::model::Calibration) -> Result<f64, String> {
@@ -16,10 +17,18 @@ fn worst_error(truth: &Truth, calibration: &catoptric::model::Calibration) -> Re
     for true_beam in truth.beams.iter().filter(|b| b.status == BeamClass::Deflected) {
         let found = calibration.beam(true_beam.beam).ok_or("an element is missing")?;
         if found.status != Status::Solved {
-            return Err(format!("beam {} is {:?}: {:?}", true_beam.beam, found.status, found.reason));
+            return Err(format!(
+                "beam {} is {:?}: {:?}",
+                true_beam.beam, found.status, found.reason
+            ));
         }
-        let (found, true_one) = (found.deflection().ok_or("no angles")?, true_beam.deflection().ok_or("no truth")?);
-        worst = worst.max((found.azimuth - true_one.azimuth).abs()).max((found.elevation - true_one.elevation).abs());
+        let (found, true_one) = (
+            found.deflection().ok_or("no angles")?,
+            true_beam.deflection().ok_or("no truth")?,
+        );
+        worst = worst
+            .max((found.azimuth - true_one.azimuth).abs())
+            .max((found.elevation - true_one.elevation).abs());
     }
     for true_beam in truth.beams.iter().filter(|b| b.status == BeamClass::Direct) {
         let status = calibration.beam(true_beam.beam).map(|b| b.status);
@@ -32,8 +41,12 @@ fn worst_error(truth: &Truth, calibration: &catoptric::model::Calibration) -> Re
 
 fn close(scene: &Scene, seed: u64) -> Result<(), TestCaseError> {
     let laboratory = Laboratory::new(scene, seed).map_err(|e| TestCaseError::reject(e.to_string()))?;
-    let dataset = laboratory.dataset().map_err(|e| TestCaseError::fail(e.to_string()))?;
-    let truth = laboratory.truth().map_err(|e| TestCaseError::fail(e.to_string()))?;
+    let dataset = laboratory
+        .dataset()
+        .map_err(|e| TestCaseError::fail(e.to_string()))?;
+    let truth = laboratory
+        .truth()
+        .map_err(|e| TestCaseError::fail(e.to_string()))?;
     for method in Method::ALL {
         let calibration = calib::calibrate(&dataset, method, &Options::default())
             .map_err(|e| TestCaseError::fail(e.to_string()))?;
@@ -53,7 +66,14 @@ fn the_repositorys_scenes_close() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, max_global_rejects: 2000, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig {
+        cases: 200,
+        max_global_rejects: 2000,
+        failure_persistence: None,
+        // The same 200 layouts on every run: a failure here is a change of ours.
+        rng_seed: RngSeed::Fixed(2018),
+        ..ProptestConfig::default()
+    })]
 
     #[test]
     fn random_layouts_close(scene in layouts(), seed in any::<u64>()) {

@@ -15,10 +15,16 @@ use catoptric_model::{BeamEstimate, Dataset, Deflection, MirrorPlane, Pose, Stat
 pub const LEAST_BOARDS: usize = 3;
 
 /// Direction errors allowed for while the boards of an element are chosen, in radians, from the drawing's to none.
-const STAGES: [f64; 7] = [0.05, 0.02, 0.007, 0.0, 0.0, 0.0, 0.0];
+///
+/// A mirror doubles its tilt: 1° (1σ) of the facet and up to 1° of the scanner in its housing turn a beam by 8° now
+/// and then.
+const STAGES: [f64; 8] = [0.15, 0.05, 0.02, 0.007, 0.0, 0.0, 0.0, 0.0];
+
+/// How far a solution may end from the estimate that its boards were chosen with, in radians.
+const FARTHEST_END: f64 = 0.007;
 
 /// A start in closed form that is farther than this from the drawing is noise, in radians.
-const FARTHEST_START: f64 = 0.25;
+const FARTHEST_START: f64 = 0.35;
 
 /// Largest ||v| − 1| of a start in closed form that is believed.
 const LARGEST_EXCESS: f64 = 0.2;
@@ -143,7 +149,7 @@ impl Attempt<'_> {
                 s.deflection.exit_direction(self.azimuth),
                 at.exit_direction(self.azimuth),
             );
-            s.converged && beam::angle_between(&a, &b) < STAGES[2]
+            s.converged && beam::angle_between(&a, &b) < FARTHEST_END
         };
         let solution = run(start).filter(near).or_else(|| run(at)).ok_or_else(lost)?;
         Ok(Fit {

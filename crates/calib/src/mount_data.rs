@@ -10,7 +10,7 @@ use catoptric_model::{Dataset, Pose, PoseKind, PoseRecord, RawRange, Summary, be
 use nalgebra::{DMatrix, DVector, Point3};
 
 /// Beams this close to a served range may meet a mirror as built: half a spot and some facet tilt.
-const CLEAR_OF_FACETS: usize = 6;
+const CLEAR_OF_FACETS: usize = 12;
 
 /// Noise of a mean below which readings are not weighted further, in metres: whole millimetres, 1/√12 mm.
 const LEAST_NOISE: f64 = 2.9e-4;

@@ -12,9 +12,12 @@ use catoptric_model::session::NominalFacet;
 use catoptric_model::{Dataset, Pose, PoseKind, PoseRecord, Summary, beam};
 use nalgebra::Point3;
 
-/// A facet as built may serve this many beams more than it was drawn for: 1° of tilt and half a millimetre move its
-/// edges by a couple of beams.
-pub const EDGE_BEAMS: usize = 3;
+/// How many beams beyond the drawn ones a facet as built may serve.
+///
+/// At 65 mm a millimetre is 3.5 beams: an optical center a millimetre off in its housing, a facet half a millimetre and
+/// 1° off in its frame, and posts that hide an edge on the drawing add up to several. Being generous costs nothing:
+/// a beam that no mirror deflects is known by its readings, not by this.
+pub const EDGE_BEAMS: usize = 10;
 
 /// Share of the usable stretches in which a direct beam has to read what is in front of it.
 const DIRECT_SHARE: f64 = 0.9;
@@ -83,7 +86,7 @@ impl<'a> Screen<'a> {
     pub fn classify(&self, beam: usize) -> Candidate {
         let session = &self.dataset.session;
         let facets = facets_near(&session.facets, beam);
-        let tally = self.tally(beam);
+        let tally = self.tally(beam, &facets);
         if let Some(reason) = self.abnormal(beam, &facets) {
             return Candidate::Rejected(reason);
         }
@@ -179,7 +182,11 @@ impl<'a> Screen<'a> {
             .filter(|(record, _)| record.label.kind != PoseKind::Bare)
     }
 
-    fn tally(&self, beam: usize) -> Tally {
+    fn tally(&self, beam: usize, facets: &[usize]) -> Tally {
+        let nearby: Vec<&str> = facets
+            .iter()
+            .map(|f| self.dataset.session.facets[*f].name.as_str())
+            .collect();
         let mut tally = Tally::default();
         for (pose, record) in self.dataset.poses.iter().enumerate() {
             let summary = &self.summaries[pose][beam];
@@ -195,6 +202,15 @@ impl<'a> Screen<'a> {
             if record.label.kind == PoseKind::Room {
                 tally.rooms += 1;
                 tally.rooms_agreeing += usize::from(agrees);
+            }
+            if record
+                .label
+                .facet
+                .as_deref()
+                .is_some_and(|name| nearby.contains(&name))
+            {
+                tally.own += 1;
+                tally.own_agreeing += usize::from(agrees);
             }
             let off = (summary.mean - expected).abs() - tolerance;
             if off > tally.worst_off {
@@ -254,17 +270,24 @@ struct Tally {
     agreeing: usize,
     rooms: usize,
     rooms_agreeing: usize,
+    /// Stretches with a board before a mirror that may deflect it.
+    own: usize,
+    own_agreeing: usize,
     /// Expected and found range, in metres, of the stretch with the largest disagreement, and its number.
     worst: Option<(f64, f64, usize)>,
     worst_off: f64,
 }
 
 impl Tally {
-    /// Every known room, and nearly every other stretch: one agreement may be chance, all of them cannot.
+    /// Every known room, nearly every stretch, and most of those in which a mirror would have shown it a board.
+    ///
+    /// The last are what counts: a mirror may by chance show a wall as far away as the one ahead, and does so again
+    /// in every stretch whose board stands elsewhere.
     fn is_direct(&self) -> bool {
         self.usable > 0
             && self.rooms_agreeing == self.rooms
             && self.agreeing as f64 >= DIRECT_SHARE * self.usable as f64
+            && 2 * self.own_agreeing >= self.own
     }
 }
 
@@ -301,7 +324,7 @@ mod tests {
         let facets = [facet(100, 200), facet(204, 300)];
         assert_eq!(facets_near(&facets, 150), [0]);
         assert_eq!(facets_near(&facets, 203), [1, 0]);
-        assert_eq!(facets_near(&facets, 97), [0]);
-        assert!(facets_near(&facets, 96).is_empty());
+        assert_eq!(facets_near(&facets, 100 - EDGE_BEAMS), [0]);
+        assert!(facets_near(&facets, 99 - EDGE_BEAMS).is_empty());
     }
 }
