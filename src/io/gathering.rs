@@ -44,10 +44,7 @@ impl Gathering {
     pub(super) fn scan(&mut self, scan: &Scan, scanner: &ScannerSheet) -> Result<(), String> {
         let beams = scanner.beams;
         if scan.ranges.len() != beams {
-            return Err(format!(
-                "{} beams, session.toml has {beams}",
-                scan.ranges.len()
-            ));
+            return Err(format!("{} beams, session.toml has {beams}", scan.ranges.len()));
         }
         let step = scanner.step_deg.to_radians();
         let first = messages::azimuth(scanner, 0);
@@ -83,12 +80,15 @@ impl Gathering {
     }
 
     /// The stretch, with times counted from the epoch; an error if its scans are not as many as its label says.
-    pub(super) fn into_stretch(self, scanner: &ScannerSheet, bodies: &Bodies, epoch: u64) -> Result<Stretch, String> {
+    pub(super) fn into_stretch(
+        self,
+        scanner: &ScannerSheet,
+        bodies: &Bodies,
+        epoch: u64,
+    ) -> Result<Stretch, String> {
         if self.scans != self.label.scans {
             let (pose, expected, found) = (self.label.pose, self.label.scans, self.scans);
-            return Err(format!(
-                "pose {pose}: {found} scans, its label says {expected}"
-            ));
+            return Err(format!("pose {pose}: {found} scans, its label says {expected}"));
         }
         let start = self.first_scan.unwrap_or(self.label_time);
         Ok(Stretch {
@@ -154,9 +154,7 @@ impl Gathering {
             }
             for marker in markers {
                 if let Some((body, i)) = bodies.find(&marker.name) {
-                    let place = seen
-                        .get_mut(&(*time, body))
-                        .and_then(|f| f.markers.get_mut(i));
+                    let place = seen.get_mut(&(*time, body)).and_then(|f| f.markers.get_mut(i));
                     if let Some(place) = place {
                         *place = Some(marker.point);
                     }

@@ -11,8 +11,8 @@ pub mod folder;
 
 pub mod cdr;
 pub mod definitions;
-pub mod messages;
 mod gathering;
+pub mod messages;
 pub mod playback;
 pub mod recording;
 mod schedule;
@@ -26,3 +26,6 @@ pub use file::{read_json, write_file, write_json};
 pub use manifest::{Manifest, Provenance};
 pub use playback::read_recording;
 pub use recording::RecordingWriter;
+
+#[cfg(test)]
+mod tests;

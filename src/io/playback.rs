@@ -90,9 +90,7 @@ pub fn parse_recording(bytes: &[u8], path: &Path, session: &Session) -> Result<V
                 offset += next.len();
             }
             LinearReadEvent::Record { data, opcode } => {
-                playback
-                    .record(opcode, data)
-                    .map_err(|what| at(offset, what))?;
+                playback.record(opcode, data).map_err(|what| at(offset, what))?;
             }
         }
     }
@@ -131,10 +129,7 @@ impl Playback<'_> {
                 self.epoch.get_or_insert(header.log_time);
                 let topic = self.topics.get(&header.channel_id);
                 let topic = topic.ok_or_else(|| {
-                    format!(
-                        "a message on channel {}, which does not exist",
-                        header.channel_id
-                    )
+                    format!("a message on channel {}, which does not exist", header.channel_id)
                 })?;
                 self.message(&topic.clone(), header.log_time, &data)?;
             }
@@ -173,7 +168,8 @@ impl Playback<'_> {
     fn message(&mut self, topic: &Topic, log_time: u64, data: &[u8]) -> Result<(), String> {
         match topic {
             Topic::Label => {
-                let label: PoseLabel = serde_json::from_slice(data).map_err(|e| format!("/session/pose: {e}"))?;
+                let label: PoseLabel =
+                    serde_json::from_slice(data).map_err(|e| format!("/session/pose: {e}"))?;
                 self.end_stretch()?;
                 self.current = Some(Gathering::new(label, log_time));
             }

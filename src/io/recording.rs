@@ -231,17 +231,11 @@ impl<W: Write> RecordingWriter<W> {
         }
         let expected = stretch.label.scans.saturating_mul(beams);
         if stretch.ranges.len() != expected {
-            return Err(format!(
-                "{} readings, {expected} expected",
-                stretch.ranges.len()
-            ));
+            return Err(format!("{} readings, {expected} expected", stretch.ranges.len()));
         }
         let duration = stretch.label.scans as f64 * stretch.scan_period_s;
         if !time_fits(stretch.start_s) || !time_fits(duration) || !time_fits(stretch.start_s + duration) {
-            return Err(format!(
-                "starts at {} s and lasts {duration} s",
-                stretch.start_s
-            ));
+            return Err(format!("starts at {} s and lasts {duration} s", stretch.start_s));
         }
         for track in &stretch.tracks {
             let body = self.bodies.position(&track.subject);

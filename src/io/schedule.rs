@@ -23,11 +23,7 @@ pub(super) type Simultaneous = Vec<(usize, usize)>;
 
 /// Whole nanoseconds of a time that was checked to be finite and not negative.
 pub(super) fn nanoseconds(seconds: f64) -> u64 {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "checked"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
     let ns = (seconds * NS_PER_S as f64).round() as u64;
     ns
 }
@@ -45,7 +41,11 @@ pub(super) fn simultaneous_frames(stretch: &Stretch) -> BTreeMap<u64, Simultaneo
 }
 
 /// Every message of a stretch in the order it is written.
-pub(super) fn schedule(stretch: &Stretch, start: u64, frames: &BTreeMap<u64, Simultaneous>) -> Vec<(u64, Event)> {
+pub(super) fn schedule(
+    stretch: &Stretch,
+    start: u64,
+    frames: &BTreeMap<u64, Simultaneous>,
+) -> Vec<(u64, Event)> {
     let first = frames.keys().next().map_or(start, |t| start.min(*t));
     let mut events = vec![(first, Event::Label), (start, Event::Transforms)];
     if stretch.label.scans > 0 {
