@@ -1,5 +1,4 @@
 //! Tells the library which commit it was built from, for the manifest of every dataset it writes.
-#![expect(clippy::print_stdout, reason = "cargo reads its instructions from there")]
 
 use std::path::Path;
 use std::process::Command;

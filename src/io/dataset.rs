@@ -11,7 +11,7 @@
 
 use super::error::IoError;
 use super::file::{sha256, sha256_file, to_json};
-use super::folder::{Occupant, StagedFile, StagedFolder};
+use super::folder::{Occupant, StagedFile, StagedFolder, list};
 use super::manifest::{Manifest, Provenance};
 use super::playback::parse_recording;
 use super::recording::RecordingWriter;
@@ -45,8 +45,8 @@ pub struct DatasetWriter {
 impl DatasetWriter {
     /// Begins a dataset that will appear at `out`, and writes what the experimenter knows.
     ///
-    /// Missing folders above it are created. An empty folder at its place is taken; a dataset only with `replace`,
-    /// and it stays until the new one is whole.
+    /// Missing folders above it are created. An empty folder at its place is taken; a dataset only with `replace`
+    /// and if nothing was added to it, and it stays until the new one is whole.
     ///
     /// # Errors
     /// [`IoError::Exists`] or [`IoError::Foreign`] if something stands in the way, [`IoError::Content`] if the names
@@ -133,12 +133,22 @@ fn occupant(out: &Path, replace: bool) -> Result<Occupant, IoError> {
         return Ok(Occupant::Nothing);
     }
     let manifest = fs::read(out.join(MANIFEST)).ok();
-    let ours = manifest.and_then(|bytes| serde_json::from_slice::<Manifest>(&bytes).ok());
-    match ours {
-        None => Err(foreign("holds files that are not a dataset of ours")),
-        Some(_) if replace => Ok(Occupant::Replaceable),
-        Some(_) => Err(IoError::Exists { path }),
+    let Some(ours) = manifest.and_then(|bytes| serde_json::from_slice::<Manifest>(&bytes).ok()) else {
+        return Err(foreign("holds files that are not a dataset of ours"));
+    };
+    if !replace {
+        return Err(IoError::Exists { path });
     }
+    let files = list(out).map_err(|e| IoError::read(out, e))?;
+    if files
+        .iter()
+        .any(|(name, _)| name != MANIFEST && !ours.files.contains_key(name))
+    {
+        return Err(foreign(
+            "holds a dataset and other files that would be lost with it",
+        ));
+    }
+    Ok(Occupant::Replaceable)
 }
 
 /// Reads what the experimenter knows.

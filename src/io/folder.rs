@@ -97,25 +97,7 @@ impl StagedFolder {
     /// # Errors
     /// [`IoError`] if the system refuses.
     pub fn files(&self) -> Result<Vec<(String, PathBuf)>, IoError> {
-        let mut found = Vec::new();
-        let mut folders = vec![(String::new(), self.root())];
-        while let Some((prefix, folder)) = folders.pop() {
-            let mut list = || -> io::Result<()> {
-                for entry in fs::read_dir(&folder)? {
-                    let entry = entry?;
-                    let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
-                    if entry.file_type()?.is_dir() {
-                        folders.push((name + "/", entry.path()));
-                    } else {
-                        found.push((name, entry.path()));
-                    }
-                }
-                Ok(())
-            };
-            list().map_err(|e| IoError::read(&self.out, e))?;
-        }
-        found.sort_unstable();
-        Ok(found)
+        list(&self.root()).map_err(|e| IoError::read(&self.out, e))
     }
 
     /// Moves the folder to its place. Every file was brought to disk when it was finished.
@@ -162,4 +144,23 @@ impl Write for StagedFile {
     fn flush(&mut self) -> io::Result<()> {
         self.file.flush()
     }
+}
+
+/// Every file below a folder, in order of name: its name with forward slashes, and its path.
+pub(super) fn list(root: &Path) -> io::Result<Vec<(String, PathBuf)>> {
+    let mut found = Vec::new();
+    let mut folders = vec![(String::new(), root.to_owned())];
+    while let Some((prefix, folder)) = folders.pop() {
+        for entry in fs::read_dir(folder)? {
+            let entry = entry?;
+            let name = format!("{prefix}{}", entry.file_name().to_string_lossy());
+            if entry.file_type()?.is_dir() {
+                folders.push((name + "/", entry.path()));
+            } else {
+                found.push((name, entry.path()));
+            }
+        }
+    }
+    found.sort_unstable();
+    Ok(found)
 }

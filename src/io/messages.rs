@@ -86,7 +86,7 @@ pub fn azimuth(scanner: &ScannerSheet, beam: usize) -> f64 {
 }
 
 /// The nearest 32-bit number, as messages hold them; one NaN for all, so that equal readings are equal bytes.
-fn single(value: f64) -> f32 {
+pub(super) fn single(value: f64) -> f32 {
     if value.is_nan() {
         return f32::NAN;
     }

@@ -100,7 +100,7 @@ fn ranges(numbers: &mut Numbers, count: usize) -> Vec<f64> {
         r if r < 0.02 => f64::NEG_INFINITY,
         r if r < 0.2 => f64::INFINITY,
         r if r < 0.21 => f64::NAN,
-        r => f64::from(((r * 1e4).round() / 1e3) as f32),
+        r => f64::from(super::messages::single((r * 1e4).round() / 1e3)),
     };
     (0..count).map(|_| code(numbers.next())).collect()
 }
@@ -476,6 +476,12 @@ fn only_datasets_are_replaced_and_only_on_request() {
     write_dataset(&out, true, &session, &second).expect("replaced");
     assert!(same(&read_stretches(&out).expect("read").1, &second));
     assert_eq!(fs::read_dir(place.path()).expect("folder").count(), 1);
+    for notes in [out.join("notes.txt"), out.join("truth/notes.txt")] {
+        fs::write(&notes, "not ours").expect("notes");
+        let error = write_dataset(&out, true, &session, &first).expect_err("notes would be lost");
+        assert!(matches!(error, IoError::Foreign { .. }), "{error}");
+        fs::remove_file(&notes).expect("still there");
+    }
 
     let theirs = place.path().join("theirs");
     fs::create_dir(&theirs).expect("folder");
