@@ -1,0 +1,3 @@
+//! Files: the only part of the library that reads or writes.
+
+pub mod cloud;

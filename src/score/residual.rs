@@ -1,0 +1,141 @@
+//! What needs no truth: how far the points that a calibration makes lie from boards and walls that were surveyed.
+
+use super::statistics::{mean, rms};
+use catoptric_model::{Calibration, CorrectedRange, Dataset, Deflection, Pose, PoseKind, PoseRecord, RawRange};
+use catoptric_model::{RangeBias, beam, range};
+use nalgebra::Unit;
+use serde::Serialize;
+
+/// Distances of lifted points from the surfaces they lie on, counted positive behind the surface, in millimetres.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SurfaceResidual {
+    /// Stretches that contributed.
+    pub stretches: usize,
+    /// Elements that contributed.
+    pub elements: usize,
+    /// Readings that contributed.
+    pub readings: usize,
+    /// Mean over the readings: what they share.
+    pub mean: f64,
+    /// Root mean square over the readings.
+    pub rms: f64,
+}
+
+/// Mean and mean square of one element's residuals over one stretch.
+struct Visit {
+    beam: usize,
+    stretch: usize,
+    readings: usize,
+    mean: f64,
+    mean_square: f64,
+}
+
+/// Point-to-board residual of every reading of the solved elements on the boards of their facets.
+///
+/// An element is on a board if its outgoing ray, as calibrated, meets the board's face farther from the edge than
+/// half its spot. A reading there is corrected by all of Eq. 3, since board and incidence are known, and its
+/// residual is the distance of the lifted point from the board's plane, cos θ_N·(r − d − s).
+pub fn boards(dataset: &Dataset, calibration: &Calibration) -> SurfaceResidual {
+    let rig_from_sensor = mount(dataset, calibration);
+    collect(dataset, calibration, PoseKind::Facet, |pose, beam, deflection| {
+        let sheet = dataset.session.board(pose.label.board.as_deref()?)?;
+        let room_from_board = pose.room_from_board?;
+        let board_from_sensor = room_from_board.inverse() * pose.room_from_rig * rig_from_sensor;
+        let plane = catoptric_model::BoardPlane::of_pose(&board_from_sensor.inverse());
+        let azimuth = beam::azimuth(beam);
+        let predicted = range::predict(deflection, azimuth, &plane)?;
+        let exit = deflection.exit_direction(azimuth);
+        let hit = deflection.deflection_point(azimuth) + exit.into_inner() * (predicted - deflection.distance);
+        let cos_incidence = plane.cos_incidence(&exit);
+        let spot_half = 0.5e-3 * dataset.session.scanner.divergence_full_mrad * predicted / cos_incidence;
+        sheet
+            .outline()
+            .contains(&(board_from_sensor * hit), spot_half)
+            .then(|| (predicted, cos_incidence, pose.label.color.clone().unwrap_or(sheet.color.clone())))
+    })
+}
+
+/// Point-to-wall residual of every reading of the solved elements in the empty room: data no method fits angles to.
+pub fn walls(dataset: &Dataset, calibration: &Calibration) -> SurfaceResidual {
+    let rig_from_sensor = mount(dataset, calibration);
+    let room = &dataset.session.room;
+    collect(dataset, calibration, PoseKind::Room, |pose, beam, deflection| {
+        let room_from_sensor = pose.room_from_rig * rig_from_sensor;
+        let azimuth = beam::azimuth(beam);
+        let origin = room_from_sensor * deflection.deflection_point(azimuth);
+        let exit = Unit::new_unchecked(room_from_sensor * deflection.exit_direction(azimuth).into_inner());
+        let (s, wall) = room.cast(&origin, &exit)?;
+        Some((deflection.distance + s, wall.cos_incidence(&exit), room.color.clone()))
+    })
+}
+
+/// The mounting used: as calibrated, or as drawn where the calibration has none.
+pub fn mount(dataset: &Dataset, calibration: &Calibration) -> Pose {
+    match &calibration.rig_from_sensor {
+        Some(estimate) => estimate.pose(),
+        None => Pose::from(&dataset.session.nominal_rig_from_sensor),
+    }
+}
+
+/// The biases used: as calibrated, or as believed where the calibration has none.
+pub fn bias<'a>(dataset: &'a Dataset, calibration: &'a Calibration) -> &'a RangeBias {
+    calibration.bias.as_ref().unwrap_or(&dataset.session.believed.bias)
+}
+
+/// Residuals over all stretches of a kind; `expect` gives predicted range, cosine of incidence and color.
+fn collect(
+    dataset: &Dataset,
+    calibration: &Calibration,
+    kind: PoseKind,
+    expect: impl Fn(&PoseRecord, usize, &Deflection) -> Option<(f64, f64, String)>,
+) -> SurfaceResidual {
+    let bias = bias(dataset, calibration);
+    let mut visits = Vec::new();
+    for pose in dataset.of_kind(kind) {
+        for estimate in calibration.beams.iter().filter(|b| b.beam < pose.beams) {
+            let Some(deflection) = estimate.deflection() else {
+                continue;
+            };
+            let Some((predicted, cos_incidence, color)) = expect(pose, estimate.beam, &deflection) else {
+                continue;
+            };
+            let residuals: Vec<f64> = pose
+                .readings(estimate.beam)
+                .filter(|r| r.is_finite())
+                .map(|r| {
+                    let CorrectedRange(corrected) =
+                        bias.correct(RawRange(r), predicted, cos_incidence, &color);
+                    cos_incidence * (corrected - predicted) * 1e3
+                })
+                .collect();
+            if !residuals.is_empty() {
+                visits.push(Visit {
+                    beam: estimate.beam,
+                    stretch: pose.label.pose,
+                    readings: residuals.len(),
+                    mean: mean(residuals.iter().copied()),
+                    mean_square: rms(residuals.iter().copied()).powi(2),
+                });
+            }
+        }
+    }
+    summarize(&visits)
+}
+
+fn summarize(visits: &[Visit]) -> SurfaceResidual {
+    let count = |key: fn(&Visit) -> usize| {
+        let distinct: std::collections::BTreeSet<usize> = visits.iter().map(key).collect();
+        distinct.len()
+    };
+    let readings: usize = visits.iter().map(|v| v.readings).sum();
+    let weighted = |value: fn(&Visit) -> f64| {
+        visits.iter().map(|v| v.readings as f64 * value(v)).sum::<f64>() / readings as f64
+    };
+    SurfaceResidual {
+        stretches: count(|v| v.stretch),
+        elements: count(|v| v.beam),
+        readings,
+        mean: weighted(|v| v.mean),
+        rms: weighted(|v| v.mean_square).sqrt(),
+    }
+}
