@@ -2,7 +2,7 @@
 
 use catoptric_model::calibration::{self, Calibration, FacetEstimate, MountEstimate};
 use catoptric_model::{BeamEstimate, RangeBias, Status, beam};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{DMatrix, SVector};
 use std::collections::BTreeSet;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::fmt;
@@ -209,7 +209,7 @@ fn check_covariances(at: &mut OfBeam, b: &BeamEstimate) {
         let Some(covariance) = covariance else {
             continue;
         };
-        if let Err(message) = check_covariance(&SMatrix::from(covariance).transpose()) {
+        if let Err(message) = check_covariance(&covariance) {
             at.error(key, message);
             continue;
         }
@@ -244,7 +244,7 @@ fn check_facet(problems: &mut Problems, key: &str, facet: &FacetEstimate) {
             format!("of {:?} is {}, not within {MIRROR_DISTANCE_M} m", facet.facet, facet.offset_m),
         );
     }
-    if let Err(message) = check_covariance(&SMatrix::from(facet.covariance).transpose()) {
+    if let Err(message) = check_covariance(&facet.covariance) {
         problems.error(&format!("{key}.covariance"), format!("of {:?} {message}", facet.facet));
     }
 }
@@ -264,7 +264,7 @@ fn check_mount(problems: &mut Problems, mount: &MountEstimate) {
         );
     }
     if let Some(covariance) = mount.covariance
-        && let Err(message) = check_covariance(&SMatrix::from(covariance).transpose())
+        && let Err(message) = check_covariance(&covariance)
     {
         problems.error("rig_from_sensor.covariance", message);
     }
@@ -291,23 +291,21 @@ fn check_bias(problems: &mut Problems, bias: &RangeBias) {
 }
 
 /// Whether a matrix can be a covariance: finite, symmetric, positive semi-definite.
-fn check_covariance<const N: usize>(c: &SMatrix<f64, N, N>) -> Result<(), String> {
+fn check_covariance<const N: usize>(rows: &[[f64; N]; N]) -> Result<(), String> {
+    let c = DMatrix::from_fn(N, N, |i, j| rows[i][j]);
     if !c.iter().all(|x| x.is_finite()) {
         return Err("holds something that is not a number".to_owned());
     }
-    if (c - c.transpose()).abs().max() > DEFINITE_TOLERANCE * c.abs().max() {
+    if (&c - c.transpose()).amax() > DEFINITE_TOLERANCE * c.amax() {
         return Err("is not symmetric".to_owned());
     }
-    // Angles and shifts have different sizes: scaling to correlations makes one tolerance fit both.
     if let Some(negative) = c.diagonal().iter().find(|&&x| x < 0.0) {
         return Err(format!("has the negative variance {negative:e}"));
     }
+    // Angles and shifts have different sizes: scaling to correlations makes one tolerance fit both.
     let scale = c.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 1.0 });
-    let correlation = SMatrix::<f64, N, N>::from_fn(|i, j| c[(i, j)] * scale[i] * scale[j]);
-    // Eigenvalues through singular values, which need no type-level arithmetic: for a symmetric matrix the sum of
-    // both kinds differs exactly if an eigenvalue is negative.
-    let lack = correlation.svd(false, false).singular_values.sum() - correlation.trace();
-    if lack > 2.0 * DEFINITE_TOLERANCE * N as f64 {
+    let correlation = DMatrix::from_fn(N, N, |i, j| c[(i, j)] * scale[i] * scale[j]);
+    if correlation.symmetric_eigenvalues().min() < -DEFINITE_TOLERANCE {
         return Err("is not positive semi-definite".to_owned());
     }
     Ok(())
@@ -359,5 +357,162 @@ impl OfBeam<'_> {
             beam: Some(self.beam),
             message,
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample::{noisy, perfect, sample};
+
+    /// A sound calibration after one change, and what is found wrong with it.
+    fn after(change: impl FnOnce(&mut Calibration, usize)) -> Vec<Problem> {
+        let truth = sample().truth;
+        let mut calibration = noisy(&truth, 1e-3, 1);
+        let solved = calibration
+            .beams
+            .iter()
+            .position(|b| b.status == Status::Solved)
+            .expect("some are solved");
+        change(&mut calibration, solved);
+        validate(&calibration)
+    }
+
+    fn one(problems: &[Problem]) -> &Problem {
+        assert_eq!(problems.len(), 1, "{problems:?}");
+        &problems[0]
+    }
+
+    #[test]
+    fn a_sound_calibration_has_no_problem() {
+        let truth = sample().truth;
+        assert_eq!(validate(&noisy(&truth, 1e-3, 1)), []);
+        assert_eq!(validate(&perfect(&truth)), []);
+    }
+
+    #[test]
+    fn degrees_are_recognized() {
+        let problems = after(|c, i| {
+            for b in &mut c.beams {
+                b.azimuth_rad = b.azimuth_rad.map(f64::to_degrees);
+                b.elevation_rad = b.elevation_rad.map(f64::to_degrees);
+            }
+            c.beams[i].elevation_rad = Some(45.0);
+        });
+        assert!(problems.len() > 300);
+        let at_45 = problems.iter().find(|p| p.message.contains("is 45,")).expect("it is found");
+        assert_eq!(
+            at_45.message,
+            "is 45, outside ±π/2; it looks like degrees: 45° is 0.7854 rad"
+        );
+        assert!(at_45.key.ends_with("].elevation_rad") && at_45.severity == Severity::Error);
+        assert_eq!(
+            at_45.to_string(),
+            format!("error: {} (beam {}): {}", at_45.key, at_45.beam.expect("of a beam"), at_45.message)
+        );
+    }
+
+    #[test]
+    fn angles_have_limits_and_numbers() {
+        let problem = after(|c, i| c.beams[i].azimuth_rad = Some(3.2));
+        assert!(one(&problem).message.starts_with("is 3.2, outside ±π"));
+        assert!(!one(&problem).message.contains("degrees"));
+        for bad in [f64::NAN, f64::INFINITY] {
+            let problem = after(|c, i| c.beams[i].elevation_rad = Some(bad));
+            assert!(one(&problem).message.ends_with("not a number"));
+        }
+        let problem = after(|c, i| c.beams[i].elevation_rad = None);
+        assert!(one(&problem).message.contains("missing from a solved element"));
+    }
+
+    #[test]
+    fn distances_are_positive_metres() {
+        assert!(one(&after(|c, i| c.beams[i].distance_m = Some(65.0))).message.contains("millimetres"));
+        assert!(one(&after(|c, i| c.beams[i].distance_m = Some(-0.06))).key.ends_with("distance_m"));
+        assert_eq!(after(|c, i| c.beams[i].distance_m = None), []);
+    }
+
+    #[test]
+    fn a_covariance_is_symmetric_and_positive() {
+        for (covariance, what) in [
+            ([[1e-6, 2e-7], [-2e-7, 1e-6]], "is not symmetric"),
+            ([[1e-6, 2e-6], [2e-6, 1e-6]], "is not positive semi-definite"),
+            ([[-1e-6, 0.0], [0.0, 1e-6]], "has the negative variance -1e-6"),
+            ([[f64::NAN, 0.0], [0.0, 1e-6]], "holds something that is not a number"),
+            (
+                [[100.0, 0.0], [0.0, 1e-6]],
+                "means a standard deviation of 10.000 rad, which says nothing; is it in degrees?",
+            ),
+        ] {
+            let problems = after(|c, i| c.beams[i].covariance_rad2 = Some(covariance));
+            assert_eq!(one(&problems).message, what);
+            assert_eq!(one(&problems).severity, Severity::Error);
+        }
+        let tiny = after(|c, i| c.beams[i].covariance_rad2 = Some([[1e-24, 0.0], [0.0, 1e-24]]));
+        assert_eq!(one(&tiny).severity, Severity::Warning);
+        // Perfectly correlated is semi-definite, and sound.
+        assert_eq!(after(|c, i| c.beams[i].covariance_rad2 = Some([[4e-6, 2e-6], [2e-6, 1e-6]])), []);
+    }
+
+    #[test]
+    fn a_status_fits_the_rest() {
+        let unsolved = |status, reason: Option<&str>, angle| {
+            after(|c, i| {
+                let mut b = BeamEstimate::without_angles(c.beams[i].beam, status, reason.map(str::to_owned));
+                b.azimuth_rad = angle;
+                c.beams[i] = b;
+            })
+        };
+        assert!(one(&unsolved(Status::Rejected, None, None)).key.ends_with("reason"));
+        assert!(one(&unsolved(Status::Rejected, Some(" "), None)).key.ends_with("reason"));
+        assert!(
+            one(&unsolved(Status::Unobservable, Some("one axis"), Some(0.1)))
+                .message
+                .contains("never a number")
+        );
+        assert_eq!(unsolved(Status::Direct, None, None), []);
+        assert_eq!(unsolved(Status::Unobservable, Some("one axis"), None), []);
+        assert!(one(&unsolved(Status::Direct, None, Some(0.1))).key.ends_with("status"));
+    }
+
+    #[test]
+    fn the_rest_of_the_file_is_looked_at_too() {
+        let key = |change: fn(&mut Calibration, usize)| {
+            let problems = after(change);
+            one(&problems).key.clone()
+        };
+        assert_eq!(key(|c, _| c.schema_version = 2), "schema_version");
+        assert_eq!(key(|c, _| c.frame = "room".to_owned()), "frame");
+        assert_eq!(key(|c, _| c.method.clear()), "method");
+        assert_eq!(key(|c, _| c.beams[3].beam = 1081), "beams[3].beam");
+        assert_eq!(key(|c, _| c.beams[3].beam = 2), "beams[3].beam");
+        assert_eq!(
+            key(|c, i| c.beams[i].null_direction = Some([1.0, 1.0])).split('.').next_back(),
+            Some("null_direction")
+        );
+        assert_eq!(
+            key(|c, _| {
+                let mount = c.rig_from_sensor.as_mut().expect("it has one");
+                mount.rotation_xyzw = [0.0, 0.0, 0.0, 2.0];
+            }),
+            "rig_from_sensor.rotation_xyzw"
+        );
+        assert_eq!(
+            key(|c, _| c.facets.push(FacetEstimate {
+                facet: "port".to_owned(),
+                normal: [0.0, 0.0, 1.1],
+                offset_m: 0.05,
+                covariance: [[0.0; 3]; 3],
+            })),
+            "facets[0].normal"
+        );
+        assert_eq!(
+            key(|c, _| {
+                let mut bias = RangeBias::default();
+                bias.distance.range_m = vec![1.0];
+                c.bias = Some(bias);
+            }),
+            "bias.distance"
+        );
     }
 }

@@ -1,7 +1,7 @@
 //! The bound an element's error is measured by, at the true angles.
 
 use catoptric_calib::covariance::budget;
-use catoptric_calib::observations::{BoardInSensor, SPOT_RADII};
+use catoptric_calib::observations::BoardInSensor;
 use catoptric_calib::{observations, pose};
 use catoptric_model::{Dataset, Pose, PoseKind, PoseRecord};
 use catoptric_sim::Truth;
@@ -40,7 +40,7 @@ pub(super) fn at_truth(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize, Matr
             .filter_map(|(board, summary)| {
                 let count = summary.get(beam.beam)?.count;
                 let hit = board.hit(&origin, &exit)?;
-                let spot = SPOT_RADII * cone * (deflection.distance + hit.distance);
+                let spot = cone * (deflection.distance + hit.distance);
                 (count > 0 && board.holds(&hit, spot, 0.0)).then(|| board.view(noise_sd, count))
             })
             .collect();

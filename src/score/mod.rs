@@ -17,6 +17,7 @@
 //! Every element that the truth deflects unsplit is one of solved, abstained or missed. Figures that do not exist
 //! are NaN here and `null` in JSON, with the reason in `nulls`.
 
+mod bound;
 pub mod residual;
 mod statistics;
 mod words;
@@ -317,7 +318,7 @@ pub fn score(dataset: &Dataset, calibration: &Calibration, truth: Option<&Truth>
 
 /// The errors of every solved element that the truth deflects once.
 fn compare(dataset: &Dataset, calibration: &Calibration, truth: &Truth) -> Vec<ElementError> {
-    let bounds = bounds(dataset, truth);
+    let bounds = bound::at_truth(dataset, truth);
     let mut elements = Vec::new();
     for true_beam in &truth.beams {
         let (Some(actual), Some(estimate)) = (true_beam.deflection(), calibration.beam(true_beam.beam)) else {
@@ -355,11 +356,6 @@ fn compare(dataset: &Dataset, calibration: &Calibration, truth: &Truth) -> Vec<E
         });
     }
     elements
-}
-
-/// The bound on the covariance of (θ_a, φ) of every deflected element, at the true angles.
-fn bounds(_dataset: &Dataset, _truth: &Truth) -> BTreeMap<usize, Matrix2<f64>> {
-    BTreeMap::new()
 }
 
 /// An element's deflection if it is solved and its angles are numbers.
@@ -540,3 +536,6 @@ fn apart(
         per_axis_rms_deg: (0.5 * mean(squares)).sqrt().to_degrees(),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,8 +1,9 @@
 //! What needs no truth: how far the points that a calibration makes lie from boards and walls that were surveyed.
 
 use super::statistics::{mean, rms};
-use catoptric_model::{Calibration, CorrectedRange, Dataset, Deflection, Pose, PoseKind, PoseRecord, RawRange};
-use catoptric_model::{RangeBias, beam, range};
+use catoptric_calib::observations::{self, BoardInSensor};
+use catoptric_model::{Calibration, CorrectedRange, Dataset, Deflection, Pose, PoseKind, PoseRecord};
+use catoptric_model::{RangeBias, RawRange, beam};
 use nalgebra::Unit;
 use serde::Serialize;
 
@@ -21,6 +22,13 @@ pub struct SurfaceResidual {
     pub rms: f64,
 }
 
+/// What a beam is expected to meet.
+struct Surface {
+    predicted: f64,
+    cos_incidence: f64,
+    color: String,
+}
+
 /// Mean and mean square of one element's residuals over one stretch.
 struct Visit {
     beam: usize,
@@ -33,25 +41,24 @@ struct Visit {
 /// Point-to-board residual of every reading of the solved elements on the boards of their facets.
 ///
 /// An element is on a board if its outgoing ray, as calibrated, meets the board's face farther from the edge than
-/// half its spot. A reading there is corrected by all of Eq. 3, since board and incidence are known, and its
-/// residual is the distance of the lifted point from the board's plane, cos θ_N·(r − d − s).
+/// its spot. A reading there is corrected by all of Eq. 3, since board and incidence are known, and its residual is
+/// the distance of the lifted point from the board's plane, cos θ_N·(r − d − s).
 pub fn boards(dataset: &Dataset, calibration: &Calibration) -> SurfaceResidual {
     let rig_from_sensor = mount(dataset, calibration);
-    collect(dataset, calibration, PoseKind::Facet, |pose, beam, deflection| {
-        let sheet = dataset.session.board(pose.label.board.as_deref()?)?;
-        let room_from_board = pose.room_from_board?;
-        let board_from_sensor = room_from_board.inverse() * pose.room_from_rig * rig_from_sensor;
-        let plane = catoptric_model::BoardPlane::of_pose(&board_from_sensor.inverse());
-        let azimuth = beam::azimuth(beam);
-        let predicted = range::predict(deflection, azimuth, &plane)?;
-        let exit = deflection.exit_direction(azimuth);
-        let hit = deflection.deflection_point(azimuth) + exit.into_inner() * (predicted - deflection.distance);
-        let cos_incidence = plane.cos_incidence(&exit);
-        let spot_half = 0.5e-3 * dataset.session.scanner.divergence_full_mrad * predicted / cos_incidence;
-        sheet
-            .outline()
-            .contains(&(board_from_sensor * hit), spot_half)
-            .then(|| (predicted, cos_incidence, pose.label.color.clone().unwrap_or(sheet.color.clone())))
+    let cone = observations::cone_half_angle(&dataset.session);
+    collect(dataset, calibration, PoseKind::Facet, |pose| {
+        let board = BoardInSensor::of(pose, &dataset.session, &rig_from_sensor);
+        move |beam: usize, deflection: &Deflection| {
+            let board = board.as_ref()?;
+            let exit = deflection.exit_direction(beam::azimuth(beam));
+            let hit = board.hit(&deflection.deflection_point(beam::azimuth(beam)), &exit)?;
+            let predicted = deflection.distance + hit.distance;
+            board.holds(&hit, cone * predicted, 0.0).then(|| Surface {
+                predicted,
+                cos_incidence: board.plane.cos_incidence(&exit),
+                color: board.color.clone(),
+            })
+        }
     })
 }
 
@@ -59,13 +66,19 @@ pub fn boards(dataset: &Dataset, calibration: &Calibration) -> SurfaceResidual {
 pub fn walls(dataset: &Dataset, calibration: &Calibration) -> SurfaceResidual {
     let rig_from_sensor = mount(dataset, calibration);
     let room = &dataset.session.room;
-    collect(dataset, calibration, PoseKind::Room, |pose, beam, deflection| {
+    collect(dataset, calibration, PoseKind::Room, |pose| {
         let room_from_sensor = pose.room_from_rig * rig_from_sensor;
-        let azimuth = beam::azimuth(beam);
-        let origin = room_from_sensor * deflection.deflection_point(azimuth);
-        let exit = Unit::new_unchecked(room_from_sensor * deflection.exit_direction(azimuth).into_inner());
-        let (s, wall) = room.cast(&origin, &exit)?;
-        Some((deflection.distance + s, wall.cos_incidence(&exit), room.color.clone()))
+        move |beam: usize, deflection: &Deflection| {
+            let origin = room_from_sensor * deflection.deflection_point(beam::azimuth(beam));
+            let exit = deflection.exit_direction(beam::azimuth(beam));
+            let exit = Unit::new_unchecked(room_from_sensor * exit.into_inner());
+            let (s, wall) = room.cast(&origin, &exit)?;
+            Some(Surface {
+                predicted: deflection.distance + s,
+                cos_incidence: wall.cos_incidence(&exit),
+                color: room.color.clone(),
+            })
+        }
     })
 }
 
@@ -82,21 +95,25 @@ pub fn bias<'a>(dataset: &'a Dataset, calibration: &'a Calibration) -> &'a Range
     calibration.bias.as_ref().unwrap_or(&dataset.session.believed.bias)
 }
 
-/// Residuals over all stretches of a kind; `expect` gives predicted range, cosine of incidence and color.
-fn collect(
+/// Residuals over all stretches of a kind; `expect` says what a beam meets in one of them.
+fn collect<E>(
     dataset: &Dataset,
     calibration: &Calibration,
     kind: PoseKind,
-    expect: impl Fn(&PoseRecord, usize, &Deflection) -> Option<(f64, f64, String)>,
-) -> SurfaceResidual {
+    expect: impl Fn(&PoseRecord) -> E,
+) -> SurfaceResidual
+where
+    E: Fn(usize, &Deflection) -> Option<Surface>,
+{
     let bias = bias(dataset, calibration);
     let mut visits = Vec::new();
     for pose in dataset.of_kind(kind) {
+        let expect = expect(pose);
         for estimate in calibration.beams.iter().filter(|b| b.beam < pose.beams) {
             let Some(deflection) = estimate.deflection() else {
                 continue;
             };
-            let Some((predicted, cos_incidence, color)) = expect(pose, estimate.beam, &deflection) else {
+            let Some(on) = expect(estimate.beam, &deflection) else {
                 continue;
             };
             let residuals: Vec<f64> = pose
@@ -104,8 +121,8 @@ fn collect(
                 .filter(|r| r.is_finite())
                 .map(|r| {
                     let CorrectedRange(corrected) =
-                        bias.correct(RawRange(r), predicted, cos_incidence, &color);
-                    cos_incidence * (corrected - predicted) * 1e3
+                        bias.correct(RawRange(r), on.predicted, on.cos_incidence, &on.color);
+                    on.cos_incidence * (corrected - on.predicted) * 1e3
                 })
                 .collect();
             if !residuals.is_empty() {

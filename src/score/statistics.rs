@@ -3,12 +3,12 @@
 use nalgebra::{Matrix2, Matrix3, Rotation3, Unit, Vector2, Vector3};
 
 /// Root mean square; NaN of nothing.
-pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
+pub(super) fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     mean(values.into_iter().map(|v| v * v)).sqrt()
 }
 
 /// Arithmetic mean; NaN of nothing.
-pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
+pub(super) fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     let (sum, count) = values.into_iter().fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
     sum / count
 }
@@ -40,7 +40,7 @@ pub fn percentile(values: &[f64], share: f64) -> f64 {
 ///
 /// Zero for an error that is exactly zero; infinite for any other error under a covariance that is not positive
 /// definite, since such a covariance claims that the error cannot happen.
-pub fn mahalanobis_squared(error: &Vector2<f64>, covariance: &Matrix2<f64>) -> f64 {
+pub(super) fn mahalanobis_squared(error: &Vector2<f64>, covariance: &Matrix2<f64>) -> f64 {
     if error.norm_squared() == 0.0 {
         return 0.0;
     }
@@ -54,7 +54,7 @@ pub fn mahalanobis_squared(error: &Vector2<f64>, covariance: &Matrix2<f64>) -> f
 ///
 /// `None` unless the directions span at least a plane: one direction leaves a turn about itself free.
 #[doc(alias = "Kabsch")]
-pub fn best_rotation(pairs: &[(Unit<Vector3<f64>>, Unit<Vector3<f64>>)]) -> Option<Rotation3<f64>> {
+pub(super) fn best_rotation(pairs: &[(Unit<Vector3<f64>>, Unit<Vector3<f64>>)]) -> Option<Rotation3<f64>> {
     // Directions closer together than a microradian span no plane worth the name.
     const LEAST_SPAN: f64 = 1e-12;
     let spread: Matrix3<f64> = pairs
@@ -73,7 +73,7 @@ pub fn best_rotation(pairs: &[(Unit<Vector3<f64>>, Unit<Vector3<f64>>)]) -> Opti
 }
 
 /// Angle of a rotation, in radians: exact for small angles, where an arc cosine of the trace is not.
-pub fn rotation_angle(rotation: &Rotation3<f64>) -> f64 {
+pub(super) fn rotation_angle(rotation: &Rotation3<f64>) -> f64 {
     let m = rotation.matrix();
     let twice_sine_axis = Vector3::new(
         m[(2, 1)] - m[(1, 2)],
