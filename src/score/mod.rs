@@ -20,7 +20,7 @@
 mod bound;
 pub mod residual;
 mod statistics;
-mod words;
+pub(crate) mod words;
 
 use catoptric_model::beam::{self, Deflection};
 use catoptric_model::frame::Pose;

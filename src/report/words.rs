@@ -1,0 +1,186 @@
+//! What a person would say about an experiment and a score.
+
+use super::page::{escape, number};
+use crate::score::{Score, Verdict, words as score_words};
+use catoptric_model::{Calibration, Dataset, PoseKind};
+use catoptric_sim::Truth;
+use catoptric_sim::truth::BeamClass;
+
+/// What was recorded, and what was really there.
+pub(super) fn experiment(dataset: &Dataset, truth: Option<&Truth>) -> String {
+    let session = &dataset.session;
+    let count = |kind| dataset.of_kind(kind).count();
+    let scans: Vec<usize> = dataset.of_kind(PoseKind::Facet).map(|p| p.label.scans).collect();
+    let each = match (scans.iter().min(), scans.iter().max()) {
+        (Some(least), Some(most)) if least == most => format!(" with {} each", plural(*least, "scan")),
+        (Some(least), Some(most)) => format!(" with {least} to {most} scans each"),
+        _ => String::new(),
+    };
+    let mut text = format!(
+        "A {} with {} beams looks through {}. A board was set up {} in the fans of the mirrors{each}",
+        session.scanner.preset.to_uppercase(),
+        session.scanner.beams,
+        plural(session.facets.len(), "mirror"),
+        plural(count(PoseKind::Facet), "time"),
+    );
+    let direct = count(PoseKind::Direct);
+    if direct > 0 {
+        text += &format!(", and {} before beams that no mirror deflects", plural(direct, "time"));
+    }
+    text += &format!(
+        ". Range noise is believed to be {} mm, markers to be within {} mm.",
+        session.believed.range_noise_sd_mm, session.believed.marker_sd_mm
+    );
+    if let Some(truth) = truth {
+        let class = |class| truth.beams.iter().filter(|b| b.status == class).count();
+        text += &format!(
+            " This is a simulation, so the truth is known: {} deflected by one mirror, {} are split at an edge, {} pass by, {} end on the structure",
+            plural_are(class(BeamClass::Deflected)),
+            class(BeamClass::Split),
+            class(BeamClass::Direct),
+            class(BeamClass::Blocked) + class(BeamClass::Lost),
+        );
+        let bounced = class(BeamClass::MultiBounce);
+        text += &if bounced > 0 {
+            format!(", {bounced} meet more than one mirror.")
+        } else {
+            ".".to_owned()
+        };
+    } else {
+        text += " The truth is not known.";
+    }
+    text
+}
+
+/// The verdict on one calibration: a badge, what came back, what dominates, what is at fault.
+pub(super) fn verdict(calibration: &Calibration, score: &Score) -> String {
+    let (class, badge) = match score.verdict {
+        Verdict::Pass => ("pass", "PASS"),
+        Verdict::Fail => ("fail", "FAIL"),
+        Verdict::Blind => ("blind", "BLIND"),
+    };
+    let mut html = format!(
+        "<section class=\"verdict {class}\">\n<h3><span class=\"badge\">{badge}</span> – method “{}”</h3>\n",
+        escape(&calibration.method)
+    );
+    for sentence in [accuracy(score), dominance(score), honesty(score), abstentions(calibration, score)] {
+        if !sentence.is_empty() {
+            html += &format!("<p>{}</p>\n", escape(&sentence));
+        }
+    }
+    if !score.warnings.is_empty() {
+        html += "<ul>\n";
+        for warning in &score.warnings {
+            html += &format!("<li>{}</li>\n", escape(warning));
+        }
+        html += "</ul>\n";
+    }
+    html + "</section>\n"
+}
+
+fn accuracy(score: &Score) -> String {
+    let beams = score.beams;
+    let Some(deflected) = beams.deflected else {
+        return format!(
+            "{} solved. Without a truth the points they make are held against what was surveyed: they lie {} mm (rms) off the boards and {} mm off the walls of the empty room.",
+            plural_are(beams.solved),
+            number(score.boards_mm.rms, 1),
+            number(score.walls_mm.rms, 1)
+        );
+    };
+    let mut text = format!("{} of {deflected} deflected elements came back", beams.solved);
+    if !score.per_axis_rms_deg.is_finite() {
+        return text + ": there is no accuracy to speak of.";
+    }
+    text += &format!(
+        " with θ and φ within {}° per axis (rms); half of the directions are better than {}°, the worst is off by {}°. A point 4 m behind the mirror is displaced by {} mm.",
+        number(score.per_axis_rms_deg, 3),
+        number(score.direction_deg.median, 3),
+        number(score.direction_deg.max, 3),
+        number(score.point_mm.at_4m, 1)
+    );
+    if score.per_axis_rms_room_deg.is_finite() {
+        text += &format!(
+            " Seen in the room, mounting included, it is {}° per axis.",
+            number(score.per_axis_rms_room_deg, 3)
+        );
+    }
+    text
+}
+
+fn dominance(score: &Score) -> String {
+    let share = score_words::common_share(score);
+    if !share.is_finite() {
+        return String::new();
+    }
+    let percent = number(share * 100.0, 0);
+    let rotation = number(score.common_mode_deg, 3);
+    let left = number(score.differential_per_axis_rms_deg, 3);
+    if share > 0.5 {
+        format!(
+            "What all elements have in common dominates: a rotation of {rotation}° makes {percent} % of the squared error. That is an error of the sensor's mounting; without it {left}° per axis would be left, which is due to mirrors, boards and ranges."
+        )
+    } else {
+        format!(
+            "What differs from element to element dominates: {left}° per axis is left once the rotation they share ({rotation}°, {percent} % of the squared error) is taken out. The mounting is not at fault; boards and ranges are."
+        )
+    }
+}
+
+fn honesty(score: &Score) -> String {
+    let mut text = String::new();
+    if score.efficiency.is_finite() {
+        text += &format!(
+            "With these boards no per-element method can be expected to do better than {}° per axis; measured in squares, this one reaches {} % of that.",
+            number(score.crlb_per_axis_deg, 3),
+            number(score.efficiency * 100.0, 0)
+        );
+    }
+    if score.nees_mean.is_finite() {
+        let judgement = if score.nees_mean > 2.0 {
+            "smaller than the errors"
+        } else if score.nees_mean < 0.3 {
+            "larger than the errors"
+        } else {
+            "about right"
+        };
+        text += &format!(
+            " The stated uncertainty is {judgement}: {} % of the errors lie inside their 95 % ellipses.",
+            number(score.coverage_95 * 100.0, 0)
+        );
+    }
+    text.trim_start().to_owned()
+}
+
+fn abstentions(calibration: &Calibration, score: &Score) -> String {
+    let reasons = score_words::abstentions(calibration);
+    let Some(((status, reason), count)) = reasons.first() else {
+        return String::new();
+    };
+    let total: usize = reasons.iter().map(|(_, count)| count).sum();
+    let solvable = match score.beams.deflected {
+        Some(_) => format!(" {} of them could have been solved.", score.beams.abstained),
+        None => String::new(),
+    };
+    format!(
+        "{} left without a direction.{solvable} The most frequent reason, {count} times, is “{}”: {reason}.",
+        plural_are(total),
+        status.replace('_', " ")
+    )
+}
+
+fn plural(count: usize, noun: &str) -> String {
+    if count == 1 {
+        format!("1 {noun}")
+    } else {
+        format!("{count} {noun}s")
+    }
+}
+
+fn plural_are(count: usize) -> String {
+    if count == 1 {
+        "1 element is".to_owned()
+    } else {
+        format!("{count} elements are")
+    }
+}
