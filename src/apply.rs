@@ -100,8 +100,13 @@ pub fn apply(
         CloudFrame::Room => record.room_from_rig * rig_from_sensor,
     };
     let bias = residual::bias(dataset, calibration);
-    let color = record.label.color.as_deref().unwrap_or(&dataset.session.room.color);
-    let deflections: Vec<Option<Deflection>> = (0..record.beams).map(|b| deflection(calibration, b)).collect();
+    let color = record
+        .label
+        .color
+        .as_deref()
+        .unwrap_or(&dataset.session.room.color);
+    let deflections: Vec<Option<Deflection>> =
+        (0..record.beams).map(|b| deflection(calibration, b)).collect();
 
     let mut result = PointCloud {
         frame,
@@ -179,11 +184,22 @@ mod tests {
         let cloud = apply(&s.dataset, &perfect(&s.truth), None, CloudFrame::Room).expect("there is a room");
         assert_eq!(cloud.pose, 0);
         assert!(cloud.points.len() > 1500);
-        assert!(cloud.points.iter().all(|p| off_wall(&s.dataset, &p.position) < 1e-9));
+        assert!(
+            cloud
+                .points
+                .iter()
+                .all(|p| off_wall(&s.dataset, &p.position) < 1e-9)
+        );
         let all: usize = s.dataset.poses[0].ranges.len();
-        assert_eq!(cloud.points.len() + cloud.without_range + cloud.without_direction, all);
+        assert_eq!(
+            cloud.points.len() + cloud.without_range + cloud.without_direction,
+            all
+        );
         // Exact readings, two scans: what is left out are the ranges of rejected and blocked elements.
-        assert_eq!((cloud.without_range, cloud.without_direction), (0, 2 * cloud.unsolved_elements));
+        assert_eq!(
+            (cloud.without_range, cloud.without_direction),
+            (0, 2 * cloud.unsolved_elements)
+        );
         assert!(cloud.unsolved_elements > 0 && !cloud.mount_is_nominal);
     }
 
@@ -191,19 +207,29 @@ mod tests {
     fn frames_differ_by_the_poses_between_them() {
         let s = sample();
         let calibration = perfect(&s.truth);
-        let first = |frame| apply(&s.dataset, &calibration, None, frame).expect("there is a room").points[0];
+        let first = |frame| {
+            apply(&s.dataset, &calibration, None, frame)
+                .expect("there is a room")
+                .points[0]
+        };
         let in_sensor = first(CloudFrame::Sensor).position;
         let rig_from_sensor = Pose::from(&s.truth.rig_from_sensor);
         let room_from_rig = s.dataset.poses[0].room_from_rig;
         assert!((first(CloudFrame::Rig).position - rig_from_sensor * in_sensor).norm() < 1e-12);
-        assert!((first(CloudFrame::Room).position - room_from_rig * rig_from_sensor * in_sensor).norm() < 1e-12);
+        assert!(
+            (first(CloudFrame::Room).position - room_from_rig * rig_from_sensor * in_sensor).norm() < 1e-12
+        );
     }
 
     #[test]
     fn direct_elements_stay_in_the_plane() {
         let s = sample();
         let cloud = apply(&s.dataset, &perfect(&s.truth), None, CloudFrame::Sensor).expect("there is a room");
-        let forward = cloud.points.iter().find(|p| p.beam == beam::FORWARD).expect("it is direct");
+        let forward = cloud
+            .points
+            .iter()
+            .find(|p| p.beam == beam::FORWARD)
+            .expect("it is direct");
         assert_eq!((forward.position.y, forward.position.z), (0.0, 0.0));
         assert_eq!(forward.position.x, s.dataset.poses[0].ranges[beam::FORWARD]);
         assert!(cloud.points.iter().any(|p| p.position.z > 1.0));
@@ -230,7 +256,11 @@ mod tests {
         );
         calibration.bias = Some(bias);
         let cloud = apply(&s.dataset, &calibration, Some(0), CloudFrame::Sensor).expect("there is a room");
-        let forward = cloud.points.iter().find(|p| p.beam == beam::FORWARD).expect("it is direct");
+        let forward = cloud
+            .points
+            .iter()
+            .find(|p| p.beam == beam::FORWARD)
+            .expect("it is direct");
         let range = s.dataset.poses[0].ranges[beam::FORWARD];
         assert!((forward.position.x - (range - 0.010)).abs() < 1e-12);
     }
@@ -243,7 +273,12 @@ mod tests {
         }
         let cloud = apply(&s.dataset, &perfect(&s.truth), None, CloudFrame::Room).expect("there is a room");
         assert_eq!(cloud.without_range, 3);
-        assert!(cloud.points.iter().all(|p| p.position.iter().all(|x| x.is_finite())));
+        assert!(
+            cloud
+                .points
+                .iter()
+                .all(|p| p.position.iter().all(|x| x.is_finite()))
+        );
     }
 
     #[test]
@@ -251,7 +286,10 @@ mod tests {
         let mut s = sample();
         let calibration = perfect(&s.truth);
         let error = apply(&s.dataset, &calibration, Some(99), CloudFrame::Room).expect_err("there are 49");
-        assert_eq!(error.to_string(), "the dataset has no pose 99; its poses are numbered 0 to 48");
+        assert_eq!(
+            error.to_string(),
+            "the dataset has no pose 99; its poses are numbered 0 to 48"
+        );
         s.dataset.poses.remove(0);
         let error = apply(&s.dataset, &calibration, None, CloudFrame::Room).expect_err("no room is left");
         assert_eq!(error, ApplyError::NoRoom);

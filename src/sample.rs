@@ -6,8 +6,8 @@ use catoptric_model::session::{
     self, BareStructure, Beliefs, BoardSheet, Marker, MountTolerance, NominalFacet, RoomSurvey, ScannerSheet,
 };
 use catoptric_model::{
-    BeamEstimate, BoardPlane, Calibration, Dataset, Deflection, MirrorPlane, Pose, PoseData, PoseKind, PoseLabel,
-    PoseRecord, RangeBias, Session, Status, beam, range,
+    BeamEstimate, BoardPlane, Calibration, Dataset, Deflection, MirrorPlane, Pose, PoseData, PoseKind,
+    PoseLabel, PoseRecord, RangeBias, Session, Status, beam, range,
 };
 use catoptric_sim::Truth;
 use catoptric_sim::layout;
@@ -49,7 +49,14 @@ struct Mirror {
 }
 
 const NAMES: [&str; 8] = [
-    "port 1", "port 2", "port 3", "port 4", "starboard 1", "starboard 2", "starboard 3", "starboard 4",
+    "port 1",
+    "port 2",
+    "port 3",
+    "port 4",
+    "starboard 1",
+    "starboard 2",
+    "starboard 3",
+    "starboard 4",
 ];
 
 fn mirrors() -> Vec<Mirror> {
@@ -57,7 +64,11 @@ fn mirrors() -> Vec<Mirror> {
         let side = if i < 4 { 1.0 } else { -1.0 };
         let place = (i % 4) as f64;
         let first = 62.0 + 16.8 * place;
-        let azimuth_deg = if side > 0.0 { [first, first + 15.0] } else { [-first - 15.0, -first] };
+        let azimuth_deg = if side > 0.0 {
+            [first, first + 15.0]
+        } else {
+            [-first - 15.0, -first]
+        };
         let up = if i % 2 == 0 { 1.0 } else { -1.0 };
         let corners = layout::corners(&FacetShape::Wedge(Wedge {
             azimuth_deg,
@@ -136,7 +147,7 @@ fn session(mirrors: &[Mirror]) -> Session {
             color: "white".to_owned(),
         },
         believed: Beliefs {
-            range_noise_sd_mm: 10.0,
+            range_noise_sd_mm: 2.0,
             drift_sd_mm: 0.9,
             marker_sd_mm: 0.2,
             bias: RangeBias::default(),
@@ -150,15 +161,19 @@ fn session(mirrors: &[Mirror]) -> Session {
             first_beam: 0,
             distance_m: Vec::new(),
         },
-        rig_markers: vec![marker("a", 75.0, 75.0), marker("b", -75.0, 75.0), marker("c", 75.0, -75.0)],
+        rig_markers: vec![
+            marker("a", 75.0, 75.0),
+            marker("b", -75.0, 75.0),
+            marker("c", 75.0, -75.0),
+        ],
         facets: mirrors
             .iter()
             .map(|m| NominalFacet {
                 name: m.name.to_owned(),
                 corners_mm: m.corners.iter().map(|c| (c.coords * 1e3).into()).collect(),
-                beams: m.azimuth_deg.map(|a| {
-                    beam::nearest(a.to_radians()).expect("mirrors stand before the scanner")
-                }),
+                beams: m
+                    .azimuth_deg
+                    .map(|a| beam::nearest(a.to_radians()).expect("mirrors stand before the scanner")),
             })
             .collect(),
         boards: vec![BoardSheet {
@@ -180,7 +195,10 @@ fn session(mirrors: &[Mirror]) -> Session {
 fn boards_of(mirror: &Mirror, room_from_sensor: &Pose) -> Vec<Pose> {
     let middle = 0.5 * (mirror.azimuth_deg[0] + mirror.azimuth_deg[1]);
     let azimuth = middle.to_radians();
-    let deflection = mirror.plane.deflect(beam::direction(azimuth)).expect("it faces the scanner");
+    let deflection = mirror
+        .plane
+        .deflect(beam::direction(azimuth))
+        .expect("it faces the scanner");
     let exit = deflection.exit_direction(azimuth);
     (0..6)
         .map(|k| {
@@ -197,7 +215,13 @@ fn boards_of(mirror: &Mirror, room_from_sensor: &Pose) -> Vec<Pose> {
         .collect()
 }
 
-fn record(pose: usize, kind: PoseKind, facet: Option<&str>, room_from_rig: Pose, board: Option<Pose>) -> PoseRecord {
+fn record(
+    pose: usize,
+    kind: PoseKind,
+    facet: Option<&str>,
+    room_from_rig: Pose,
+    board: Option<Pose>,
+) -> PoseRecord {
     PoseRecord {
         label: PoseLabel {
             pose,
@@ -220,13 +244,25 @@ pub(crate) fn sample() -> Sample {
     let mirrors = mirrors();
     let session = session(&mirrors);
     let beams: Vec<TrueBeam> = (0..beam::COUNT).map(|b| true_beam(b, &mirrors)).collect();
-    let room_from_rig = Pose::from_parts(Translation3::new(0.1, -0.2, 1.3), yaw_pitch_roll(0.1, 0.02, -0.01));
-    let rig_from_sensor = Pose::from_parts(Translation3::new(0.001, 0.0, -0.041), yaw_pitch_roll(0.004, -0.008, 0.01));
+    let room_from_rig = Pose::from_parts(
+        Translation3::new(0.1, -0.2, 1.3),
+        yaw_pitch_roll(0.1, 0.02, -0.01),
+    );
+    let rig_from_sensor = Pose::from_parts(
+        Translation3::new(0.001, 0.0, -0.041),
+        yaw_pitch_roll(0.004, -0.008, 0.01),
+    );
     let room_from_sensor = room_from_rig * rig_from_sensor;
     let mut poses = vec![record(0, PoseKind::Room, None, room_from_rig, None)];
     for mirror in &mirrors {
         for board in boards_of(mirror, &room_from_sensor) {
-            poses.push(record(poses.len(), PoseKind::Facet, Some(mirror.name), room_from_rig, Some(board)));
+            poses.push(record(
+                poses.len(),
+                PoseKind::Facet,
+                Some(mirror.name),
+                room_from_rig,
+                Some(board),
+            ));
         }
     }
     for pose in &mut poses {
@@ -275,7 +311,10 @@ fn reading(b: &TrueBeam, pose: &PoseRecord, session: &Session, room_from_sensor:
         if let Some(r) = range::predict(&deflection, azimuth, &plane) {
             let hit = deflection.deflection_point(azimuth) + exit.into_inner() * (r - deflection.distance);
             let sheet = &session.boards[0];
-            if sheet.outline().contains(&(sensor_from_board.inverse() * hit), 0.0) {
+            if sheet
+                .outline()
+                .contains(&(sensor_from_board.inverse() * hit), 0.0)
+            {
                 return r;
             }
         }
@@ -306,10 +345,13 @@ pub(crate) fn perfect(truth: &Truth) -> Calibration {
                 rms_residual_m: Some(0.0),
                 ..without(Status::Solved, None)
             },
-            BeamClass::Split | BeamClass::MultiBounce => {
-                without(Status::Rejected, Some("spread of 9 mm on 3 boards: it falls on an edge"))
+            BeamClass::Split | BeamClass::MultiBounce => without(
+                Status::Rejected,
+                Some("spread of 9 mm on 3 boards: it falls on an edge"),
+            ),
+            BeamClass::Blocked | BeamClass::Lost => {
+                without(Status::TooFewPoses, Some("1 board, 3 are needed"))
             }
-            BeamClass::Blocked | BeamClass::Lost => without(Status::TooFewPoses, Some("1 board, 3 are needed")),
         }
     };
     Calibration {
@@ -332,7 +374,11 @@ pub(crate) fn noisy(truth: &Truth, sd: f64, seed: u64) -> Calibration {
     let mut noise = Noise::new(seed);
     let mut calibration = perfect(truth);
     calibration.method = "noisy".to_owned();
-    for b in calibration.beams.iter_mut().filter(|b| b.status == Status::Solved) {
+    for b in calibration
+        .beams
+        .iter_mut()
+        .filter(|b| b.status == Status::Solved)
+    {
         let cos = b.elevation_rad.map_or(1.0, f64::cos);
         b.azimuth_rad = b.azimuth_rad.map(|a| a + sd * noise.next() / cos);
         b.elevation_rad = b.elevation_rad.map(|e| e + sd * noise.next());

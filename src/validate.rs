@@ -113,7 +113,10 @@ pub fn validate(calibration: &Calibration) -> Vec<Problem> {
     for (place, facet) in calibration.facets.iter().enumerate() {
         let key = format!("facets[{place}]");
         if !names.insert(&facet.facet) {
-            problems.error(&format!("{key}.facet"), format!("{:?} is listed more than once", facet.facet));
+            problems.error(
+                &format!("{key}.facet"),
+                format!("{:?} is listed more than once", facet.facet),
+            );
         }
         check_facet(&mut problems, &key, facet);
     }
@@ -141,12 +144,18 @@ fn check_status(at: &mut OfBeam, b: &BeamEstimate) {
         }
         Status::Direct => {
             if has_angles {
-                at.error("status", "is direct, and yet there are angles of deflection".to_owned());
+                at.error(
+                    "status",
+                    "is direct, and yet there are angles of deflection".to_owned(),
+                );
             }
         }
         Status::TooFewPoses | Status::Unobservable | Status::NotConverged | Status::Rejected => {
             if b.reason.as_ref().is_none_or(|r| r.trim().is_empty()) {
-                at.error("reason", format!("is missing from an element that is {}", b.status.word()));
+                at.error(
+                    "reason",
+                    format!("is missing from an element that is {}", b.status.word()),
+                );
             }
         }
     }
@@ -160,7 +169,10 @@ fn check_status(at: &mut OfBeam, b: &BeamEstimate) {
     if let Some(direction) = b.null_direction {
         let length = SVector::from(direction).norm();
         if !((length - 1.0).abs() <= UNIT_TOLERANCE) {
-            at.error("null_direction", format!("has length {length}, a direction has 1"));
+            at.error(
+                "null_direction",
+                format!("has length {length}, a direction has 1"),
+            );
         }
     }
 }
@@ -175,7 +187,10 @@ fn check_angles(at: &mut OfBeam, b: &BeamEstimate) {
             // Rounding to nine digits may carry an angle that far beyond its limit.
             Some(value) if value.abs() > limit + 1e-9 => {
                 let hint = if value.abs() > TAU {
-                    format!("; it looks like degrees: {value}° is {:.4} rad", value.to_radians())
+                    format!(
+                        "; it looks like degrees: {value}° is {:.4} rad",
+                        value.to_radians()
+                    )
                 } else {
                     String::new()
                 };
@@ -195,7 +210,10 @@ fn check_angles(at: &mut OfBeam, b: &BeamEstimate) {
     }
     match b.rms_residual_m {
         Some(r) if !(r.is_finite() && r >= 0.0) => {
-            at.error("rms_residual_m", format!("is {r}, a root mean square is a number from 0"));
+            at.error(
+                "rms_residual_m",
+                format!("is {r}, a root mean square is a number from 0"),
+            );
         }
         _ => {}
     }
@@ -219,7 +237,9 @@ fn check_covariances(at: &mut OfBeam, b: &BeamEstimate) {
         if largest > most {
             at.error(
                 key,
-                format!("means a standard deviation of {largest:.3} rad, which says nothing; is it in degrees?"),
+                format!(
+                    "means a standard deviation of {largest:.3} rad, which says nothing; is it in degrees?"
+                ),
             );
         } else if smallest < least {
             at.warning(
@@ -241,11 +261,17 @@ fn check_facet(problems: &mut Problems, key: &str, facet: &FacetEstimate) {
     if !(facet.offset_m.abs() <= MIRROR_DISTANCE_M) {
         problems.error(
             &format!("{key}.offset_m"),
-            format!("of {:?} is {}, not within {MIRROR_DISTANCE_M} m", facet.facet, facet.offset_m),
+            format!(
+                "of {:?} is {}, not within {MIRROR_DISTANCE_M} m",
+                facet.facet, facet.offset_m
+            ),
         );
     }
     if let Err(message) = check_covariance(&facet.covariance) {
-        problems.error(&format!("{key}.covariance"), format!("of {:?} {message}", facet.facet));
+        problems.error(
+            &format!("{key}.covariance"),
+            format!("of {:?} {message}", facet.facet),
+        );
     }
 }
 
@@ -275,10 +301,19 @@ fn check_bias(problems: &mut Problems, bias: &RangeBias) {
     if table.range_m.len() != table.error_mm.len() {
         problems.error(
             "bias.distance",
-            format!("has {} ranges and {} errors", table.range_m.len(), table.error_mm.len()),
+            format!(
+                "has {} ranges and {} errors",
+                table.range_m.len(),
+                table.error_mm.len()
+            ),
         );
     }
-    if !table.range_m.iter().zip(table.range_m.iter().skip(1)).all(|(a, b)| a < b) {
+    if !table
+        .range_m
+        .iter()
+        .zip(table.range_m.iter().skip(1))
+        .all(|(a, b)| a < b)
+    {
         problems.error("bias.distance.range_m", "does not increase".to_owned());
     }
     let lines = bias.color.values().flat_map(|c| [c.slope_mm_per_m, c.offset_mm]);
@@ -400,7 +435,10 @@ mod tests {
             c.beams[i].elevation_rad = Some(45.0);
         });
         assert!(problems.len() > 300);
-        let at_45 = problems.iter().find(|p| p.message.contains("is 45,")).expect("it is found");
+        let at_45 = problems
+            .iter()
+            .find(|p| p.message.contains("is 45,"))
+            .expect("it is found");
         assert_eq!(
             at_45.message,
             "is 45, outside ±π/2; it looks like degrees: 45° is 0.7854 rad"
@@ -408,7 +446,12 @@ mod tests {
         assert!(at_45.key.ends_with("].elevation_rad") && at_45.severity == Severity::Error);
         assert_eq!(
             at_45.to_string(),
-            format!("error: {} (beam {}): {}", at_45.key, at_45.beam.expect("of a beam"), at_45.message)
+            format!(
+                "error: {} (beam {}): {}",
+                at_45.key,
+                at_45.beam.expect("of a beam"),
+                at_45.message
+            )
         );
     }
 
@@ -427,8 +470,16 @@ mod tests {
 
     #[test]
     fn distances_are_positive_metres() {
-        assert!(one(&after(|c, i| c.beams[i].distance_m = Some(65.0))).message.contains("millimetres"));
-        assert!(one(&after(|c, i| c.beams[i].distance_m = Some(-0.06))).key.ends_with("distance_m"));
+        assert!(
+            one(&after(|c, i| c.beams[i].distance_m = Some(65.0)))
+                .message
+                .contains("millimetres")
+        );
+        assert!(
+            one(&after(|c, i| c.beams[i].distance_m = Some(-0.06)))
+                .key
+                .ends_with("distance_m")
+        );
         assert_eq!(after(|c, i| c.beams[i].distance_m = None), []);
     }
 
@@ -438,7 +489,10 @@ mod tests {
             ([[1e-6, 2e-7], [-2e-7, 1e-6]], "is not symmetric"),
             ([[1e-6, 2e-6], [2e-6, 1e-6]], "is not positive semi-definite"),
             ([[-1e-6, 0.0], [0.0, 1e-6]], "has the negative variance -1e-6"),
-            ([[f64::NAN, 0.0], [0.0, 1e-6]], "holds something that is not a number"),
+            (
+                [[f64::NAN, 0.0], [0.0, 1e-6]],
+                "holds something that is not a number",
+            ),
             (
                 [[100.0, 0.0], [0.0, 1e-6]],
                 "means a standard deviation of 10.000 rad, which says nothing; is it in degrees?",
@@ -451,7 +505,10 @@ mod tests {
         let tiny = after(|c, i| c.beams[i].covariance_rad2 = Some([[1e-24, 0.0], [0.0, 1e-24]]));
         assert_eq!(one(&tiny).severity, Severity::Warning);
         // Perfectly correlated is semi-definite, and sound.
-        assert_eq!(after(|c, i| c.beams[i].covariance_rad2 = Some([[4e-6, 2e-6], [2e-6, 1e-6]])), []);
+        assert_eq!(
+            after(|c, i| c.beams[i].covariance_rad2 = Some([[4e-6, 2e-6], [2e-6, 1e-6]])),
+            []
+        );
     }
 
     #[test]
@@ -463,8 +520,16 @@ mod tests {
                 c.beams[i] = b;
             })
         };
-        assert!(one(&unsolved(Status::Rejected, None, None)).key.ends_with("reason"));
-        assert!(one(&unsolved(Status::Rejected, Some(" "), None)).key.ends_with("reason"));
+        assert!(
+            one(&unsolved(Status::Rejected, None, None))
+                .key
+                .ends_with("reason")
+        );
+        assert!(
+            one(&unsolved(Status::Rejected, Some(" "), None))
+                .key
+                .ends_with("reason")
+        );
         assert!(
             one(&unsolved(Status::Unobservable, Some("one axis"), Some(0.1)))
                 .message
@@ -472,7 +537,11 @@ mod tests {
         );
         assert_eq!(unsolved(Status::Direct, None, None), []);
         assert_eq!(unsolved(Status::Unobservable, Some("one axis"), None), []);
-        assert!(one(&unsolved(Status::Direct, None, Some(0.1))).key.ends_with("status"));
+        assert!(
+            one(&unsolved(Status::Direct, None, Some(0.1)))
+                .key
+                .ends_with("status")
+        );
     }
 
     #[test]
@@ -487,7 +556,9 @@ mod tests {
         assert_eq!(key(|c, _| c.beams[3].beam = 1081), "beams[3].beam");
         assert_eq!(key(|c, _| c.beams[3].beam = 2), "beams[3].beam");
         assert_eq!(
-            key(|c, i| c.beams[i].null_direction = Some([1.0, 1.0])).split('.').next_back(),
+            key(|c, i| c.beams[i].null_direction = Some([1.0, 1.0]))
+                .split('.')
+                .next_back(),
             Some("null_direction")
         );
         assert_eq!(

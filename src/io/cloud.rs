@@ -143,7 +143,14 @@ fn encode(point: &CloudPoint) -> io::Result<[u8; POINT_BYTES]> {
 }
 
 fn decode(bytes: &[u8]) -> CloudPoint {
-    let axis = |i: usize| f64::from(f32::from_le_bytes([bytes[i], bytes[i + 1], bytes[i + 2], bytes[i + 3]]));
+    let axis = |i: usize| {
+        f64::from(f32::from_le_bytes([
+            bytes[i],
+            bytes[i + 1],
+            bytes[i + 2],
+            bytes[i + 3],
+        ]))
+    };
     CloudPoint {
         position: Point3::new(axis(0), axis(4), axis(8)),
         beam: usize::from(u16::from_le_bytes([bytes[12], bytes[13]])),

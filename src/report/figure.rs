@@ -62,6 +62,7 @@ pub(super) struct Axes {
 }
 
 /// A value over an azimuth, with the band it should be in.
+#[derive(Debug, Clone)]
 pub(super) struct Dot {
     pub(super) x: f64,
     pub(super) y: f64,
@@ -137,7 +138,9 @@ pub(super) fn per_beam(size: (u32, u32), axes: &Axes, title: &str, dots: &[Dot])
             let zero = [(axes.x.start, 0.0), (axes.x.end, 0.0)];
             chart.draw_series(LineSeries::new(zero, BLACK.mix(0.6).stroke_width(1)))?;
         }
-        let marks = dots.iter().map(|d| Circle::new((d.x, d.y.clamp(low, high)), 2, d.color.filled()));
+        let marks = dots
+            .iter()
+            .map(|d| Circle::new((d.x, d.y.clamp(low, high)), 2, d.color.filled()));
         chart.draw_series(marks)?;
         Ok(())
     })
@@ -169,14 +172,13 @@ fn frame<'a>(
         Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>,
     >,
     Box<dyn std::error::Error>,
->
-where
-{
+> {
     let mut chart = ChartBuilder::on(area)
         .margin(MARGIN)
         .x_label_area_size(AXIS_ROOM)
         .y_label_area_size(AXIS_ROOM)
         .build_cartesian_2d(axes.x.clone(), axes.y.clone())?;
+    let label = |value: &f64| tick(*value);
     let mut mesh = chart.configure_mesh();
     mesh.x_desc(axes.x_label.as_str())
         .y_desc(axes.y_label.as_str())
@@ -184,12 +186,26 @@ where
         .axis_desc_style((FONT, LABEL_SIZE))
         .axis_style(BLACK.mix(0.6))
         .bold_line_style(GRID.mix(0.6))
-        .max_light_lines(1);
+        .max_light_lines(1)
+        .x_label_formatter(&label)
+        .y_label_formatter(&label);
     if !y_labels {
         mesh.disable_y_mesh().y_labels(0);
     }
     mesh.draw()?;
     Ok(chart)
+}
+
+/// A number at an axis: no more digits than it needs, a true minus, and one zero only.
+fn tick(value: f64) -> String {
+    // Ticks are round numbers; what is beyond the sixth decimal is rounding.
+    let text = format!("{value:.6}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    match text.strip_prefix('-') {
+        Some("0") => "0".to_owned(),
+        Some(rest) => format!("−{rest}"),
+        None => text.to_owned(),
+    }
 }
 
 /// An SVG for inlining: without a name space, which HTML supplies, with a title, and as wide as the page lets it.
@@ -200,7 +216,10 @@ fn draw(size: (u32, u32), title: &str, content: impl FnOnce(&Area) -> Outcome) -
         content(&area).and_then(|()| Ok(area.present()?))
     };
     if let Err(error) = outcome {
-        return format!("<p class=\"failed\">This plot could not be drawn: {}</p>", super::page::escape(&error.to_string()));
+        return format!(
+            "<p class=\"failed\">This plot could not be drawn: {}</p>",
+            super::page::escape(&error.to_string())
+        );
     }
     let start = svg.find('>').map_or(0, |end| end + 1);
     let (width, height) = size;
@@ -256,6 +275,19 @@ mod tests {
         let at = |y: f64| per_beam((300, 300), &axes(), "", &[dot(y)]);
         assert_eq!(at(5.0), at(1.0));
         assert_ne!(at(0.5), at(1.0));
+    }
+
+    #[test]
+    fn ticks_are_short() {
+        for (value, text) in [
+            (100.0, "100"),
+            (-0.0, "0"),
+            (-1e-17, "0"),
+            (-0.15, "−0.15"),
+            (0.1 + 0.2, "0.3"),
+        ] {
+            assert_eq!(tick(value), text);
+        }
     }
 
     #[test]

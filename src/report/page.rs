@@ -26,19 +26,27 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
     }
 }
 
-/// A table; cells are text, numbers are set to the right by the style sheet in all columns but the first.
+/// A table; columns of words are set to the left, columns of numbers to the right.
 pub(super) fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
+    let is_word = |cell: &String| cell.starts_with(char::is_alphabetic);
+    let class = |column: usize| {
+        let has_words = rows.iter().filter_map(|row| row.get(column)).any(is_word);
+        if has_words { " class=\"words\"" } else { "" }
+    };
     let mut html = "<div class=\"scroll\"><table>\n<thead><tr>".to_owned();
-    for heading in headings {
-        html += &format!("<th scope=\"col\">{}</th>", escape(heading));
+    for (column, heading) in headings.iter().enumerate() {
+        html += &format!("<th scope=\"col\"{}>{}</th>", class(column), escape(heading));
     }
     html += "</tr></thead>\n<tbody>\n";
     for row in rows {
         html += "<tr>";
         for (i, cell) in row.iter().enumerate() {
-            let tag = if i == 0 { "th scope=\"row\"" } else { "td" };
-            let end = if i == 0 { "th" } else { "td" };
-            html += &format!("<{tag}>{}</{end}>", escape(cell));
+            let cell = escape(cell);
+            html += &if i == 0 {
+                format!("<th scope=\"row\">{cell}</th>")
+            } else {
+                format!("<td{}>{cell}</td>", class(i))
+            };
         }
         html += "</tr>\n";
     }
@@ -49,19 +57,31 @@ pub(super) fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
 const LONG_TABLE: usize = 12;
 
 /// Plots, what to see in them, and their numbers.
-pub(super) fn figure(plots: &str, caption: &str, legend: &[(String, String)], headings: &[&str], rows: &[Vec<String>]) -> String {
+pub(super) fn figure(
+    plots: &str,
+    caption: &str,
+    legend: &[(String, String)],
+    headings: &[&str],
+    rows: &[Vec<String>],
+) -> String {
     let mut html = format!("<figure>\n{plots}\n");
     if !legend.is_empty() {
         html += "<p class=\"legend\">";
         for (color, name) in legend {
-            html += &format!("<span><i style=\"background:{color}\"></i>{}</span> ", escape(name));
+            html += &format!(
+                "<span><i style=\"background:{color}\"></i>{}</span> ",
+                escape(name)
+            );
         }
         html += "</p>\n";
     }
     html += &format!("<figcaption>{}</figcaption>\n", escape(caption));
     let table = table(headings, rows);
     if rows.len() > LONG_TABLE {
-        html += &format!("<details><summary>The numbers ({} rows)</summary>\n{table}</details>\n", rows.len());
+        html += &format!(
+            "<details><summary>The numbers ({} rows)</summary>\n{table}</details>\n",
+            rows.len()
+        );
     } else {
         html += &table;
     }

@@ -10,18 +10,24 @@ use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
 use nalgebra::Point3;
 use plotters::style::{BLACK, RGBColor};
+use std::ops::Range;
 
 /// Size of a square view and of a plot over azimuth, in pixels.
 const SQUARE: (u32, u32) = (500, 500);
 const WIDE: (u32, u32) = (980, 270);
+const HALF: (u32, u32) = (490, 270);
 const STRIP: (u32, u32) = (980, 150);
 
 /// How far rays are drawn, in metres, in the whole view and in the close-up.
 const REACH_M: f64 = 1.5;
 const CLOSE_M: f64 = 0.16;
 
-/// Every n-th beam is drawn as a ray.
+/// Every n-th beam is drawn as a ray; fewer of those that no mirror deflects.
 const RAY_STEP: usize = 4;
+const DIRECT_STEP: usize = 16;
+
+/// Azimuths without an element beyond which a plot is parted in two, in degrees.
+const WIDE_GAP_DEG: f64 = 40.0;
 
 /// Points of a cloud that are drawn at most.
 const MOST_POINTS: usize = 6000;
@@ -51,7 +57,9 @@ fn color_of(facet: Option<usize>) -> RGBColor {
 
 /// The facets and their colors.
 fn legend(dataset: &Dataset) -> Vec<(String, String)> {
-    let entry = |(i, f): (usize, &catoptric_model::session::NominalFacet)| (figure::css(figure::color(i)), f.name.clone());
+    let entry = |(i, f): (usize, &catoptric_model::session::NominalFacet)| {
+        (figure::css(figure::color(i)), f.name.clone())
+    };
     dataset.session.facets.iter().enumerate().map(entry).collect()
 }
 
@@ -60,7 +68,7 @@ fn azimuth_deg(beam: usize) -> f64 {
 }
 
 /// Azimuths of all beams, with a margin.
-fn azimuth_axis(dataset: &Dataset) -> std::ops::Range<f64> {
+fn azimuth_axis(dataset: &Dataset) -> Range<f64> {
     let last = dataset.session.scanner.beams.saturating_sub(1);
     azimuth_deg(0) - 1.0..azimuth_deg(last) + 1.0
 }
@@ -75,8 +83,18 @@ pub(super) fn fans(dataset: &Dataset, calibration: &Calibration) -> String {
     let solved = solved(dataset, calibration);
     let mut svgs = "<div class=\"views\">\n".to_owned();
     for (title, reach, [i, j], [x, y]) in [
-        ("From above", REACH_M, [0, 1], ["x, forward (m)", "y, to port (m)"]),
-        ("From above, the mirrors close up", CLOSE_M, [0, 1], ["x, forward (m)", "y, to port (m)"]),
+        (
+            "From above",
+            REACH_M,
+            [0, 1],
+            ["x, forward (m)", "y, to port (m)"],
+        ),
+        (
+            "From above, the mirrors close up",
+            CLOSE_M,
+            [0, 1],
+            ["x, forward (m)", "y, to port (m)"],
+        ),
         ("From the side", REACH_M, [0, 2], ["x, forward (m)", "z, up (m)"]),
         ("From behind", REACH_M, [1, 2], ["y, to port (m)", "z, up (m)"]),
     ] {
@@ -86,7 +104,11 @@ pub(super) fn fans(dataset: &Dataset, calibration: &Calibration) -> String {
         let axes = Axes {
             x: -reach * 1.05..reach * 1.05,
             y: -reach * 1.05..reach * 1.05,
-            x_label: if i == 1 { "−y, to starboard (m)".to_owned() } else { x.to_owned() },
+            x_label: if i == 1 {
+                "−y, to starboard (m)".to_owned()
+            } else {
+                x.to_owned()
+            },
             y_label: y.to_owned(),
         };
         let svg = figure::plan(
@@ -94,7 +116,11 @@ pub(super) fn fans(dataset: &Dataset, calibration: &Calibration) -> String {
             &axes,
             title,
             &strokes(dataset, calibration, &solved, reach, view),
-            &if reach > CLOSE_M { labels(dataset, &solved, reach, view) } else { Vec::new() },
+            &if reach > CLOSE_M {
+                labels(dataset, &solved, reach, view)
+            } else {
+                Vec::new()
+            },
         );
         svgs += &format!("<div><h4>{title}</h4>{svg}</div>\n");
     }
@@ -146,7 +172,7 @@ fn strokes(
         opacity,
     };
     let direct = calibration.beams.iter().filter(|b| b.status == Status::Direct);
-    for b in direct.filter(|b| b.beam % RAY_STEP == 0) {
+    for b in direct.filter(|b| b.beam % DIRECT_STEP == 0) {
         let end = Point3::from(beam::direction(beam::azimuth(b.beam)).into_inner() * reach.min(REACH_M));
         strokes.push(ray(&[Point3::origin(), end], GRID, 1, 0.9));
     }
@@ -182,9 +208,11 @@ fn labels(
         let azimuth = beam::azimuth(middle.estimate.beam);
         let exit = middle.deflection.exit_direction(azimuth).into_inner();
         let mut at = view(&(middle.deflection.deflection_point(azimuth) + exit * reach * 0.98));
-        // A word that falls on another one moves down by a line.
-        let line = 0.08 * reach;
-        let near = |w: &Word, at: (f64, f64)| (w.at.0 - at.0).abs() < 5.0 * line && (w.at.1 - at.1).abs() < line;
+        // A word that falls on another one moves towards the middle by a line.
+        let line = if at.1 < 0.0 { -0.08 } else { 0.08 } * reach;
+        let near = |w: &Word, at: (f64, f64)| {
+            (w.at.0 - at.0).abs() < 5.0 * line.abs() && (w.at.1 - at.1).abs() < 0.9 * line.abs()
+        };
         while words.iter().any(|w| near(w, at)) {
             at.1 -= line;
         }
@@ -229,7 +257,13 @@ pub(super) fn errors(dataset: &Dataset, calibration: &Calibration, score: &Score
         })
         .collect();
     let headings = [
-        "Beam", "Azimuth (°)", "Mirror", "cos φ·δθ (°)", "its σ (°)", "δφ (°)", "its σ (°)",
+        "Beam",
+        "Azimuth (°)",
+        "Mirror",
+        "cos φ·δθ (°)",
+        "its σ (°)",
+        "δφ (°)",
+        "its σ (°)",
     ];
     let caption = "Error of every solved, unsplit element against the truth, with the ±2σ band its covariance states. \
                    19 of 20 dots should lie on their band. Dots that run together along a mirror share an error: a board, a \
@@ -258,7 +292,9 @@ pub(super) fn estimates(dataset: &Dataset, calibration: &Calibration) -> String 
         .iter()
         .map(|s| {
             let sigma = |axis: usize| {
-                s.estimate.covariance_rad2.map_or(f64::NAN, |c| c[axis][axis].sqrt().to_degrees())
+                s.estimate
+                    .covariance_rad2
+                    .map_or(f64::NAN, |c| c[axis][axis].sqrt().to_degrees())
             };
             vec![
                 s.estimate.beam.to_string(),
@@ -271,21 +307,52 @@ pub(super) fn estimates(dataset: &Dataset, calibration: &Calibration) -> String 
             ]
         })
         .collect();
-    let headings = ["Beam", "Azimuth (°)", "Mirror", "θ (°)", "its σ (°)", "φ (°)", "its σ (°)"];
+    let headings = [
+        "Beam",
+        "Azimuth (°)",
+        "Mirror",
+        "θ (°)",
+        "its σ (°)",
+        "φ (°)",
+        "its σ (°)",
+    ];
     let caption = "What was estimated for every solved element. A plane mirror makes a smooth curve; a dot off the curve of \
                    its mirror is an element to look at.";
     block(&svgs, caption, &legend(dataset), &headings, &rows)
 }
 
+/// Errors around zero over azimuth.
 fn over_azimuth(dataset: &Dataset, title: &str, dots: &[Dot]) -> String {
-    let axes = Axes {
-        x: azimuth_axis(dataset),
-        y: figure::around_zero(dots.iter().flat_map(|d| [d.y, d.half_band])),
-        x_label: "Base azimuth of the element (°)".to_owned(),
-        y_label: "(°)".to_owned(),
+    let y = figure::around_zero(dots.iter().flat_map(|d| [d.y, d.half_band]));
+    parted(dataset, title, "(°)", &y, dots)
+}
+
+/// Dots over azimuth; in two plots side by side if a wide sector in the middle has none.
+fn parted(dataset: &Dataset, title: &str, unit: &str, y: &Range<f64>, dots: &[Dot]) -> String {
+    let whole = azimuth_axis(dataset);
+    let gap = dots
+        .iter()
+        .zip(dots.iter().skip(1))
+        .map(|(a, b)| a.x..b.x)
+        .filter(|gap| gap.end - gap.start > WIDE_GAP_DEG)
+        .max_by(|a, b| (a.end - a.start).total_cmp(&(b.end - b.start)));
+    let parts = match gap {
+        Some(gap) => vec![whole.start..gap.start + 2.0, gap.end - 2.0..whole.end],
+        None => vec![whole],
     };
-    let svg = figure::per_beam(WIDE, &axes, title, dots);
-    format!("<div class=\"plot\"><h4>{title}</h4>{svg}</div>\n")
+    let size = if parts.len() == 1 { WIDE } else { HALF };
+    let mut svgs = String::new();
+    for x in parts {
+        let inside: Vec<Dot> = dots.iter().filter(|d| x.contains(&d.x)).cloned().collect();
+        let axes = Axes {
+            x,
+            y: y.clone(),
+            x_label: "Base azimuth of the element (°)".to_owned(),
+            y_label: unit.to_owned(),
+        };
+        svgs += &format!("<div>{}</div>", figure::per_beam(size, &axes, title, &inside));
+    }
+    format!("<div class=\"plot\"><h4>{title}</h4><div class=\"views\">{svgs}</div></div>\n")
 }
 
 /// What the fit left over the boards.
@@ -305,13 +372,8 @@ pub(super) fn residuals(dataset: &Dataset, calibration: &Calibration) -> String 
         })
         .collect();
     let title = "Residual of the fit (mm, rms over the boards)";
-    let axes = Axes {
-        x: azimuth_axis(dataset),
-        y: 0.0..figure::around_zero(dots.iter().map(|d| d.y)).end,
-        x_label: "Base azimuth of the element (°)".to_owned(),
-        y_label: "(mm)".to_owned(),
-    };
-    let svg = figure::per_beam(WIDE, &axes, title, &dots);
+    let y = 0.0..figure::around_zero(dots.iter().map(|d| d.y)).end;
+    let plot = parted(dataset, title, "(mm)", &y, &dots);
     let count = |c: Option<usize>| c.map_or_else(|| "–".to_owned(), |c| c.to_string());
     let mut rows: Vec<Vec<String>> = of
         .iter()
@@ -330,11 +392,18 @@ pub(super) fn residuals(dataset: &Dataset, calibration: &Calibration) -> String 
     if rows.is_empty() {
         rows.push(vec!["No solved element states a residual.".to_owned()]);
     }
-    let headings = ["Beam", "Azimuth (°)", "Mirror", "Residual (mm)", "Boards", "Readings", "Steps"];
+    let headings = [
+        "Beam",
+        "Azimuth (°)",
+        "Mirror",
+        "Residual (mm)",
+        "Boards",
+        "Readings",
+        "Steps",
+    ];
     let caption = "How far the ranges of an element are from the boards once its direction is fitted. Residuals should be the \
                    size of drift and board errors; a mirror that stands out has a board that was tracked badly, an element \
                    that stands out falls on an edge.";
-    let plot = format!("<div class=\"plot\"><h4>{title}</h4>{svg}</div>\n");
     block(&plot, caption, &legend(dataset), &headings, &rows)
 }
 
@@ -361,26 +430,35 @@ fn class_color(class: BeamClass) -> (RGBColor, &'static str) {
     }
 }
 
+/// One bar for each run of neighbouring elements of the same color.
+fn runs(row: usize, elements: impl Iterator<Item = (usize, RGBColor)>) -> Vec<Bar> {
+    let half = 0.5 * beam::STEP.to_degrees();
+    let mut bars: Vec<Bar> = Vec::new();
+    for (beam, color) in elements {
+        let x = azimuth_deg(beam) - half..azimuth_deg(beam) + half;
+        match bars.last_mut() {
+            // Neighbours share an edge up to rounding.
+            Some(last) if last.color == color && (last.x.end - x.start).abs() < half => last.x.end = x.end,
+            _ => bars.push(Bar { x, row, color }),
+        }
+    }
+    bars
+}
+
 /// What became of every element, over azimuth.
 pub(super) fn statuses(dataset: &Dataset, calibration: &Calibration, truth: Option<&Truth>) -> String {
-    let half = 0.5 * beam::STEP.to_degrees();
-    let bar = |beam: usize, row: usize, color: RGBColor| Bar {
-        x: azimuth_deg(beam) - half..azimuth_deg(beam) + half,
-        row,
-        color,
-    };
-    let mut bars: Vec<Bar> = calibration
-        .beams
-        .iter()
-        .map(|b| bar(b.beam, 0, status_color(b.status)))
-        .collect();
+    let found = calibration.beams.iter().map(|b| (b.beam, status_color(b.status)));
+    let mut bars = runs(0, found);
     let mut legend: Vec<(String, String)> = Status::ALL
         .iter()
         .filter(|s| calibration.beams.iter().any(|b| b.status == **s))
         .map(|s| (figure::css(status_color(*s)), s.word().replace('_', " ")))
         .collect();
     if let Some(truth) = truth {
-        bars.extend(truth.beams.iter().map(|b| bar(b.beam, 1, class_color(b.status).0)));
+        bars.extend(runs(
+            1,
+            truth.beams.iter().map(|b| (b.beam, class_color(b.status).0)),
+        ));
         let mut seen = Vec::new();
         for b in &truth.beams {
             if !seen.contains(&b.status) {
@@ -395,7 +473,11 @@ pub(super) fn statuses(dataset: &Dataset, calibration: &Calibration, truth: Opti
         x: azimuth_axis(dataset),
         y: 0.0..rows_drawn as f64,
         x_label: "Base azimuth of the element (°)".to_owned(),
-        y_label: if truth.is_some() { "truth · found".to_owned() } else { "found".to_owned() },
+        y_label: if truth.is_some() {
+            "truth · found".to_owned()
+        } else {
+            "found".to_owned()
+        },
     };
     let title = "What became of every element";
     let svg = figure::strip(STRIP, &axes, title, &bars, rows_drawn);
@@ -439,7 +521,11 @@ pub(super) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud:
             let is_direct = calibration
                 .and_then(|c| c.beam(p.beam))
                 .is_some_and(|b| b.status == Status::Direct);
-            let color = if is_direct { RGBColor(0x8C, 0x8C, 0x8C) } else { color_of(facet) };
+            let color = if is_direct {
+                RGBColor(0x8C, 0x8C, 0x8C)
+            } else {
+                color_of(facet)
+            };
             (p.position.x, p.position.y, color)
         })
         .collect();
@@ -460,7 +546,11 @@ pub(super) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud:
     let limits = |value: fn((f64, f64)) -> f64| {
         let low = all().map(value).fold(f64::INFINITY, f64::min);
         let high = all().map(value).fold(f64::NEG_INFINITY, f64::max);
-        if low < high { low - 0.3..high + 0.3 } else { -1.0..1.0 }
+        if low < high {
+            low - 0.3..high + 0.3
+        } else {
+            -1.0..1.0
+        }
     };
     let axes = Axes {
         x: limits(|p| p.0),
@@ -481,7 +571,11 @@ pub(super) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud:
         "Points of pose {} in the {} frame, colored by mirror; grey points were seen past the mirrors. {outline}{}",
         cloud.pose,
         cloud.frame.word(),
-        if step > 1 { format!("One point in {step} is drawn.") } else { String::new() },
+        if step > 1 {
+            format!("One point in {step} is drawn.")
+        } else {
+            String::new()
+        },
     );
     let plot = format!("<div class=\"plot\"><h4>{title}</h4>{svg}</div>\n");
     block(
@@ -514,13 +608,24 @@ fn cloud_rows(
 ) -> Vec<Vec<String>> {
     let status = |b: usize| calibration.and_then(|c| c.beam(b)).map(|b| b.status);
     let row = |name: &str, keep: &dyn Fn(usize) -> bool| {
-        let points: Vec<Point3<f64>> = cloud.points.iter().filter(|p| keep(p.beam)).map(|p| p.position).collect();
+        let points: Vec<Point3<f64>> = cloud
+            .points
+            .iter()
+            .filter(|p| keep(p.beam))
+            .map(|p| p.position)
+            .collect();
         let extent = |axis: usize| {
             let low = points.iter().map(|p| p[axis]).fold(f64::NAN, f64::min);
             let high = points.iter().map(|p| p[axis]).fold(f64::NAN, f64::max);
             format!("{} … {}", number(low, 2), number(high, 2))
         };
-        vec![name.to_owned(), points.len().to_string(), extent(0), extent(1), extent(2)]
+        vec![
+            name.to_owned(),
+            points.len().to_string(),
+            extent(0),
+            extent(1),
+            extent(2),
+        ]
     };
     let mut rows = vec![row("All points", &|_| true)];
     for (i, facet) in dataset.session.facets.iter().enumerate() {

@@ -25,7 +25,10 @@ pub(super) fn experiment(dataset: &Dataset, truth: Option<&Truth>) -> String {
     );
     let direct = count(PoseKind::Direct);
     if direct > 0 {
-        text += &format!(", and {} before beams that no mirror deflects", plural(direct, "time"));
+        text += &format!(
+            ", and {} before beams that no mirror deflects",
+            plural(direct, "time")
+        );
     }
     text += &format!(
         ". Range noise is believed to be {} mm, markers to be within {} mm.",
@@ -63,14 +66,24 @@ pub(super) fn verdict(calibration: &Calibration, score: &Score) -> String {
         "<section class=\"verdict {class}\">\n<h3><span class=\"badge\">{badge}</span> – method “{}”</h3>\n",
         escape(&calibration.method)
     );
-    for sentence in [accuracy(score), dominance(score), honesty(score), abstentions(calibration, score)] {
+    for sentence in [
+        accuracy(score),
+        dominance(score),
+        honesty(score),
+        abstentions(calibration, score),
+    ] {
         if !sentence.is_empty() {
             html += &format!("<p>{}</p>\n", escape(&sentence));
         }
     }
-    if !score.warnings.is_empty() {
+    let warnings: Vec<&String> = score
+        .warnings
+        .iter()
+        .filter(|w| !score_words::is_told(w))
+        .collect();
+    if !warnings.is_empty() {
         html += "<ul>\n";
-        for warning in &score.warnings {
+        for warning in warnings {
             html += &format!("<li>{}</li>\n", escape(warning));
         }
         html += "</ul>\n";
@@ -130,11 +143,17 @@ fn dominance(score: &Score) -> String {
 fn honesty(score: &Score) -> String {
     let mut text = String::new();
     if score.efficiency.is_finite() {
-        text += &format!(
-            "With these boards no per-element method can be expected to do better than {}° per axis; measured in squares, this one reaches {} % of that.",
-            number(score.crlb_per_axis_deg, 3),
-            number(score.efficiency * 100.0, 0)
-        );
+        let bound = number(score.crlb_per_axis_deg, 3);
+        text += &if score.efficiency > 1.2 {
+            format!(
+                "That is better than the {bound}° per axis which can be expected of a method that treats every element by itself: this one ties elements together, or was lucky."
+            )
+        } else {
+            format!(
+                "With these boards, no method that treats every element by itself can be expected to do better than {bound}° per axis; counted in squares, this one reaches {} % of that.",
+                number(score.efficiency * 100.0, 0)
+            )
+        };
     }
     if score.nees_mean.is_finite() {
         let judgement = if score.nees_mean > 2.0 {
@@ -158,12 +177,13 @@ fn abstentions(calibration: &Calibration, score: &Score) -> String {
         return String::new();
     };
     let total: usize = reasons.iter().map(|(_, count)| count).sum();
-    let solvable = match score.beams.deflected {
-        Some(_) => format!(" {} of them could have been solved.", score.beams.abstained),
-        None => String::new(),
+    let solvable = match (score.beams.deflected, score.beams.abstained) {
+        (None, _) => String::new(),
+        (Some(_), 0) => ", none of which leaves by one mirror unsplit".to_owned(),
+        (Some(_), n) => format!(", of which {n} do leave by one mirror unsplit"),
     };
     format!(
-        "{} left without a direction.{solvable} The most frequent reason, {count} times, is “{}”: {reason}.",
+        "{} left without a direction{solvable}. The most frequent reason, {count} times: {} ({reason}).",
         plural_are(total),
         status.replace('_', " ")
     )

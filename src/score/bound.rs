@@ -23,7 +23,9 @@ pub(super) fn at_truth(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize, Matr
         .iter()
         .zip(&summaries)
         .filter(|(record, _)| record.label.kind == PoseKind::Facet)
-        .filter_map(|(record, summary)| Some((BoardInSensor::of(record, session, &rig_from_sensor)?, summary)))
+        .filter_map(|(record, summary)| {
+            Some((BoardInSensor::of(record, session, &rig_from_sensor)?, summary))
+        })
         .collect();
     let cone = observations::cone_half_angle(session);
     let noise_sd = session.believed.range_noise_sd_mm * 1e-3;

@@ -219,9 +219,9 @@ impl Score {
     pub fn with_limit(mut self, max_rms_deg: f64) -> Self {
         let error = self.per_axis_rms_deg;
         match self.verdict {
-            Verdict::Blind => self
-                .warnings
-                .push(format!("the limit of {max_rms_deg}° was not tested: there is no truth")),
+            Verdict::Blind => self.warnings.push(format!(
+                "the limit of {max_rms_deg}° was not tested: there is no truth"
+            )),
             Verdict::Pass | Verdict::Fail if error <= max_rms_deg => {}
             Verdict::Pass | Verdict::Fail => {
                 self.verdict = Verdict::Fail;
@@ -321,7 +321,8 @@ fn compare(dataset: &Dataset, calibration: &Calibration, truth: &Truth) -> Vec<E
     let bounds = bound::at_truth(dataset, truth);
     let mut elements = Vec::new();
     for true_beam in &truth.beams {
-        let (Some(actual), Some(estimate)) = (true_beam.deflection(), calibration.beam(true_beam.beam)) else {
+        let (Some(actual), Some(estimate)) = (true_beam.deflection(), calibration.beam(true_beam.beam))
+        else {
             continue;
         };
         let Some(found) = solved(estimate) else {
@@ -350,9 +351,7 @@ fn compare(dataset: &Dataset, calibration: &Calibration, truth: &Truth) -> Vec<E
             up: error.y,
             sigma: covariance.map(|c| [cos * c[(0, 0)].sqrt(), c[(1, 1)].sqrt()]),
             mahalanobis_squared: covariance.map(|c| mahalanobis_squared(&error, &c)),
-            bound: bounds
-                .get(&true_beam.beam)
-                .map(|b| to_tangent * b * to_tangent),
+            bound: bounds.get(&true_beam.beam).map(|b| to_tangent * b * to_tangent),
         });
     }
     elements
@@ -419,7 +418,8 @@ impl Directions {
             .collect();
         let pairs: Vec<_> = rays.iter().map(|((_, v), (_, found))| (*v, *found)).collect();
         let rotation = best_rotation(&pairs);
-        let undo = |r: &Rotation3<f64>, v: &Unit<Vector3<f64>>| Unit::new_unchecked(r.inverse() * v.into_inner());
+        let undo =
+            |r: &Rotation3<f64>, v: &Unit<Vector3<f64>>| Unit::new_unchecked(r.inverse() * v.into_inner());
         let point_at = |s: f64| {
             1e3 * rms(rays.iter().map(|((p, v), (p_found, v_found))| {
                 ((p_found + v_found.into_inner() * s) - (p + v.into_inner() * s)).norm()
@@ -427,11 +427,16 @@ impl Directions {
         };
         let [near, middle, far] = POINT_RANGES_M.map(point_at);
         Self {
-            errors: pairs.iter().map(|(v, found)| beam::angle_between(v, found)).collect(),
+            errors: pairs
+                .iter()
+                .map(|(v, found)| beam::angle_between(v, found))
+                .collect(),
             per_axis_deg: per_axis(pairs.iter().copied()).to_degrees(),
             common_mode_deg: rotation.as_ref().map_or(f64::NAN, rotation_angle).to_degrees(),
             differential_deg: rotation
-                .map_or(f64::NAN, |r| per_axis(pairs.iter().map(|(v, found)| (*v, undo(&r, found)))))
+                .map_or(f64::NAN, |r| {
+                    per_axis(pairs.iter().map(|(v, found)| (*v, undo(&r, found))))
+                })
                 .to_degrees(),
             point_mm: PointError {
                 at_1m: near,
@@ -464,7 +469,8 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 fn count(calibration: &Calibration, truth: Option<&Truth>) -> BeamCounts {
-    let has_reason = |b: &catoptric_model::BeamEstimate| b.reason.as_ref().is_some_and(|r| !r.trim().is_empty());
+    let has_reason =
+        |b: &catoptric_model::BeamEstimate| b.reason.as_ref().is_some_and(|r| !r.trim().is_empty());
     let abstains = |b: &catoptric_model::BeamEstimate| match b.status {
         Status::Solved | Status::Direct => false,
         Status::TooFewPoses | Status::Unobservable | Status::NotConverged | Status::Rejected => has_reason(b),
@@ -521,7 +527,13 @@ fn apart(
     class: BeamClass,
 ) -> ApartScore {
     let there: Vec<usize> = truth
-        .map(|t| t.beams.iter().filter(|b| b.status == class).map(|b| b.beam).collect())
+        .map(|t| {
+            t.beams
+                .iter()
+                .filter(|b| b.status == class)
+                .map(|b| b.beam)
+                .collect()
+        })
         .unwrap_or_default();
     let squares = elements
         .iter()

@@ -92,7 +92,10 @@ pub fn mount(dataset: &Dataset, calibration: &Calibration) -> Pose {
 
 /// The biases used: as calibrated, or as believed where the calibration has none.
 pub fn bias<'a>(dataset: &'a Dataset, calibration: &'a Calibration) -> &'a RangeBias {
-    calibration.bias.as_ref().unwrap_or(&dataset.session.believed.bias)
+    calibration
+        .bias
+        .as_ref()
+        .unwrap_or(&dataset.session.believed.bias)
 }
 
 /// Residuals over all stretches of a kind; `expect` says what a beam meets in one of them.

@@ -106,10 +106,7 @@ mod tests {
         // Correlated: P⁻¹ of [[2,1],[1,2]] is [[2,−1],[−1,2]]/3.
         let p = Matrix2::new(2.0, 1.0, 1.0, 2.0);
         assert!((mahalanobis_squared(&Vector2::new(1.0, -1.0), &p) - 2.0).abs() < 1e-15);
-        assert_eq!(
-            mahalanobis_squared(&Vector2::zeros(), &Matrix2::zeros()),
-            0.0
-        );
+        assert_eq!(mahalanobis_squared(&Vector2::zeros(), &Matrix2::zeros()), 0.0);
         assert_eq!(
             mahalanobis_squared(&Vector2::new(1e-9, 0.0), &Matrix2::zeros()),
             f64::INFINITY

@@ -52,7 +52,12 @@ fn a_common_rotation_shows_as_nothing_else() {
     assert!(score.differential_per_axis_rms_deg < 1e-12);
     assert!(score.per_axis_rms_deg > 0.1);
     assert!(score.direction_deg.max <= 0.5 + 1e-12);
-    assert!(score.warnings.iter().any(|w| w.starts_with("common mode dominates")));
+    assert!(
+        score
+            .warnings
+            .iter()
+            .any(|w| w.starts_with("common mode dominates"))
+    );
 }
 
 #[test]
@@ -60,10 +65,11 @@ fn a_mounting_that_is_off_shows_in_the_room_only() {
     let s = sample();
     let mut calibration = perfect(&s.truth);
     let mount = calibration.rig_from_sensor.as_mut().expect("it has one");
-    let off = mount.pose() * Pose::from_parts(
-        nalgebra::Translation3::new(0.0, 0.0, 0.003),
-        nalgebra::UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.01),
-    );
+    let off = mount.pose()
+        * Pose::from_parts(
+            nalgebra::Translation3::new(0.0, 0.0, 0.003),
+            nalgebra::UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.01),
+        );
     let data = catoptric_model::PoseData::from(&off);
     mount.translation_m = data.translation_m;
     mount.rotation_xyzw = data.rotation_xyzw;
@@ -75,7 +81,10 @@ fn a_mounting_that_is_off_shows_in_the_room_only() {
     calibration.rig_from_sensor = None;
     let without = score(&s.dataset, &calibration, Some(&s.truth));
     assert!(without.per_axis_rms_room_deg.is_nan());
-    assert_eq!(without.nulls["per_axis_rms_room_deg"], "the calibration has no rig_from_sensor");
+    assert_eq!(
+        without.nulls["per_axis_rms_room_deg"],
+        "the calibration has no rig_from_sensor"
+    );
 }
 
 #[test]
@@ -163,7 +172,11 @@ fn a_covariance_of_zero_is_infinitely_dishonest() {
     assert_eq!(score.verdict, Verdict::Fail);
     let json = serde_json::to_value(&score).expect("it is JSON");
     assert!(json["nees_mean"].is_null());
-    assert!(json["nulls"]["nees_mean"].as_str().is_some_and(|r| r.starts_with("infinite")));
+    assert!(
+        json["nulls"]["nees_mean"]
+            .as_str()
+            .is_some_and(|r| r.starts_with("infinite"))
+    );
 }
 
 #[test]
@@ -171,7 +184,8 @@ fn every_deflected_element_is_solved_abstained_or_missed() {
     let s = sample();
     let beams = deflected(&s.truth);
     let mut calibration = perfect(&s.truth);
-    let without = |b, status, reason: Option<&str>| BeamEstimate::without_angles(b, status, reason.map(str::to_owned));
+    let without =
+        |b, status, reason: Option<&str>| BeamEstimate::without_angles(b, status, reason.map(str::to_owned));
     *estimate(&mut calibration, beams[0]) = without(beams[0], Status::Unobservable, Some("one tilt axis"));
     *estimate(&mut calibration, beams[1]) = without(beams[1], Status::Unobservable, None);
     *estimate(&mut calibration, beams[2]) = without(beams[2], Status::Direct, None);
@@ -182,7 +196,10 @@ fn every_deflected_element_is_solved_abstained_or_missed() {
     let score = score(&s.dataset, &calibration, Some(&s.truth));
     let counts = score.beams;
     assert_eq!(counts.deflected, Some(beams.len()));
-    assert_eq!((counts.abstained, counts.missed, counts.wrong), (1, Some(4), Some(1)));
+    assert_eq!(
+        (counts.abstained, counts.missed, counts.wrong),
+        (1, Some(4), Some(1))
+    );
     assert_eq!(counts.solved, beams.len() - 5);
     assert_eq!(score.verdict, Verdict::Fail);
     assert_eq!(score.statuses["absent"], 1);
@@ -194,7 +211,12 @@ fn every_deflected_element_is_solved_abstained_or_missed() {
 fn split_elements_are_reported_apart() {
     let s = sample();
     let mut calibration = perfect(&s.truth);
-    let split = s.truth.beams.iter().find(|b| b.status == BeamClass::Split).expect("there are edges");
+    let split = s
+        .truth
+        .beams
+        .iter()
+        .find(|b| b.status == BeamClass::Split)
+        .expect("there are edges");
     *estimate(&mut calibration, split.beam) = BeamEstimate {
         azimuth_rad: split.azimuth_rad,
         elevation_rad: split.elevation_rad.map(|e| e + 0.1),
@@ -222,7 +244,11 @@ fn without_truth_the_score_is_blind() {
 fn the_limit_decides() {
     let s = sample();
     let calibration = noisy(&s.truth, 1e-3, 3);
-    let verdict = |limit| score(&s.dataset, &calibration, Some(&s.truth)).with_limit(limit).verdict;
+    let verdict = |limit| {
+        score(&s.dataset, &calibration, Some(&s.truth))
+            .with_limit(limit)
+            .verdict
+    };
     assert_eq!(verdict(0.07), Verdict::Pass);
     assert_eq!(verdict(0.04), Verdict::Fail);
 }
@@ -255,7 +281,12 @@ fn json_has_the_keys_of_the_interface() {
         }
     }
     assert!(json.get("elements").is_none());
-    assert_eq!(json["nulls"].as_object().map(serde_json::Map::len), Some(2), "{}", json["nulls"]);
+    assert_eq!(
+        json["nulls"].as_object().map(serde_json::Map::len),
+        Some(2),
+        "{}",
+        json["nulls"]
+    );
 }
 
 #[test]

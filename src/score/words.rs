@@ -15,6 +15,18 @@ const MANY: f64 = 0.1;
 /// Below this an error is numerical, and nothing is at fault for it, in degrees.
 const NEGLIGIBLE_DEG: f64 = 1e-6;
 
+/// How warnings begin whose matter a report tells in sentences of its own.
+const OVER: &str = "over-confident";
+const UNDER: &str = "under-confident";
+const COMMON: &str = "common mode dominates";
+
+/// Whether a warning is about accuracy or covariance, of which a report speaks anyway.
+pub(crate) fn is_told(warning: &str) -> bool {
+    [OVER, UNDER, COMMON]
+        .iter()
+        .any(|start| warning.starts_with(start))
+}
+
 /// Share of the squared error that one rotation common to all elements explains; NaN where it does not exist.
 pub(crate) fn common_share(score: &Score) -> f64 {
     1.0 - (score.differential_per_axis_rms_deg / score.per_axis_rms_deg).powi(2)
@@ -75,14 +87,14 @@ fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<St
     let (nees, coverage) = (score.nees_mean, score.coverage_95);
     if nees > OVER_CONFIDENT.0 || coverage < OVER_CONFIDENT.1 {
         warnings.push(format!(
-            "over-confident: {:.0} % of the errors are inside their 95 % ellipses and the mean normalised squared error is {}",
+            "{OVER}: {:.0} % of the errors are inside their 95 % ellipses and the mean normalised squared error is {}",
             coverage * 100.0,
             number(nees)
         ));
     }
     if nees < UNDER_CONFIDENT_NEES && score.per_axis_rms_deg > NEGLIGIBLE_DEG {
         warnings.push(format!(
-            "under-confident: the mean normalised squared error is {} where 1 is honest",
+            "{UNDER}: the mean normalised squared error is {} where 1 is honest",
             number(nees)
         ));
     }
@@ -97,7 +109,7 @@ fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<St
     let share = common_share(score);
     if share > DOMINANT_SHARE && score.per_axis_rms_deg > NEGLIGIBLE_DEG {
         warnings.push(format!(
-            "common mode dominates: one rotation of {:.4}° shared by all elements makes {:.0} % of the squared error, so the mounting of the sensor is at fault rather than the mirrors",
+            "{COMMON}: one rotation of {:.4}° shared by all elements makes {:.0} % of the squared error, so the mounting of the sensor is at fault rather than the mirrors",
             score.common_mode_deg,
             share * 100.0
         ));
@@ -109,7 +121,10 @@ fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<St
             elements(without_distance, "comes", "come")
         ));
     }
-    let candidates = score.beams.deflected.unwrap_or(score.beams.solved + score.beams.abstained);
+    let candidates = score
+        .beams
+        .deflected
+        .unwrap_or(score.beams.solved + score.beams.abstained);
     if score.beams.abstained as f64 > MANY * candidates as f64 {
         let reasons: Vec<String> = abstentions(calibration)
             .into_iter()
@@ -133,16 +148,20 @@ fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<St
 
 /// Reasons of the elements that are neither solved nor direct, the most frequent first.
 ///
-/// Numbers in a reason are left out of it, so that "2 boards" and "1 board" count as one.
+/// Reasons that differ in their numbers only count as one, and the first of them stands for all.
 pub(crate) fn abstentions(calibration: &Calibration) -> Vec<((&'static str, String), usize)> {
-    let mut counts: BTreeMap<(&'static str, String), usize> = BTreeMap::new();
+    let mut groups: BTreeMap<(&'static str, String), (String, usize)> = BTreeMap::new();
     for b in &calibration.beams {
         if !matches!(b.status, Status::Solved | Status::Direct) {
-            let reason = b.reason.as_deref().map_or_else(|| "no reason given".to_owned(), without_numbers);
-            *counts.entry((b.status.word(), reason)).or_default() += 1;
+            let reason = b.reason.as_deref().unwrap_or("no reason given");
+            let group = groups.entry((b.status.word(), without_numbers(reason)));
+            group.or_insert_with(|| (reason.to_owned(), 0)).1 += 1;
         }
     }
-    let mut sorted: Vec<_> = counts.into_iter().collect();
+    let mut sorted: Vec<_> = groups
+        .into_iter()
+        .map(|((status, _), (example, count))| ((status, example), count))
+        .collect();
     sorted.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
     sorted
 }
@@ -189,29 +208,57 @@ fn nulls(score: &Score, calibration: &Calibration, has_truth: bool) -> BTreeMap<
         ("direction_deg", score.direction_deg.rms, because(none_scored)),
         ("per_axis_rms_deg", score.per_axis_rms_deg, because(none_scored)),
         ("common_mode_deg", score.common_mode_deg, because(too_few)),
-        ("differential_per_axis_rms_deg", score.differential_per_axis_rms_deg, because(too_few)),
+        (
+            "differential_per_axis_rms_deg",
+            score.differential_per_axis_rms_deg,
+            because(too_few),
+        ),
         ("direction_room_deg", score.direction_room_deg.rms, because(room)),
-        ("per_axis_rms_room_deg", score.per_axis_rms_room_deg, because(room)),
+        (
+            "per_axis_rms_room_deg",
+            score.per_axis_rms_room_deg,
+            because(room),
+        ),
         (
             "common_mode_room_deg",
             score.common_mode_room_deg,
-            because(if score.per_axis_rms_room_deg.is_nan() { room } else { too_few }),
+            because(if score.per_axis_rms_room_deg.is_nan() {
+                room
+            } else {
+                too_few
+            }),
         ),
-        ("distance_mm", score.distance_mm.rms, because("no scored element has a distance_m")),
+        (
+            "distance_mm",
+            score.distance_mm.rms,
+            because("no scored element has a distance_m"),
+        ),
         ("point_mm", score.point_mm.at_1m, because(none_scored)),
         ("point_room_mm", score.point_room_mm.at_1m, because(room)),
         ("nees_mean", score.nees_mean, because(covariance)),
         ("coverage_95", score.coverage_95, because(covariance)),
         ("crlb_per_axis_deg", score.crlb_per_axis_deg, because(no_bound)),
         ("efficiency", score.efficiency, because(efficiency)),
-        ("split.per_axis_rms_deg", score.split.per_axis_rms_deg, "no split element is scored"),
+        (
+            "split.per_axis_rms_deg",
+            score.split.per_axis_rms_deg,
+            "no split element is scored",
+        ),
         (
             "multi_bounce.per_axis_rms_deg",
             score.multi_bounce.per_axis_rms_deg,
             "one deflection does not describe them",
         ),
-        ("boards_mm", score.boards_mm.rms, "no solved element reads a board"),
-        ("walls_mm", score.walls_mm.rms, "no solved element reads a wall of the empty room"),
+        (
+            "boards_mm",
+            score.boards_mm.rms,
+            "no solved element reads a board",
+        ),
+        (
+            "walls_mm",
+            score.walls_mm.rms,
+            "no solved element reads a wall of the empty room",
+        ),
     ];
     figures
         .into_iter()
@@ -229,5 +276,9 @@ fn elements(count: usize, one: &str, many: &str) -> String {
 }
 
 fn number(value: f64) -> String {
-    if value.is_finite() { format!("{value:.2}") } else { "infinite".to_owned() }
+    if value.is_finite() {
+        format!("{value:.2}")
+    } else {
+        "infinite".to_owned()
+    }
 }
