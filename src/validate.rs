@@ -168,7 +168,7 @@ fn check_status(at: &mut OfBeam, b: &BeamEstimate) {
     }
     if let Some(direction) = b.null_direction {
         let length = SVector::from(direction).norm();
-        if !((length - 1.0).abs() <= UNIT_TOLERANCE) {
+        if !is_unit(length) {
             at.error(
                 "null_direction",
                 format!("has length {length}, a direction has 1"),
@@ -252,13 +252,13 @@ fn check_covariances(at: &mut OfBeam, b: &BeamEstimate) {
 
 fn check_facet(problems: &mut Problems, key: &str, facet: &FacetEstimate) {
     let length = SVector::from(facet.normal).norm();
-    if !((length - 1.0).abs() <= UNIT_TOLERANCE) {
+    if !is_unit(length) {
         problems.error(
             &format!("{key}.normal"),
             format!("of {:?} has length {length}, a unit normal has 1", facet.facet),
         );
     }
-    if !(facet.offset_m.abs() <= MIRROR_DISTANCE_M) {
+    if !is_near(facet.offset_m) {
         problems.error(
             &format!("{key}.offset_m"),
             format!(
@@ -276,14 +276,14 @@ fn check_facet(problems: &mut Problems, key: &str, facet: &FacetEstimate) {
 }
 
 fn check_mount(problems: &mut Problems, mount: &MountEstimate) {
-    if !mount.translation_m.iter().all(|x| x.abs() <= MIRROR_DISTANCE_M) {
+    if !mount.translation_m.iter().all(|&x| is_near(x)) {
         problems.error(
             "rig_from_sensor.translation_m",
             format!("is {:?}, not within {MIRROR_DISTANCE_M} m", mount.translation_m),
         );
     }
     let length = SVector::from(mount.rotation_xyzw).norm();
-    if !((length - 1.0).abs() <= UNIT_TOLERANCE) {
+    if !is_unit(length) {
         problems.error(
             "rig_from_sensor.rotation_xyzw",
             format!("has length {length}, a unit quaternion has 1"),
@@ -323,6 +323,16 @@ fn check_bias(problems: &mut Problems, bias: &RangeBias) {
     if !numbers.into_iter().all(f64::is_finite) {
         problems.error("bias", "holds something that is not a number".to_owned());
     }
+}
+
+/// Whether a length is 1 up to rounding; not for NaN.
+fn is_unit(length: f64) -> bool {
+    (length - 1.0).abs() <= UNIT_TOLERANCE
+}
+
+/// Whether a coordinate is one of a structure around the scanner; not for NaN.
+fn is_near(metres: f64) -> bool {
+    metres.abs() <= MIRROR_DISTANCE_M
 }
 
 /// Whether a matrix can be a covariance: finite, symmetric, positive semi-definite.

@@ -1,5 +1,6 @@
 //! The plots, as inline SVG without a color scheme of their own: black follows the page's ink, [`GRID`] its grid.
 
+use crate::score::percentile;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 use std::ops::Range;
@@ -230,11 +231,20 @@ fn draw(size: (u32, u32), title: &str, content: impl FnOnce(&Area) -> Outcome) -
     )
 }
 
-/// Axis limits that hold all values, 0 included, with a little room; −1…1 for nothing.
+/// Limits around zero that hold the values, save for a few that are far beyond the others; −1…1 for nothing.
 pub(super) fn around_zero(values: impl Iterator<Item = f64>) -> Range<f64> {
-    let largest = values.filter(|v| v.is_finite()).map(f64::abs).fold(0.0, f64::max);
-    let limit = if largest > 0.0 { 1.1 * largest } else { 1.0 };
-    -limit..limit
+    // What is beyond four times the 95th percentile would press all others onto the axis.
+    const FAR: f64 = 4.0;
+    let sizes: Vec<f64> = values.filter(|v| v.is_finite()).map(f64::abs).collect();
+    let largest = percentile(&sizes, 1.0);
+    let usual = percentile(&sizes, 0.95);
+    let limit = 1.1
+        * if usual > 0.0 {
+            largest.min(FAR * usual)
+        } else {
+            largest
+        };
+    if limit > 0.0 { -limit..limit } else { -1.0..1.0 }
 }
 
 #[cfg(test)]
@@ -294,5 +304,7 @@ mod tests {
     fn limits_hold_the_values() {
         assert_eq!(around_zero([1.0, -2.0, f64::NAN].into_iter()), -2.2..2.2);
         assert_eq!(around_zero(std::iter::empty()), -1.0..1.0);
+        let outlier = (0..100).map(|i| if i == 50 { 100.0 } else { 1.0 });
+        assert_eq!(around_zero(outlier), -4.4..4.4);
     }
 }

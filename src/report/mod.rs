@@ -149,12 +149,16 @@ fn scores(results: &[(Calibration, Score)]) -> String {
     row("Points off the walls of the empty room: mean / rms (mm)", &|s| {
         format!("{} / {}", number(s.walls_mm.mean, 2), number(s.walls_mm.rms, 2))
     });
-    row("Split elements: solved of all", &|s| {
-        format!("{} of {}", s.split.solved, s.split.elements)
+    row("Split elements: solved of all", &|s| match s.split.elements {
+        0 => "–".to_owned(),
+        all => format!("{} of {all}", s.split.solved),
     });
     row("– their per-axis error (°)", &|s| {
         number(s.split.per_axis_rms_deg, 4)
     });
+    // A row without a single figure, as all accuracies are without a truth, says nothing.
+    let is_empty = |cell: &String| cell.chars().all(|c| matches!(c, '–' | '/' | ' '));
+    rows.retain(|row| !row.iter().skip(1).all(is_empty));
     page::table(&headings, &rows)
 }
 

@@ -5,7 +5,7 @@ use super::figure::{self, Axes, Bar, Dot, GRID, Stroke, Word};
 use super::page::{figure as block, number};
 use crate::apply::{CloudFrame, PointCloud};
 use crate::score::Score;
-use catoptric_model::{BeamEstimate, Calibration, Dataset, Deflection, Status, beam};
+use catoptric_model::{BeamEstimate, Calibration, Dataset, Deflection, Pose, Status, beam};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
 use nalgebra::Point3;
@@ -537,10 +537,18 @@ pub(super) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud:
         corners = vec![(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)];
         strokes.push(Stroke {
             points: corners.clone(),
-            color: BLACK,
-            width: 1,
-            opacity: 0.7,
+            color: GRID,
+            width: 3,
+            opacity: 1.0,
         });
+        strokes.extend(
+            dataset
+                .poses
+                .first()
+                .map(|p| cross(&p.room_from_rig))
+                .into_iter()
+                .flatten(),
+        );
     }
     let all = || points.iter().map(|p| (p.0, p.1)).chain(corners.iter().copied());
     let limits = |value: fn((f64, f64)) -> f64| {
@@ -563,7 +571,7 @@ pub(super) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud:
     let rows = cloud_rows(dataset, calibration, cloud, &facets);
     let outline = if cloud.frame == CloudFrame::Room {
         "The outline is the surveyed room: points belong on its walls, or inside on floor and ceiling; a wall of points that \
-         leaves the outline is a mirror whose directions are off. "
+         leaves the outline is a mirror whose directions are off. The cross is the scanner. "
     } else {
         ""
     };
@@ -585,6 +593,18 @@ pub(super) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud:
         &["Part", "Points", "x (m)", "y (m)", "z (m)"],
         &rows,
     )
+}
+
+/// A cross where the rig stood.
+fn cross(room_from_rig: &Pose) -> [Stroke; 2] {
+    const ARM_M: f64 = 0.12;
+    let (x, y) = (room_from_rig.translation.x, room_from_rig.translation.y);
+    [(ARM_M, 0.0), (0.0, ARM_M)].map(|(dx, dy)| Stroke {
+        points: vec![(x - dx, y - dy), (x + dx, y + dy)],
+        color: BLACK,
+        width: 2,
+        opacity: 1.0,
+    })
 }
 
 /// A size at which one metre is as long upward as across.
@@ -634,7 +654,12 @@ fn cloud_rows(
         }));
     }
     rows.push(row("Past the mirrors", &|b| status(b) == Some(Status::Direct)));
-    let count = |name: &str, count: usize| vec![name.to_owned(), count.to_string()];
+    let count = |name: &str, count: usize| {
+        let mut row = vec![String::new(); 5];
+        row[0] = name.to_owned();
+        row[1] = count.to_string();
+        row
+    };
     rows.push(count("Left out: no direction", cloud.without_direction));
     rows.push(count("Left out: no range", cloud.without_range));
     rows

@@ -131,11 +131,11 @@ fn dominance(score: &Score) -> String {
     let left = number(score.differential_per_axis_rms_deg, 3);
     if share > 0.5 {
         format!(
-            "What all elements have in common dominates: a rotation of {rotation}° makes {percent} % of the squared error. That is an error of the sensor's mounting; without it {left}° per axis would be left, which is due to mirrors, boards and ranges."
+            "What all elements have in common dominates: a rotation of {rotation}° makes {percent} % of the squared error. That is what an error of the sensor's mounting does; without it {left}° per axis would be left, which is due to boards and ranges."
         )
     } else {
         format!(
-            "What differs from element to element dominates: {left}° per axis is left once the rotation they share ({rotation}°, {percent} % of the squared error) is taken out. The mounting is not at fault; boards and ranges are."
+            "What differs from element to element dominates: {left}° per axis is left once the rotation they share ({rotation}°, {percent} % of the squared error) is taken out. The mounting of the sensor is not the main fault; boards and ranges are."
         )
     }
 }

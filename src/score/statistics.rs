@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix2, Matrix3, Rotation3, Unit, Vector2, Vector3};
 
+type Direction = Unit<Vector3<f64>>;
+
 /// Root mean square; NaN of nothing.
 pub(super) fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     mean(values.into_iter().map(|v| v * v)).sqrt()
@@ -54,7 +56,7 @@ pub(super) fn mahalanobis_squared(error: &Vector2<f64>, covariance: &Matrix2<f64
 ///
 /// `None` unless the directions span at least a plane: one direction leaves a turn about itself free.
 #[doc(alias = "Kabsch")]
-pub(super) fn best_rotation(pairs: &[(Unit<Vector3<f64>>, Unit<Vector3<f64>>)]) -> Option<Rotation3<f64>> {
+pub(super) fn best_rotation(pairs: &[(Direction, Direction)]) -> Option<Rotation3<f64>> {
     // Directions closer together than a microradian span no plane worth the name.
     const LEAST_SPAN: f64 = 1e-12;
     let spread: Matrix3<f64> = pairs

@@ -15,16 +15,17 @@ const MANY: f64 = 0.1;
 /// Below this an error is numerical, and nothing is at fault for it, in degrees.
 const NEGLIGIBLE_DEG: f64 = 1e-6;
 
-/// How warnings begin whose matter a report tells in sentences of its own.
+/// What warnings say whose matter a report tells in sentences of its own.
 const OVER: &str = "over-confident";
 const UNDER: &str = "under-confident";
 const COMMON: &str = "common mode dominates";
+const UNSOLVED: &str = "elements were not solved";
 
-/// Whether a warning is about accuracy or covariance, of which a report speaks anyway.
+/// Whether a warning is about accuracy, covariance or abstentions, of which a report speaks anyway.
 pub(crate) fn is_told(warning: &str) -> bool {
-    [OVER, UNDER, COMMON]
+    [OVER, UNDER, COMMON, UNSOLVED]
         .iter()
-        .any(|start| warning.starts_with(start))
+        .any(|words| warning.contains(words))
 }
 
 /// Share of the squared error that one rotation common to all elements explains; NaN where it does not exist.
@@ -109,7 +110,7 @@ fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<St
     let share = common_share(score);
     if share > DOMINANT_SHARE && score.per_axis_rms_deg > NEGLIGIBLE_DEG {
         warnings.push(format!(
-            "{COMMON}: one rotation of {:.4}° shared by all elements makes {:.0} % of the squared error, so the mounting of the sensor is at fault rather than the mirrors",
+            "{COMMON}: one rotation of {:.4}° shared by all elements makes {:.0} % of the squared error, as an error of the sensor's mounting does",
             score.common_mode_deg,
             share * 100.0
         ));
@@ -132,7 +133,7 @@ fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<St
             .take(3)
             .collect();
         warnings.push(format!(
-            "{} of {candidates} elements were not solved; over all elements the usual reasons are: {}",
+            "{} of {candidates} {UNSOLVED}; over all elements the usual reasons are: {}",
             score.beams.abstained,
             reasons.join(", ")
         ));
