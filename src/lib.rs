@@ -7,7 +7,9 @@ pub mod score;
 pub mod validate;
 
 pub use apply::{CloudFrame, PointCloud, apply};
+pub use catoptric_calib as calib;
 pub use catoptric_model as model;
+pub use catoptric_sim as sim;
 pub use report::report;
 pub use score::{Score, Verdict, score};
 pub use validate::{Problem, validate};

@@ -1,1 +1,6 @@
-//! t
+//! One binary for all integration tests; each module says what it proves and what it does not.
+#![allow(clippy::unwrap_used, clippy::print_stderr, missing_docs)]
+
+mod determinism;
+mod physics;
+mod scenes;

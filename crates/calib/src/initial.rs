@@ -12,7 +12,7 @@ const LEAST_CONDITION: f64 = 1e-2;
 pub struct ClosedForm {
     /// The exit direction v.
     pub direction: Unit<Vector3<f64>>,
-    /// |v| − 1 before it was normalised: nothing in the linear system makes it zero except the truth.
+    /// |v| − 1 before it was normalized: nothing in the linear system makes it zero except the truth.
     pub excess: f64,
 }
 

@@ -1,6 +1,7 @@
 //! Which elements a mirror deflects (step 4): what each beam read in the known room and elsewhere, against what a beam
 //! that no mirror touches would have read.
 
+use crate::ahead::{AGREEMENT_FLOOR, ahead};
 use crate::common::CommonErrors;
 use crate::covariance::MountUncertainty;
 use crate::jacobian;
@@ -8,8 +9,8 @@ use crate::observations::{BoardInSensor, azimuth, cone_half_angle};
 use crate::pose::Mount;
 use crate::spread;
 use catoptric_model::session::NominalFacet;
-use catoptric_model::{BoardPlane, Dataset, Pose, PoseKind, PoseRecord, RawRange, Session, Summary, beam};
-use nalgebra::{Point3, Unit, Vector3};
+use catoptric_model::{Dataset, Pose, PoseKind, PoseRecord, Summary, beam};
+use nalgebra::Point3;
 
 /// A facet as built may serve this many beams more than it was drawn for: 1° of tilt and half a millimetre move its
 /// edges by a couple of beams.
@@ -20,9 +21,6 @@ const DIRECT_SHARE: f64 = 0.9;
 
 /// Standard deviations within which a range agrees with its prediction.
 const AGREEMENT_SIGMAS: f64 = 6.0;
-
-/// Disagreement that is always allowed, in metres: survey of the room, beam size, whole millimetres.
-const AGREEMENT_FLOOR: f64 = 0.02;
 
 /// A reading this near is of the structure around the sensor, in metres, wherever the mirrors are.
 const STRUCTURE_RANGE: f64 = 0.12;
@@ -47,14 +45,6 @@ enum Expected {
     Range(f64, f64),
     /// An edge lies in the beam: nothing can be said.
     Unclear,
-}
-
-/// A surface ahead of a ray, as far as it is known.
-pub(crate) struct Ahead {
-    pub(crate) distance: f64,
-    pub(crate) plane: BoardPlane,
-    /// Whether the whole beam falls on that surface.
-    pub(crate) whole: bool,
 }
 
 /// The stretches of a dataset prepared for screening.
@@ -229,7 +219,7 @@ impl<'a> Screen<'a> {
         let Some((ahead, color)) = ahead else {
             return Expected::Unclear;
         };
-        if !ahead.whole || ahead.distance > session.scanner.range_max_m {
+        if ahead.spread.is_infinite() || ahead.distance > session.scanner.range_max_m {
             return Expected::Unclear;
         }
         let beliefs = &session.believed;
@@ -252,7 +242,7 @@ impl<'a> Screen<'a> {
         let smear = 0.1 * ahead.distance * tan * cone_half_angle(session);
         Expected::Range(
             ahead.distance + bias,
-            AGREEMENT_FLOOR + smear + AGREEMENT_SIGMAS * variance.sqrt(),
+            AGREEMENT_FLOOR + smear + ahead.spread + AGREEMENT_SIGMAS * variance.sqrt(),
         )
     }
 }
@@ -292,54 +282,6 @@ pub fn facets_near(facets: &[NominalFacet], beam: usize) -> Vec<usize> {
         .collect();
     near.sort_unstable();
     near.into_iter().map(|(_, i)| i).collect()
-}
-
-/// What a ray in the sensor frame meets, board or room, and the surface's color.
-pub(crate) fn ahead<'s>(
-    session: &'s Session,
-    room_from_sensor: &Pose,
-    board: Option<&'s BoardInSensor>,
-    origin: &Point3<f64>,
-    direction: &Unit<Vector3<f64>>,
-) -> Option<(Ahead, &'s str)> {
-    let wall = |v: &Unit<Vector3<f64>>| {
-        session
-            .room
-            .cast(&(room_from_sensor * origin), &(room_from_sensor.rotation * v))
-    };
-    let (distance, plane) = wall(direction)?;
-    let cone = cone_half_angle(session);
-    let path = origin.coords.norm();
-    if let Some((board, hit)) = board.and_then(|b| Some((b, b.hit(origin, direction)?))) {
-        let radius = cone * (path + hit.distance);
-        // An edge of the board as well as its corners: allowed for by twice the spot outside.
-        let near = board.holds(&hit, -2.0 * radius, -AGREEMENT_FLOOR);
-        if near && hit.distance < distance {
-            let whole = board.holds(&hit, radius, AGREEMENT_FLOOR);
-            let ahead = Ahead {
-                distance: hit.distance,
-                plane: board.plane,
-                whole,
-            };
-            return Some((ahead, &board.color));
-        }
-    }
-    let (across, up) = catoptric_model::frame::tangent_basis(direction);
-    let whole = [across, -across, up, -up].iter().all(|side| {
-        let near = Unit::new_normalize(direction.into_inner() + side.into_inner() * cone);
-        wall(&near).is_some_and(|(_, other)| other.normal == plane.normal)
-    });
-    let sensor_from_room = room_from_sensor.inverse();
-    let plane = BoardPlane::new(
-        sensor_from_room * plane.point,
-        Unit::new_unchecked(sensor_from_room.rotation * plane.normal.into_inner()),
-    );
-    let ahead = Ahead {
-        distance,
-        plane,
-        whole,
-    };
-    Some((ahead, &session.room.color))
 }
 
 #[cfg(test)]
