@@ -252,13 +252,4 @@ mod tests {
         let s = sample();
         check_nesting(&report(&s.dataset, None, &[], None));
     }
-
-    /// Writes the sample's report where `CATOPTRIC_REPORT` says, to be looked at.
-    #[test]
-    #[ignore = "writes a file; run by hand with CATOPTRIC_REPORT set"]
-    fn write_the_sample_report() {
-        let path = std::env::var("CATOPTRIC_REPORT").expect("CATOPTRIC_REPORT names the file");
-        std::fs::write(format!("{path}.html"), html(true)).expect("it can be written");
-        std::fs::write(format!("{path}-blind.html"), html(false)).expect("it can be written");
-    }
 }

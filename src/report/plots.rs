@@ -511,11 +511,12 @@ pub(super) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud:
     let facets: Vec<Option<usize>> = (0..dataset.session.scanner.beams)
         .map(|b| facet_of(dataset, calibration?.beam(b)?))
         .collect();
+    // Whole scans are left out: every n-th point would favour some beams.
     let step = cloud.points.len().div_ceil(MOST_POINTS).max(1);
     let points: Vec<(f64, f64, RGBColor)> = cloud
         .points
         .iter()
-        .step_by(step)
+        .filter(|p| p.scan % step == 0)
         .map(|p| {
             let facet = facets.get(p.beam).copied().flatten();
             let is_direct = calibration
@@ -580,7 +581,7 @@ pub(super) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud:
         cloud.pose,
         cloud.frame.word(),
         if step > 1 {
-            format!("One point in {step} is drawn.")
+            format!("One scan in {step} is drawn.")
         } else {
             String::new()
         },

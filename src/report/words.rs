@@ -5,6 +5,7 @@ use crate::score::{Score, Verdict, words as score_words};
 use catoptric_model::{Calibration, Dataset, PoseKind};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
+use std::collections::BTreeMap;
 
 /// What was recorded, and what was really there.
 pub(super) fn experiment(dataset: &Dataset, truth: Option<&Truth>) -> String {
@@ -129,15 +130,45 @@ fn dominance(score: &Score) -> String {
     let percent = number(share * 100.0, 0);
     let rotation = number(score.common_mode_deg, 3);
     let left = number(score.differential_per_axis_rms_deg, 3);
-    if share > 0.5 {
-        format!(
+    if share > score_words::DOMINANT_SHARE {
+        return format!(
             "What all elements have in common dominates: a rotation of {rotation}° makes {percent} % of the squared error. That is what an error of the sensor's mounting does; without it {left}° per axis would be left, which is due to boards and ranges."
+        );
+    }
+    let within = within_mirrors(score);
+    let scatter = number(within.to_degrees(), 3);
+    let (found, advice) = if within.to_degrees().powi(2) < 0.5 * score.per_axis_rms_deg.powi(2) {
+        (
+            "What the elements of one mirror have in common dominates",
+            "Drift, markers and biases of the boards do that: more boards would help, more scans would not.",
         )
     } else {
-        format!(
-            "What differs from element to element dominates: {left}° per axis is left once the rotation they share ({rotation}°, {percent} % of the squared error) is taken out. The mounting of the sensor is not the main fault; boards and ranges are."
+        (
+            "What differs from element to element dominates",
+            "Range noise and uneven mirrors do that: more scans may help.",
         )
+    };
+    format!(
+        "{found}: within a mirror the elements scatter by {scatter}° per axis about what they share. {advice} The rotation that all elements share, {rotation}°, makes only {percent} % of the squared error: the mounting of the sensor is not the main fault."
+    )
+}
+
+/// Per-axis scatter of the elements about the mean error of their mirror, in radians.
+fn within_mirrors(score: &Score) -> f64 {
+    let mut of_facet: BTreeMap<&str, Vec<[f64; 2]>> = BTreeMap::new();
+    for e in score.scored() {
+        of_facet.entry(&e.facet).or_default().push([e.across, e.up]);
     }
+    let (mut squares, mut count) = (0.0, 0.0);
+    for errors in of_facet.values() {
+        let n = errors.len() as f64;
+        for axis in 0..2 {
+            let mean = errors.iter().map(|e| e[axis]).sum::<f64>() / n;
+            squares += errors.iter().map(|e| (e[axis] - mean).powi(2)).sum::<f64>();
+            count += n;
+        }
+    }
+    (squares / count).sqrt()
 }
 
 fn honesty(score: &Score) -> String {
@@ -146,7 +177,7 @@ fn honesty(score: &Score) -> String {
         let bound = number(score.crlb_per_axis_deg, 3);
         text += &if score.efficiency > 1.2 {
             format!(
-                "That is better than the {bound}° per axis which can be expected of a method that treats every element by itself: this one ties elements together, or was lucky."
+                "A method that treats every element by itself is expected to reach {bound}° per axis with these boards. This is better: the method ties elements together, or the errors that all elements share happened to be small."
             )
         } else {
             format!(
@@ -156,9 +187,9 @@ fn honesty(score: &Score) -> String {
         };
     }
     if score.nees_mean.is_finite() {
-        let judgement = if score.nees_mean > 2.0 {
+        let judgement = if score.nees_mean > score_words::OVER_CONFIDENT.0 {
             "smaller than the errors"
-        } else if score.nees_mean < 0.3 {
+        } else if score.nees_mean < score_words::UNDER_CONFIDENT_NEES {
             "larger than the errors"
         } else {
             "about right"
@@ -202,5 +233,34 @@ fn plural_are(count: usize) -> String {
         "1 element is".to_owned()
     } else {
         format!("{count} elements are")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sample::{Noise, noisy, perfect, sample, turned};
+    use crate::score::score;
+
+    #[test]
+    fn each_kind_of_error_is_named() {
+        let s = sample();
+        let said = |calibration: &Calibration| dominance(&score(&s.dataset, calibration, Some(&s.truth)));
+        assert!(
+            said(&turned(noisy(&s.truth, 1e-4, 1), 5e-3)).starts_with("What all elements have in common")
+        );
+        assert!(said(&noisy(&s.truth, 1e-3, 1)).starts_with("What differs from element to element"));
+        let mut by_mirror = noisy(&s.truth, 1e-4, 1);
+        let mut noise = Noise::new(9);
+        for facet in &s.dataset.session.facets {
+            let lift = 2e-3 * noise.next();
+            let of = by_mirror
+                .beams
+                .iter_mut()
+                .filter(|b| b.facet.as_ref() == Some(&facet.name));
+            of.for_each(|b| b.elevation_rad = b.elevation_rad.map(|e| e + lift));
+        }
+        assert!(said(&by_mirror).starts_with("What the elements of one mirror have in common"));
+        assert!(accuracy(&score(&s.dataset, &perfect(&s.truth), Some(&s.truth))).contains("within 0.000°"));
     }
 }

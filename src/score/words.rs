@@ -5,11 +5,12 @@ use catoptric_model::{Calibration, Status};
 use std::collections::BTreeMap;
 
 /// Mean NEES, and coverage below which, a covariance is called too small without failing the score.
-const OVER_CONFIDENT: (f64, f64) = (2.0, 0.85);
-/// Mean NEES below which a covariance is called too large.
-const UNDER_CONFIDENT_NEES: f64 = 0.3;
+pub(crate) const OVER_CONFIDENT: (f64, f64) = (2.0, 0.85);
+/// Mean NEES below which a covariance is called too large: if all elements share one error, an honest one is there in
+/// one run of ten.
+pub(crate) const UNDER_CONFIDENT_NEES: f64 = 0.1;
 /// Share of the squared error beyond which one rotation is said to dominate it.
-const DOMINANT_SHARE: f64 = 0.5;
+pub(crate) const DOMINANT_SHARE: f64 = 0.5;
 /// Share of the elements beyond which abstentions are worth a word.
 const MANY: f64 = 0.1;
 /// Below this an error is numerical, and nothing is at fault for it, in degrees.
