@@ -188,14 +188,14 @@ fn honesty(score: &Score) -> String {
     }
     if score.nees_mean.is_finite() {
         let judgement = if score.nees_mean > score_words::OVER_CONFIDENT.0 {
-            "smaller than the errors"
+            "smaller than the errors made"
         } else if score.nees_mean < score_words::UNDER_CONFIDENT_NEES {
-            "larger than the errors"
+            "larger than the errors made"
         } else {
-            "about right"
+            "consistent with the errors made"
         };
         text += &format!(
-            " The stated uncertainty is {judgement}: {} % of the errors lie inside their 95 % ellipses.",
+            " The stated uncertainty is {judgement}: {} % of them lie inside their 95 % ellipses.",
             number(score.coverage_95 * 100.0, 0)
         );
     }
