@@ -12,7 +12,7 @@
 //! let laboratory = sim::Laboratory::new(&scene, scene.seed)?;
 //! let (dataset, truth) = (laboratory.dataset()?, laboratory.truth()?);
 //! let calibration = calib::calibrate(&dataset, calib::Method::Beam, &calib::Options::default())?;
-//! let score = score::score(&dataset, &calibration, Some(&truth));
+//! let score = score(&dataset, &calibration, Some(&truth));
 //! assert!(score.beams.solved > 400);
 //! # Ok(())
 //! # }
@@ -21,8 +21,19 @@
 //! The words are the same everywhere: [`model`] is the vocabulary, [`sim`] the world, [`calib`] the estimator; [`io`]
 //! holds every file format. The guide's chapters are in the repository under `docs/`.
 
+pub mod apply;
 pub mod io;
+pub mod report;
+pub mod score;
+pub mod validate;
 
+pub use apply::{CloudFrame, PointCloud, apply};
 pub use catoptric_calib as calib;
 pub use catoptric_model as model;
 pub use catoptric_sim as sim;
+pub use report::report;
+pub use score::{Score, Verdict, score};
+pub use validate::{Problem, validate};
+
+#[cfg(test)]
+mod sample;

@@ -17,6 +17,7 @@ pub mod playback;
 pub mod recording;
 mod schedule;
 
+pub mod cloud;
 pub mod dataset;
 pub mod manifest;
 

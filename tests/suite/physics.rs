@@ -159,9 +159,11 @@ fn traced(
 fn unfolded_mirrors_agree_with_the_tracer() {
     let mut draws = Draws::new(11, Purpose::Placement, 0);
     let (mut compared, mut by_bounces, mut near_edges) = (0, [0; 6], 0);
-    while compared < 10_000 {
-        let count = 1 + (draws.uniform() * 6.0) as usize;
-        let facets: Vec<_> = (0..count)
+    for shots in 0.. {
+        if compared >= 10_000 {
+            break;
+        }
+        let facets: Vec<_> = (0..1 + shots % 6)
             .map(|_| {
                 let center =
                     Point3::from(random_direction(&mut draws).into_inner() * (0.06 + 0.04 * draws.uniform()));
