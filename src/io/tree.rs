@@ -49,10 +49,17 @@ pub(super) enum Value {
 /// Reads TOML; what can still be read after a syntax error is read.
 pub(super) fn from_toml(text: &str) -> (Node, Vec<Diagnostic>) {
     let (root, errors) = DeTable::parse_recoverable(text);
-    let diagnostics = errors.iter().map(|e| Diagnostic {
-        place: Place::Span(e.span().unwrap_or(text.len()..text.len())),
-        message: e.message().to_owned(),
-        help: None,
+    let diagnostics = errors.iter().map(|e| {
+        let span = e.span().unwrap_or(text.len()..text.len());
+        let message = match text.get(span.clone()) {
+            Some(key) if e.message() == "duplicate key" => format!("duplicate key `{key}`"),
+            _ => e.message().to_owned(),
+        };
+        Diagnostic {
+            place: Place::Span(span),
+            message,
+            help: None,
+        }
     });
     let at = |span: Range<usize>| Source::File(span);
     // The outermost table is reported without a span; it begins where the file does.
@@ -129,6 +136,11 @@ pub(super) fn apply_set(root: &mut Node, argument: &str, number: usize) -> Resul
         at = match &mut at.value {
             Value::Table(entries) => {
                 let found = entries.iter().position(|(k, _)| k.name == *step);
+                if found.is_none() && step.parse::<usize>().is_ok() {
+                    return Err(format!(
+                        "{so_far} has no entries in the scene; there is no {step}"
+                    ));
+                }
                 let index = found.unwrap_or_else(|| {
                     // Tables that the file leaves to their defaults come into being here.
                     let key = Key {

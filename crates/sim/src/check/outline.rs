@@ -140,7 +140,8 @@ impl Face {
 }
 
 impl Block {
-    /// Distance at which a beam meets the box (slab method); 0 from inside.
+    /// Distance at which a beam meets the box (slab method). From inside there is none: that post is reported by
+    /// itself, and what it would hide is not worth a word.
     fn distance(&self, u: &Unit<Vector3<f64>>) -> Option<f64> {
         let origin = self.post_from_sensor * Point3::origin();
         let v = self.post_from_sensor * u.into_inner();
@@ -157,7 +158,7 @@ impl Block {
             enter = enter.max(a.min(b));
             leave = leave.min(a.max(b));
         }
-        (enter <= leave).then_some(enter)
+        (enter > 0.0 && enter <= leave).then_some(enter)
     }
 }
 

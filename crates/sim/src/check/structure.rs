@@ -160,7 +160,8 @@ fn check_polygon(corners: &[Point3<f64>], path: &Path, found: &mut Findings) {
         return;
     }
     let area = layout::area_vector(corners);
-    let Some(normal) = Unit::try_new(area, f64::MIN_POSITIVE) else {
+    // The two lobes of a bow tie cancel; what rounding leaves of them has no direction.
+    let Some(normal) = Unit::try_new(area, CUTTING_ERROR_M * spread(corners)) else {
         found.add(
             path,
             "crosses itself; list the corners in order around the mirror",
@@ -170,16 +171,16 @@ fn check_polygon(corners: &[Point3<f64>], path: &Path, found: &mut Findings) {
     };
     let center = corners.iter().map(|c| c.coords).sum::<Vector3<f64>>() / corners.len() as f64;
     let off_plane = |c: &Point3<f64>| normal.dot(&(c.coords - center)).abs();
-    let worst = (0..corners.len()).max_by(|a, b| off_plane(&corners[*a]).total_cmp(&off_plane(&corners[*b])));
-    if let Some(worst) = worst.filter(|w| off_plane(&corners[*w]) > CUTTING_ERROR_M) {
+    let worst = corners.iter().map(off_plane).fold(0.0, f64::max);
+    if worst > CUTTING_ERROR_M {
         found.add(
-            &path.index(worst),
+            path,
             format_args!(
-                "lies {} mm off the plane of the others; {} mm is allowed",
-                rounded(off_plane(&corners[worst]) * 1e3),
+                "lists corners that are {} mm off one plane; {} mm is allowed",
+                rounded(worst * 1e3),
                 CUTTING_ERROR_M * 1e3
             ),
-            "mirrors are plane; three corners are always so".to_owned(),
+            "mirrors are plane; three corners always are".to_owned(),
         );
         return;
     }
