@@ -196,17 +196,19 @@ fn check_polygon(corners: &[Point3<f64>], path: &Path, found: &mut Findings) {
     check_side(corners, path, help, found);
 }
 
-/// A corner that is on the wrong side of some edge: there is none in a convex polygon that goes round once.
+/// A corner that makes the outline other than convex: one at which it turns the wrong way, or else one that is on the
+/// wrong side of some edge. There is neither in a convex polygon that goes round once.
 fn outside_corner(corners: &[Point3<f64>], normal: &Unit<Vector3<f64>>) -> Option<usize> {
     let n = corners.len();
-    (0..n).find(|c| {
-        (0..n).any(|e| {
-            let (a, b) = (corners[e], corners[(e + 1) % n]);
-            let inward = normal.cross(&(b - a));
-            Unit::try_new(inward, CUTTING_ERROR_M)
-                .is_some_and(|inward| inward.dot(&(corners[*c] - a)) < -CUTTING_ERROR_M)
-        })
-    })
+    let outside = |corner: usize, edge: usize| {
+        let (a, b) = (corners[edge], corners[(edge + 1) % n]);
+        Unit::try_new(normal.cross(&(b - a)), CUTTING_ERROR_M)
+            .is_some_and(|inward| inward.dot(&(corners[corner] - a)) < -CUTTING_ERROR_M)
+    };
+    let turns_back = |c: &usize| outside((*c + 1) % n, (*c + n - 1) % n);
+    (0..n)
+        .find(turns_back)
+        .or_else(|| (0..n).find(|c| (0..n).any(|edge| outside(*c, edge))))
 }
 
 /// The scanner must be on the reflecting side.
