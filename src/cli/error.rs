@@ -1,6 +1,7 @@
 //! How a verb can end other than well, and what the shell is told.
 
 use catoptric::io::scene::SceneErrors;
+use catoptric::sim::SimError;
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -19,6 +20,9 @@ pub(crate) enum CliError {
     /// There is no scene.
     #[error(transparent)]
     Scene(#[from] SceneErrors),
+    /// The scene is valid and still cannot be set up.
+    #[error("{0}")]
+    Setup(#[from] SimError),
     /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
@@ -39,7 +43,7 @@ impl CliError {
     fn exit_code(&self) -> u8 {
         match self {
             Self::ClosedPipe => 0,
-            Self::Invalid { .. } | Self::Scene(SceneErrors::Invalid(_)) => 2,
+            Self::Invalid { .. } | Self::Setup(_) | Self::Scene(SceneErrors::Invalid(_)) => 2,
             Self::Scene(SceneErrors::Read { .. }) | Self::Write { .. } | Self::Output(_) => 3,
         }
     }
@@ -57,6 +61,10 @@ impl CliError {
                 message,
                 help: Some(help),
             } => writeln!(stderr, "error: {message}\nhelp: {help}"),
+            Self::Setup(error @ SimError::Placement { .. }) => writeln!(
+                stderr,
+                "error: {error}\nhelp: make the room larger, the board smaller, or experiment.range_m shorter"
+            ),
             other => writeln!(stderr, "error: {other}"),
         };
         ExitCode::from(self.exit_code())

@@ -581,3 +581,20 @@ fn the_resolved_scene_reads_back_as_itself() {
     let back = scene::parse(&scene::to_toml(&scene).unwrap(), "resolved.toml", &[]).unwrap();
     assert_eq!(back.seed, u64::MAX);
 }
+
+#[test]
+fn a_board_that_fits_nowhere_is_found_by_check() {
+    // Poses are chosen by the rules once none are given.
+    let text = VALID.split("[[experiment.pose]]").next().unwrap();
+    let (folder, _) = folder_with(text);
+    let output = run(folder.path(), &["check", "scene.toml"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let sets = ["check", "scene.toml", "--set", "board.0.height_mm=3500"];
+    let output = run(folder.path(), &sets);
+    assert_eq!(output.status.code(), Some(2));
+    let said = stderr(&output);
+    assert!(
+        said.contains("no room for board \"big\"") && said.contains("help: "),
+        "{said}"
+    );
+}

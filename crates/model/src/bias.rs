@@ -76,24 +76,39 @@ pub struct ColorBias {
     pub offset_mm: f64,
 }
 
+/// Weights of a table's nodes in the value interpolated linearly at `x`, held constant outside the table.
+///
+/// At most two nodes, as (index, weight); all weights are 0 for an empty table. `nodes` must increase strictly.
+pub fn interpolation_weights(nodes: &[f64], x: f64) -> [(usize, f64); 2] {
+    let n = nodes.len();
+    if n == 0 {
+        return [(0, 0.0), (0, 0.0)];
+    }
+    let above = nodes.partition_point(|&node| node <= x);
+    if above == 0 {
+        return [(0, 1.0), (0, 0.0)];
+    }
+    if above == n {
+        return [(n - 1, 1.0), (n - 1, 0.0)];
+    }
+    let t = (x - nodes[above - 1]) / (nodes[above] - nodes[above - 1]);
+    [(above - 1, 1.0 - t), (above, t)]
+}
+
+/// The value of a table at `x`, interpolated linearly and constant outside; 0 for an empty table.
+pub fn interpolate(nodes: &[f64], values: &[f64], x: f64) -> f64 {
+    interpolation_weights(nodes, x)
+        .iter()
+        .map(|&(i, w)| w * values.get(i).copied().unwrap_or(0.0))
+        .sum()
+}
+
 impl DistanceBias {
     /// Weight of each table node in the interpolated value: (index, weight) of at most two nodes.
     ///
     /// The derivative of E_r with respect to its nodes, which an error budget needs.
     pub fn weights(&self, range: f64) -> [(usize, f64); 2] {
-        let n = self.range_m.len();
-        if n == 0 {
-            return [(0, 0.0), (0, 0.0)];
-        }
-        let above = self.range_m.partition_point(|&r| r <= range);
-        if above == 0 {
-            return [(0, 1.0), (0, 0.0)];
-        }
-        if above == n {
-            return [(n - 1, 1.0), (n - 1, 0.0)];
-        }
-        let t = (range - self.range_m[above - 1]) / (self.range_m[above] - self.range_m[above - 1]);
-        [(above - 1, 1.0 - t), (above, t)]
+        interpolation_weights(&self.range_m, range)
     }
 
     /// Range error caused by the target's distance, in metres.

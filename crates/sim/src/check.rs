@@ -14,9 +14,6 @@ pub use outline::{Outline, ServedFacet, outline};
 use crate::scene::Scene;
 use std::fmt;
 
-/// Colors that every scene knows.
-pub const BUILT_IN_COLORS: [&str; 5] = ["white", "antique_white", "pencil_grey", "jet_black", "structure"];
-
 /// One step into a scene.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Segment {

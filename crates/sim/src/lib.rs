@@ -1,9 +1,25 @@
 //! The virtual laboratory: a 2D LiDAR with mirrors, target boards and motion capture, simulated ray by ray.
 
+pub mod cast;
 pub mod check;
+pub mod color;
+pub mod detect;
+pub mod error;
+pub mod footprint;
+pub mod laboratory;
 pub mod layout;
+pub mod mocap;
+pub mod noise;
+pub mod optics;
+pub mod placement;
+pub mod power;
+pub mod reading;
+pub mod scanner;
 pub mod scene;
+pub mod structure;
 pub mod truth;
 
+pub use error::SimError;
+pub use laboratory::Laboratory;
 pub use scene::Scene;
 pub use truth::Truth;

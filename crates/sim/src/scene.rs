@@ -3,7 +3,7 @@
 //! Every key carries its unit. Values that nobody published are defaults marked *assumed*. The checks that need more
 //! than one value are in [`crate::check`].
 
-use catoptric_model::bias::{AngleBias, ColorBias, DistanceBias};
+use catoptric_model::bias::{AngleBias, ColorBias, DistanceBias, interpolate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -709,11 +709,6 @@ struct ColorBiasSchema {
 impl NoiseTable {
     /// Standard deviation at a range, in metres.
     pub fn sd(&self, range: f64) -> f64 {
-        // The same interpolation as E_r's.
-        DistanceBias {
-            range_m: self.range_m.clone(),
-            error_mm: self.sd_mm.clone(),
-        }
-        .error(range)
+        interpolate(&self.range_m, &self.sd_mm, range) * 1e-3
     }
 }

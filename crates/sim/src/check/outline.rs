@@ -1,13 +1,15 @@
-//! What every beam meets in the drawing, and how much an experiment will record.
+//! What every beam meets in the drawing.
 
 use crate::layout;
+use crate::placement;
 use crate::scene::Scene;
+use crate::structure;
 use catoptric_model::beam;
 use catoptric_model::frame::yaw_pitch_roll;
 use catoptric_model::{Deflection, MirrorPlane, Pose};
 use nalgebra::{Point3, Translation3, Unit, Vector3};
 
-/// The size of an experiment, from the drawing alone.
+/// What the beams of a scan are for, from the drawing alone.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outline {
     /// The facets and the beams that the drawing sends to them.
@@ -16,12 +18,6 @@ pub struct Outline {
     pub direct_beams: usize,
     /// Beams that end on a post or on the back of a facet.
     pub blocked_beams: usize,
-    /// Poses of boards, those given one by one or those that the rules give.
-    pub poses: usize,
-    /// Scans, those of the room and of the bare structure included.
-    pub scans: usize,
-    /// Readings: scans × beams.
-    pub readings: usize,
 }
 
 /// What a facet is for.
@@ -33,9 +29,7 @@ pub struct ServedFacet {
     pub beams: usize,
 }
 
-/// The size of an experiment, from the drawing alone.
-///
-/// A facet is covered in as many groups of beams as `experiment.group_span_deg` asks for.
+/// What the beams of a scan are for, from the drawing alone.
 pub fn outline(scene: &Scene) -> Outline {
     let met = Obstacles::of(scene).met_by_beams();
     let facets: Vec<ServedFacet> = scene
@@ -50,35 +44,11 @@ pub fn outline(scene: &Scene) -> Outline {
         .collect();
     let direct_beams = met.iter().filter(|m| m.is_none()).count();
     let served: usize = facets.iter().map(|f| f.beams).sum();
-    let experiment = &scene.experiment;
-    let poses = if experiment.pose.is_empty() {
-        let groups: usize = facets
-            .iter()
-            .map(|f| groups(f.beams, experiment.group_span_deg))
-            .sum();
-        groups * experiment.poses_per_group as usize + experiment.direct_poses as usize
-    } else {
-        experiment.pose.len()
-    };
-    let scans = poses * experiment.scans_per_pose as usize
-        + experiment.room_scans as usize
-        + experiment.bare_scans as usize;
     Outline {
         facets,
         direct_beams,
         blocked_beams: beam::COUNT - direct_beams - served,
-        poses,
-        scans,
-        readings: scans * beam::COUNT,
     }
-}
-
-/// Groups of beams that one facet is covered in.
-fn groups(beams: usize, span_deg: f64) -> usize {
-    // The schema keeps the span at a quarter of a degree or more, so the quotient is small.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    let groups = (beams as f64 * beam::STEP.to_degrees() / span_deg).ceil() as usize;
-    groups
 }
 
 /// What a beam meets first.
@@ -217,14 +187,5 @@ impl Obstacles {
 
 /// Where the drawing puts the sensor in the room.
 pub(super) fn nominal_room_from_sensor(scene: &Scene) -> Pose {
-    let pose = |translation: Vector3<f64>, yaw_deg: f64| {
-        Pose::from_parts(
-            Translation3::from(translation),
-            yaw_pitch_roll(yaw_deg.to_radians(), 0.0, 0.0),
-        )
-    };
-    let (room, mount) = (&scene.room, &scene.scanner.mount);
-    let room_from_rig = pose(Vector3::from(room.rig_position_m), room.rig_yaw_deg);
-    let rig_from_sensor = pose(Vector3::from(mount.position_mm) * 1e-3, mount.yaw_deg);
-    room_from_rig * rig_from_sensor
+    placement::room_from_rig(&scene.room) * structure::nominal_mount(scene)
 }

@@ -1,6 +1,7 @@
 //! Names, colors, tables and pairs of limits.
 
-use super::{BUILT_IN_COLORS, Findings, Path, suggestion};
+use super::{Findings, Path, suggestion};
+use crate::color;
 use crate::scene::{NoiseTable, Scene};
 use catoptric_model::dataset::RIG_SUBJECT;
 
@@ -82,7 +83,7 @@ fn names(scene: &Scene, found: &mut Findings) {
 }
 
 fn colors(scene: &Scene, found: &mut Findings) {
-    let known: Vec<&str> = BUILT_IN_COLORS
+    let known: Vec<&str> = color::BUILT_IN
         .into_iter()
         .chain(scene.color.keys().map(String::as_str))
         .collect();

@@ -1,0 +1,256 @@
+//! Rays against surfaces: the one user of parry.
+//!
+//! Facets, boards and walls are exact plane polygons, posts and housing exact boxes, all in one bounding volume
+//! hierarchy. A ray that leaves a mirror excludes that mirror by its index, never by an epsilon.
+
+use crate::footprint::Ray;
+use crate::layout::area_vector;
+use catoptric_model::Pose;
+use nalgebra::{Point3, Unit, Vector3};
+use parry3d::bounding_volume::Aabb;
+use parry3d::math::Vector;
+use parry3d::partitioning::{Bvh, BvhBuildStrategy};
+use parry3d::query::RayCast;
+use parry3d::shape::Cuboid;
+
+/// A convex plane polygon; its front is the side from which the corners run counter-clockwise.
+#[derive(Debug, Clone)]
+pub struct Polygon {
+    /// A point of the plane: the first corner.
+    pub origin: Point3<f64>,
+    /// Normal of the front.
+    pub normal: Unit<Vector3<f64>>,
+    /// The corners.
+    pub corners: Vec<Point3<f64>>,
+    /// For every edge, the unit vector in the plane that points inwards, and its product with the edge's points.
+    edges: Vec<(Vector3<f64>, f64)>,
+}
+
+/// A box in its own pose.
+#[derive(Debug, Clone)]
+pub struct Block {
+    sensor_from_block: Pose,
+    cuboid: Cuboid,
+}
+
+/// A shape that light can meet.
+#[derive(Debug, Clone)]
+pub enum Shape {
+    /// A polygon.
+    Polygon(Polygon),
+    /// A box.
+    Block(Block),
+}
+
+/// Where a ray meets a surface.
+#[derive(Debug, Clone, Copy)]
+pub struct Hit {
+    /// Index of the surface.
+    pub surface: usize,
+    /// Distance from the ray's origin, in metres.
+    pub distance: f64,
+    /// The point.
+    pub point: Point3<f64>,
+    /// Normal of the surface, on the side of its front.
+    pub normal: Unit<Vector3<f64>>,
+    /// Whether the front was met.
+    pub front: bool,
+}
+
+/// Surfaces with an index over them.
+pub struct World {
+    shapes: Vec<Shape>,
+    bvh: Bvh,
+}
+
+/// Farthest distance at which anything is looked for, in metres: beyond any scanner's range.
+const FARTHEST: f64 = 1e4;
+
+/// Slack at a polygon's edge, in metres: two polygons that share an edge leave no gap between them, and the slack is
+/// smaller than any distance that matters by six orders of magnitude.
+const EDGE_SLACK: f64 = 1e-12;
+
+/// Slack of a bounding box, in metres: a plane polygon's box is flat, and rounding must not push a ray past it.
+const BOX_SLACK: f64 = 1e-9;
+
+impl Polygon {
+    /// The polygon with these corners. `None` if they span no area.
+    pub fn new(corners: Vec<Point3<f64>>) -> Option<Self> {
+        let normal = Unit::try_new(area_vector(&corners), f64::MIN_POSITIVE)?;
+        let next = corners.iter().cycle().skip(1);
+        let edges = corners
+            .iter()
+            .zip(next)
+            .filter_map(|(a, b)| {
+                let inwards = Unit::try_new(normal.cross(&(b - a)), f64::MIN_POSITIVE)?;
+                Some((inwards.into_inner(), inwards.dot(&a.coords)))
+            })
+            .collect();
+        Some(Self {
+            origin: *corners.first()?,
+            normal,
+            corners,
+            edges,
+        })
+    }
+
+    /// Distance at which a ray meets the polygon, from either side.
+    fn cast(&self, ray: &Ray) -> Option<f64> {
+        let closing = self.normal.dot(&ray.direction);
+        let distance = self.normal.dot(&(self.origin - ray.origin)) / closing;
+        // A ray along the plane gives an infinity or NaN, which fails the comparison.
+        if !(distance > 0.0 && distance < FARTHEST) {
+            return None;
+        }
+        let point = ray.origin.coords + ray.direction.into_inner() * distance;
+        self.edges
+            .iter()
+            .all(|(inwards, edge)| inwards.dot(&point) >= edge - EDGE_SLACK)
+            .then_some(distance)
+    }
+}
+
+impl Block {
+    /// A box of the given extents, in metres, centered on its own frame.
+    pub fn new(sensor_from_block: Pose, size: Vector3<f64>) -> Self {
+        Self {
+            sensor_from_block,
+            cuboid: Cuboid::new(to_glam(&(size * 0.5))),
+        }
+    }
+
+    /// Distance and outward normal where a ray enters the box, or leaves it if it starts inside.
+    fn cast(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
+        let origin = self.sensor_from_block.inverse_transform_point(&ray.origin);
+        let direction = self.sensor_from_block.inverse_transform_vector(&ray.direction);
+        let local = parry3d::query::Ray::new(to_glam(&origin.coords), to_glam(&direction));
+        let hit = self
+            .cuboid
+            .cast_local_ray_and_get_normal(&local, FARTHEST, false)?;
+        let normal = self.sensor_from_block * Vector3::new(hit.normal.x, hit.normal.y, hit.normal.z);
+        (hit.time_of_impact > 0.0).then(|| (hit.time_of_impact, Unit::new_normalize(normal)))
+    }
+
+    fn corners(&self) -> Vec<Point3<f64>> {
+        let h = self.cuboid.half_extents;
+        (0..8)
+            .map(|i| {
+                let sign = |bit: u8| if i & bit == 0 { -1.0 } else { 1.0 };
+                self.sensor_from_block * Point3::new(sign(1) * h.x, sign(2) * h.y, sign(4) * h.z)
+            })
+            .collect()
+    }
+}
+
+impl World {
+    /// Indexes the shapes; a hit names a shape by its place in this list.
+    pub fn new(shapes: Vec<Shape>) -> Self {
+        let boxes: Vec<Aabb> = shapes
+            .iter()
+            .map(|shape| {
+                let corners = match shape {
+                    Shape::Polygon(polygon) => polygon.corners.clone(),
+                    Shape::Block(block) => block.corners(),
+                };
+                let points = corners.iter().map(|c| to_glam(&c.coords));
+                let mut aabb = Aabb::from_points(points);
+                aabb.mins -= Vector::splat(BOX_SLACK);
+                aabb.maxs += Vector::splat(BOX_SLACK);
+                aabb
+            })
+            .collect();
+        Self {
+            bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes),
+            shapes,
+        }
+    }
+
+    /// The nearest surface along a ray, `left` (the mirror it just left) aside.
+    pub fn cast(&self, ray: &Ray, left: Option<usize>) -> Option<Hit> {
+        let parry_ray = parry3d::query::Ray::new(to_glam(&ray.origin.coords), to_glam(&ray.direction));
+        let (surface, distance) = self.bvh.cast_ray(&parry_ray, FARTHEST, |leaf, _| {
+            let leaf = leaf as usize;
+            if left == Some(leaf) {
+                return None;
+            }
+            match &self.shapes[leaf] {
+                Shape::Polygon(polygon) => polygon.cast(ray),
+                Shape::Block(block) => block.cast(ray).map(|(distance, _)| distance),
+            }
+        })?;
+        let surface = surface as usize;
+        let normal = match &self.shapes[surface] {
+            Shape::Polygon(polygon) => polygon.normal,
+            Shape::Block(block) => block.cast(ray)?.1,
+        };
+        Some(Hit {
+            surface,
+            distance,
+            point: ray.origin + ray.direction.into_inner() * distance,
+            normal,
+            front: normal.dot(&ray.direction) < 0.0,
+        })
+    }
+}
+
+fn to_glam(v: &Vector3<f64>) -> Vector {
+    Vector::new(v.x, v.y, v.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square(x: f64) -> Shape {
+        let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)];
+        Shape::Polygon(
+            Polygon::new(corners.map(|(y, z)| Point3::new(x, y, z)).to_vec()).expect("it has an area"),
+        )
+    }
+
+    fn towards(y: f64, z: f64) -> Ray {
+        Ray {
+            origin: Point3::origin(),
+            direction: Unit::new_normalize(Vector3::new(1.0, y, z)),
+        }
+    }
+
+    #[test]
+    fn the_nearest_surface_is_found_whatever_the_order() {
+        for order in [[1.0, 2.0, 3.0], [3.0, 1.0, 2.0], [2.0, 3.0, 1.0]] {
+            let world = World::new(order.map(square).to_vec());
+            let hit = world.cast(&towards(0.1, 0.2), None).expect("something is there");
+            assert_eq!(order[hit.surface], 1.0);
+            assert!((hit.point.x - 1.0).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn a_ray_past_the_edge_misses_and_one_on_it_hits() {
+        let world = World::new(vec![square(1.0), square(-5.0)]);
+        assert!(world.cast(&towards(1.0, 0.0), None).is_some());
+        assert!(world.cast(&towards(1.0 + 1e-9, 0.0), None).is_none());
+        assert!(world.cast(&towards(0.0, -1.0 - 1e-9), None).is_none());
+    }
+
+    #[test]
+    fn the_mirror_just_left_is_not_met_again() {
+        let world = World::new(vec![square(1.0), square(2.0)]);
+        assert_eq!(
+            world.cast(&towards(0.0, 0.0), Some(0)).map(|h| h.surface),
+            Some(1)
+        );
+    }
+
+    #[test]
+    fn a_box_is_met_on_its_near_face() {
+        let pose = Pose::translation(3.0, 0.0, 0.0);
+        let world = World::new(vec![
+            Shape::Block(Block::new(pose, Vector3::new(0.5, 1.0, 1.0))),
+            square(9.0),
+        ]);
+        let hit = world.cast(&towards(0.0, 0.0), None).expect("it is in the way");
+        assert!((hit.distance - 2.75).abs() < 1e-12 && hit.front);
+        assert!((hit.normal.into_inner() + Vector3::x()).norm() < 1e-12);
+    }
+}

@@ -1,0 +1,46 @@
+//! What can stop a simulation.
+
+/// Why a scene cannot be simulated.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SimError {
+    /// A facet whose description spans no mirror.
+    #[error("facet {name:?} has no shape: {reason}")]
+    Facet {
+        /// The facet.
+        name: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A color that nobody defined.
+    #[error("color {name:?} is not defined; there are {known}")]
+    UnknownColor {
+        /// The name used.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// Something that a pose refers to and that the scene does not hold.
+    #[error("pose {pose} refers to {what}, which the scene does not hold")]
+    UnknownName {
+        /// The pose.
+        pose: usize,
+        /// What it refers to.
+        what: String,
+    },
+    /// Three markers on a line or fewer fix no pose.
+    #[error("the markers of {body:?} do not span a plane")]
+    Markers {
+        /// The body.
+        body: String,
+    },
+    /// There is no place in the room for a board where the procedure needs one.
+    #[error("no room for board {board:?} before {target}: {reason}")]
+    Placement {
+        /// The board.
+        board: String,
+        /// What it should stand before.
+        target: String,
+        /// Why it fits nowhere.
+        reason: String,
+    },
+}

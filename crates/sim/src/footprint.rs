@@ -1,0 +1,237 @@
+//! A beam as a bundle of sub-rays over its turning ellipse.
+//!
+//! The light of a Gaussian beam, exp(−2ρ²) with ρ = 1 on the 1/e² contour, is cut into rings of equal-energy rays. One
+//! cut lies on the contour itself, so that the energy inside it is 1 − e⁻² for any number of rays but one. Every ring
+//! has an even number of evenly spaced rays: the bundle's center of light is the chief ray, exactly.
+
+use crate::scene::BeamShape;
+use catoptric_model::beam;
+use nalgebra::{Point3, Unit, Vector3};
+
+/// A sub-ray's place in the ellipse, in units of the 1/e² half-axes, and its share of the energy.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SubRay {
+    /// Along the long axis.
+    pub wide: f64,
+    /// Along the short axis.
+    pub narrow: f64,
+    /// Share of the beam's energy.
+    pub weight: f64,
+}
+
+/// A ray in the sensor frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray {
+    /// Where it starts.
+    pub origin: Point3<f64>,
+    /// Where it goes.
+    pub direction: Unit<Vector3<f64>>,
+}
+
+/// Energy of a Gaussian beam inside its 1/e² contour: 1 − e⁻².
+pub const ENERGY_INSIDE: f64 = 0.864_664_716_763_387_3;
+
+/// Fewest rays for which some can be put outside the contour.
+const FEWEST_SPLIT: usize = 9;
+
+/// The sub-rays of a beam; the first is the chief ray for odd numbers, and alone it is the whole beam.
+///
+/// The weights sum to one to rounding. From five rays on the mean squares of `wide` and `narrow` are the Gaussian's,
+/// 1/4; from nine on the energy inside the contour is too.
+pub fn sub_rays(count: usize) -> Vec<SubRay> {
+    let chief = SubRay {
+        wide: 0.0,
+        narrow: 0.0,
+        weight: 1.0,
+    };
+    if count <= 1 {
+        return vec![chief];
+    }
+    let (inside, outside) = if count < FEWEST_SPLIT {
+        (count, 0)
+    } else {
+        split_at_contour(count)
+    };
+    let inside_energy = if outside == 0 { 1.0 } else { ENERGY_INSIDE };
+    let weight = inside_energy / inside as f64;
+    let mut rays = Vec::with_capacity(count);
+    let mut energy = 0.0;
+    if inside % 2 == 1 {
+        rays.push(SubRay { weight, ..chief });
+        energy = weight;
+    }
+    let sizes = if outside == 0 {
+        vec![inside - inside % 2]
+    } else {
+        rings(inside - inside % 2)
+    };
+    for (ring, size) in sizes.into_iter().enumerate() {
+        let outer = energy + weight * size as f64;
+        push_ring(&mut rays, ring, size, weight, mean_square_radius(energy, outer));
+        energy = outer;
+    }
+    let mut outermost = inside % 2;
+    if outside > 0 {
+        outermost = inside;
+        let weight = (1.0 - ENERGY_INSIDE) / outside as f64;
+        push_ring(
+            &mut rays,
+            0,
+            outside,
+            weight,
+            mean_square_radius(ENERGY_INSIDE, 1.0),
+        );
+    }
+    correct_spread(&mut rays, outermost);
+    rays
+}
+
+/// How many rays lie inside and outside the contour: in proportion to the energy, the outside an even number.
+fn split_at_contour(count: usize) -> (usize, usize) {
+    // At least four, for a ring whose spread is the same in all directions; rounding of a small positive number.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let outside = (2 * ((1.0 - ENERGY_INSIDE) * count as f64 / 2.0).round() as usize).clamp(4, count - 5);
+    (count - outside, outside)
+}
+
+/// Sizes of the rings that hold an even number of rays: growing like the radius, each even and at least four.
+fn rings(total: usize) -> Vec<usize> {
+    if total < 4 {
+        return if total == 0 { Vec::new() } else { vec![total] };
+    }
+    // Rings of 6, 12, 18, … rays hold 3k(k + 1): take the k that comes nearest.
+    let count = (1..)
+        .take_while(|k| 3 * k * (k + 1) <= total + 2)
+        .last()
+        .unwrap_or(1);
+    let unit = count * (count + 1) / 2;
+    let mut sizes: Vec<usize> = (1..=count).map(|k| (2 * (total * k / unit / 2)).max(4)).collect();
+    let inner: usize = sizes[..count - 1].iter().sum();
+    sizes[count - 1] = total - inner;
+    sizes
+}
+
+/// Mean of ρ² over the part of a Gaussian beam between two shares of its energy.
+fn mean_square_radius(inner: f64, outer: f64) -> f64 {
+    // With e = 1 − exp(−2ρ²): ∫ρ² de has the primitive ((1 − e)·ln(1 − e) + e)/2.
+    let primitive = |e: f64| {
+        if e < 1.0 {
+            0.5 * ((1.0 - e) * libm::log1p(-e) + e)
+        } else {
+            0.5
+        }
+    };
+    (primitive(outer) - primitive(inner)) / (outer - inner)
+}
+
+fn push_ring(rays: &mut Vec<SubRay>, ring: usize, size: usize, weight: f64, mean_square: f64) {
+    let radius = mean_square.sqrt();
+    // Odd rings are turned by half a step so that rays do not line up along radii.
+    let turn = if ring % 2 == 1 { 0.5 } else { 0.0 };
+    rays.extend((0..size).map(|k| {
+        let (sin, cos) = libm::sincos(std::f64::consts::TAU * (k as f64 + turn) / size as f64);
+        SubRay {
+            wide: radius * cos,
+            narrow: radius * sin,
+            weight,
+        }
+    }));
+}
+
+/// Moves the outermost ring, the rays from index `inside` on, so that the bundle's spread is the Gaussian's.
+///
+/// The chief ray stands for a small disc but has no spread itself; the outermost ring makes up for it.
+fn correct_spread(rays: &mut [SubRay], inside: usize) {
+    let spread = |rays: &[SubRay]| -> f64 {
+        rays.iter()
+            .map(|r| r.weight * (r.wide * r.wide + r.narrow * r.narrow))
+            .sum()
+    };
+    let wanted = 0.5 - spread(&rays[..inside]);
+    let scale = (wanted / spread(&rays[inside..])).sqrt();
+    for ray in &mut rays[inside..] {
+        ray.wide *= scale;
+        ray.narrow *= scale;
+    }
+}
+
+/// The ray of a sub-ray of the beam at a given azimuth, in the sensor frame.
+///
+/// Behind a spinning 45° mirror the spot turns with the azimuth θ: its long axis lies along
+/// cos θ·(horizontal) + sin θ·(vertical), its short axis along −sin θ·(horizontal) + cos θ·(vertical).
+pub fn ray(shape: &BeamShape, azimuth: f64, sub_ray: &SubRay) -> Ray {
+    let direction = beam::direction(azimuth);
+    if sub_ray.wide == 0.0 && sub_ray.narrow == 0.0 {
+        return Ray {
+            origin: Point3::origin(),
+            direction,
+        };
+    }
+    let horizontal = Vector3::new(-direction.y, direction.x, 0.0);
+    let (sin, cos) = if shape.turns {
+        libm::sincos(azimuth)
+    } else {
+        (0.0, 1.0)
+    };
+    let wide = horizontal * cos + Vector3::z() * sin;
+    let narrow = Vector3::z() * cos - horizontal * sin;
+    let half = |full: f64| 0.5e-3 * full;
+    let offset = wide * (sub_ray.wide * half(shape.wide_aperture_mm))
+        + narrow * (sub_ray.narrow * half(shape.narrow_aperture_mm));
+    let slope = wide * (sub_ray.wide * libm::tan(half(shape.wide_full_mrad)))
+        + narrow * (sub_ray.narrow * libm::tan(half(shape.narrow_full_mrad)));
+    Ray {
+        origin: Point3::from(offset),
+        direction: Unit::new_normalize(direction.into_inner() + slope),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_bundle_has_the_moments_of_the_beam() {
+        for count in (1..=70).chain([127, 256, 999, 4096]) {
+            let rays = sub_rays(count);
+            assert_eq!(rays.len(), count);
+            let sum = |f: &dyn Fn(&SubRay) -> f64| rays.iter().map(|r| r.weight * f(r)).sum::<f64>();
+            assert!((sum(&|_| 1.0) - 1.0).abs() < 1e-13, "{count} rays: energy");
+            assert!(
+                sum(&|r| r.wide).abs() < 1e-13 && sum(&|r| r.narrow).abs() < 1e-13,
+                "{count} rays: center"
+            );
+            if count >= 7 {
+                assert!(
+                    (sum(&|r| r.wide * r.wide) - 0.25).abs() < 1e-13,
+                    "{count} rays: long spread"
+                );
+                assert!(
+                    (sum(&|r| r.narrow * r.narrow) - 0.25).abs() < 1e-13,
+                    "{count} rays: short spread"
+                );
+            }
+            if count >= FEWEST_SPLIT {
+                let inside = sum(&|r| f64::from(u8::from(libm::hypot(r.wide, r.narrow) < 1.0)));
+                assert!(
+                    (inside - ENERGY_INSIDE).abs() < 1e-13,
+                    "{count} rays: {inside} inside"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_spot_turns_with_the_azimuth() {
+        let shape = crate::scene::Preset::Ust20lx.beam_shape();
+        let edge = SubRay {
+            wide: 1.0,
+            narrow: 0.0,
+            weight: 1.0,
+        };
+        let front = ray(&shape, 0.0, &edge).direction;
+        assert!((front.y / front.x - 0.008).abs() < 1e-6 && front.z.abs() < 1e-15);
+        let side = ray(&shape, std::f64::consts::FRAC_PI_2, &edge).direction;
+        assert!((side.z / side.y - 0.008).abs() < 1e-6 && side.x.abs() < 1e-15);
+    }
+}

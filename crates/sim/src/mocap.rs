@@ -1,0 +1,196 @@
+//! The motion-capture room: labelled markers, their errors, and poses solved from them.
+
+use crate::noise::{Draws, Purpose};
+use crate::scene::{Mocap, MocapProfile};
+use catoptric_model::{Pose, Track, TrackedFrame};
+use nalgebra::{Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+
+/// Errors of a marker, 1σ along the room's x, y and z, in metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MarkerErrors {
+    /// Constant while the body stays where it is.
+    pub constant: Vector3<f64>,
+    /// New in every frame.
+    pub jitter: Vector3<f64>,
+}
+
+impl MocapProfile {
+    /// The profile's errors.
+    pub fn errors(self) -> MarkerErrors {
+        let mm = |x: f64, y: f64, z: f64| Vector3::new(x, y, z) * 1e-3;
+        match self {
+            // Merriaux et al., Sensors 17(7) 1591 (2017): 0.15 mm mean error, variability below 0.025 mm.
+            Self::Modern => MarkerErrors {
+                constant: mm(0.15, 0.15, 0.15),
+                jitter: mm(0.025, 0.025, 0.025),
+            },
+            Self::Cooper => MarkerErrors {
+                constant: mm(3.4, 1.6, 6.0),
+                jitter: mm(0.025, 0.025, 0.025),
+            },
+            Self::Ideal => MarkerErrors {
+                constant: Vector3::zeros(),
+                jitter: Vector3::zeros(),
+            },
+        }
+    }
+}
+
+/// The pose that takes a template to the points seen, in the sense of least squares (Kabsch); `None` for points seen
+/// too few or on a line.
+pub fn solve_pose(template: &[Point3<f64>], seen: &[Option<Point3<f64>>]) -> Option<Pose> {
+    let pairs: Vec<_> = template
+        .iter()
+        .zip(seen)
+        .filter_map(|(t, s)| Some((t, (*s)?)))
+        .collect();
+    if pairs.len() < 3 {
+        return None;
+    }
+    let n = pairs.len() as f64;
+    let from = pairs.iter().map(|(t, _)| t.coords).sum::<Vector3<f64>>() / n;
+    let to = pairs.iter().map(|(_, s)| s.coords).sum::<Vector3<f64>>() / n;
+    let covariance: Matrix3<f64> = pairs
+        .iter()
+        .map(|(t, s)| (s.coords - to) * (t.coords - from).transpose())
+        .sum();
+    let svd = covariance.svd(true, true);
+    let (u, v_t) = (svd.u?, svd.v_t?);
+    // Points on a line leave the turn about it open.
+    if svd.singular_values[1] <= 1e-9 * svd.singular_values[0] {
+        return None;
+    }
+    // The rotation, not the reflection that may fit a plane template as well.
+    let sign = (u.determinant() * v_t.determinant()).signum();
+    let rotation = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t;
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
+    Some(Pose::from_parts(
+        Translation3::from(to - rotation * from),
+        rotation,
+    ))
+}
+
+/// A body to be tracked.
+pub struct Body<'a> {
+    /// Name.
+    pub subject: &'a str,
+    /// Its place among the scene's bodies, the rig first: keys its draws.
+    pub index: usize,
+    /// Its markers in its own frame, in metres.
+    pub template: &'a [Point3<f64>],
+    /// Where it really is.
+    pub room_from_body: Pose,
+    /// Number of the placement: a body that stays where it is keeps its constant errors.
+    pub placement: usize,
+}
+
+/// Largest number of markers of one body.
+pub const MAX_MARKERS: usize = 64;
+
+/// Tracks a body for a number of frames from `start_s` on. `first_frame` numbers the frames of the whole recording.
+pub fn track(
+    mocap: &Mocap,
+    seed: u64,
+    body: &Body<'_>,
+    start_s: f64,
+    first_frame: u64,
+    frames: u64,
+) -> Track {
+    let errors = mocap.profile.errors();
+    let column = |marker: usize| (body.index * MAX_MARKERS + marker) as u64;
+    let mut constant = Draws::new(seed, Purpose::MarkerConstant, body.placement as u64);
+    let places: Vec<Point3<f64>> = body
+        .template
+        .iter()
+        .enumerate()
+        .map(|(marker, place)| {
+            constant.seek(column(marker));
+            body.room_from_body * place + constant.normal3().component_mul(&errors.constant)
+        })
+        .collect();
+    let frames = (0..frames)
+        .map(|frame| {
+            let mut jitter = Draws::new(seed, Purpose::MarkerJitter, first_frame + frame);
+            let markers: Vec<Option<Point3<f64>>> = places
+                .iter()
+                .enumerate()
+                .map(|(marker, place)| {
+                    jitter.seek(column(marker));
+                    let seen = jitter.uniform() >= mocap.dropout;
+                    seen.then(|| place + jitter.normal3().component_mul(&errors.jitter))
+                })
+                .collect();
+            TrackedFrame {
+                time_s: start_s + frame as f64 / mocap.frame_rate_hz,
+                pose: solve_pose(body.template, &markers),
+                markers,
+            }
+        })
+        .collect();
+    Track {
+        subject: body.subject.to_owned(),
+        frames,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use catoptric_model::frame::yaw_pitch_roll;
+
+    fn template() -> Vec<Point3<f64>> {
+        vec![
+            Point3::new(0.3, 0.0, 0.0),
+            Point3::new(-0.2, 0.25, 0.0),
+            Point3::new(-0.1, -0.3, 0.0),
+            Point3::new(0.05, 0.1, 0.0),
+        ]
+    }
+
+    #[test]
+    fn exact_markers_give_the_exact_pose() {
+        let truth = Pose::from_parts(Translation3::new(1.0, -2.0, 0.5), yaw_pitch_roll(2.0, -0.7, 3.0));
+        let seen: Vec<_> = template().iter().map(|p| Some(truth * p)).collect();
+        let found = solve_pose(&template(), &seen).expect("four markers are seen");
+        for p in template() {
+            assert!((found * p - truth * p).norm() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn too_few_or_collinear_markers_give_none() {
+        let two = [
+            Some(Point3::origin()),
+            None,
+            None,
+            Some(Point3::new(1.0, 0.0, 0.0)),
+        ];
+        assert!(solve_pose(&template(), &two).is_none());
+        let line: Vec<_> = (0..4).map(|i| Point3::new(f64::from(i), 0.0, 0.0)).collect();
+        let seen: Vec<_> = line.iter().copied().map(Some).collect();
+        assert!(solve_pose(&line, &seen).is_none());
+    }
+
+    #[test]
+    fn a_body_that_stays_keeps_its_constant_error() {
+        let mocap = Mocap {
+            dropout: 0.0,
+            ..Mocap::default()
+        };
+        let template = template();
+        let body = |placement| Body {
+            subject: "rig",
+            index: 0,
+            template: &template,
+            room_from_body: Pose::identity(),
+            placement,
+        };
+        let first_marker = |placement, frame| {
+            let track = track(&mocap, 1, &body(placement), 0.0, frame, 1);
+            track.frames[0].markers[0].expect("nothing drops out")
+        };
+        assert!((first_marker(0, 0) - first_marker(0, 1)).norm() < 3e-4 * 0.5);
+        assert_ne!(first_marker(0, 0), first_marker(0, 1));
+        assert!((first_marker(0, 0) - first_marker(1, 0)).norm() > 3e-5);
+    }
+}
