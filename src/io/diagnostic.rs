@@ -1,6 +1,6 @@
 //! Problems with a file that a person wrote: each with its place, an excerpt, and what to do about it.
 
-use annotate_snippets::{AnnotationKind, Level, Origin, Renderer, Snippet};
+use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 use std::fmt;
 use std::ops::Range;
 
@@ -69,15 +69,12 @@ impl Diagnostics {
         out
     }
 
-    fn group<'a>(&'a self, diagnostic: &'a Diagnostic) -> annotate_snippets::Group<'a> {
+    fn group<'a>(&'a self, diagnostic: &'a Diagnostic) -> Group<'a> {
         let message = match &diagnostic.place {
             Place::Set(argument) => format!("--set {argument}: {}", diagnostic.message),
             _ => diagnostic.message.clone(),
         };
-        let mut group = Level::ERROR.primary_title(message).elements(
-            // A group that begins with an excerpt, or, without one, with the file's name.
-            Vec::<annotate_snippets::Element<'a>>::new(),
-        );
+        let mut group = Group::with_title(Level::ERROR.primary_title(message));
         match &diagnostic.place {
             Place::Span(span) => {
                 group = group.element(

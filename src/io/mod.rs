@@ -1,4 +1,4 @@
-//! Everything that is read or written.
+//! Files: the only part of the library that reads or writes.
 
 pub mod diagnostic;
 pub mod scene;

@@ -598,3 +598,46 @@ fn a_board_that_fits_nowhere_is_found_by_check() {
         "{said}"
     );
 }
+
+#[test]
+fn no_damage_to_the_text_is_a_panic() {
+    let check = |text: &str| {
+        if let Err(SceneErrors::Invalid(problems)) = scene::parse(text, "scene.toml", &[]) {
+            assert!(!problems.list.is_empty(), "{text}");
+            let lines = text.split('\n').count();
+            for problem in &problems.list {
+                let (line, _) = problems.position(problem).unwrap();
+                assert!((1..=lines).contains(&line), "{problems}");
+            }
+            // Excerpts are drawn of whatever is left of the text.
+            assert!(problems.render(true).contains("scene.toml"));
+        }
+    };
+    // Cut off anywhere.
+    for end in (0..VALID.len()).step_by(5) {
+        check(&VALID[..end]);
+    }
+    let lines: Vec<&str> = VALID.lines().collect();
+    for at in 0..lines.len() {
+        // A line lost, twice there, or overwritten.
+        let mut lost = lines.clone();
+        lost.remove(at);
+        check(&lost.join("\n"));
+        let mut twice = lines.clone();
+        twice.insert(at, lines[at]);
+        check(&twice.join("\n"));
+        for garbage in [
+            "= 5",
+            "é = \"ü",
+            "x = [1, {",
+            "[[room]]",
+            "[board]",
+            "scanner = 3",
+            "\t\u{7f}",
+        ] {
+            let mut overwritten = lines.clone();
+            overwritten[at] = garbage;
+            check(&overwritten.join("\r\n"));
+        }
+    }
+}
