@@ -1,5 +1,7 @@
 //! How a verb can end other than well, and what the shell is told.
 
+use catoptric::calib::CalibError;
+use catoptric::io::IoError;
 use catoptric::io::scene::SceneErrors;
 use catoptric::sim::SimError;
 use std::io::{IsTerminal, Write};
@@ -23,6 +25,18 @@ pub(crate) enum CliError {
     /// The scene is valid and still cannot be set up.
     #[error("{0}")]
     Setup(#[from] SimError),
+    /// A file that cannot be read, written or understood.
+    #[error(transparent)]
+    File(#[from] IoError),
+    /// The dataset cannot be calibrated.
+    #[error("cannot calibrate: {0}")]
+    Calibration(#[from] CalibError),
+    /// The verdict is "not good enough"; what it is about has been printed.
+    #[error("{0}")]
+    Verdict(String),
+    /// Ctrl-C.
+    #[error("interrupted; nothing half-written was left behind")]
+    Interrupted,
     /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
@@ -43,6 +57,10 @@ impl CliError {
     fn exit_code(&self) -> u8 {
         match self {
             Self::ClosedPipe => 0,
+            Self::Verdict(_) => 1,
+            Self::Calibration(_) => 2,
+            Self::File(error) => error.exit_code(),
+            Self::Interrupted => 130,
             Self::Invalid { .. } | Self::Setup(_) | Self::Scene(SceneErrors::Invalid(_)) => 2,
             Self::Scene(SceneErrors::Read { .. }) | Self::Write { .. } | Self::Output(_) => 3,
         }
@@ -65,6 +83,10 @@ impl CliError {
                 stderr,
                 "error: {error}\nhelp: make the room larger, the board smaller, or experiment.range_m shorter"
             ),
+            Self::File(error @ IoError::Exists { .. }) => {
+                writeln!(stderr, "error: {error}\nhelp: give --replace, or another --out")
+            }
+            Self::Verdict(_) | Self::Interrupted => writeln!(stderr, "{self}"),
             other => writeln!(stderr, "error: {other}"),
         };
         ExitCode::from(self.exit_code())

@@ -1,15 +1,26 @@
 //! The command line: its arguments, and one file for each verb.
 
+mod apply;
+mod calibrate;
 mod check;
 mod completions;
+mod demo;
 mod error;
+mod files;
+mod interrupt;
 mod man;
 mod new;
 mod output;
+mod progress;
+mod report;
 mod schema;
+mod score;
+mod simulate;
+mod validate;
 
 use clap::{ArgAction, Args, Parser, Subcommand};
 use error::CliError;
+use std::io::Write;
 use std::process::ExitCode;
 
 /// Said at the end of every help.
@@ -42,10 +53,24 @@ struct Global {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
+    /// The whole story on the built-in scene: simulate, calibrate, score, report
+    Demo(demo::Arguments),
     /// Write a commented scene to start from
     New(new::Arguments),
     /// Read a scene and say everything that is wrong with it
     Check(check::Arguments),
+    /// Simulate an experiment and write what it would have recorded
+    Simulate(simulate::Arguments),
+    /// Estimate where every mirrored beam goes
+    Calibrate(calibrate::Arguments),
+    /// Say whether a calibration is well formed and physically sane
+    Validate(validate::Arguments),
+    /// Compare a calibration with the truth, or, without one, with boards and walls
+    Score(score::Arguments),
+    /// Turn a scan into a point cloud
+    Apply(apply::Arguments),
+    /// Write a page to read about calibrations and their scores
+    Report(report::Arguments),
     /// Print the JSON Schema of scenes
     Schema,
     /// Print completions for a shell
@@ -58,6 +83,23 @@ enum Verb {
 #[derive(Debug)]
 struct Context {
     global: Global,
+}
+
+impl Context {
+    /// Says something on stderr, unless asked to be quiet.
+    fn say(&self, text: &str) {
+        if !self.global.quiet {
+            // With stderr closed there is nobody left to tell.
+            let _ = writeln!(anstream::stderr(), "{text}");
+        }
+    }
+
+    /// Says more, for those who asked for it.
+    fn detail(&self, text: &str) {
+        if self.global.verbose > 0 {
+            self.say(text);
+        }
+    }
 }
 
 /// Runs the program.
@@ -77,6 +119,7 @@ pub(crate) fn main() -> ExitCode {
 }
 
 fn run(cli: Cli) -> Result<(), CliError> {
+    interrupt::install();
     let context = Context { global: cli.global };
     if let Some(threads) = context.global.threads {
         // Fails only if a pool exists already, and this is the first statement that could make one.
@@ -85,6 +128,13 @@ fn run(cli: Cli) -> Result<(), CliError> {
             .map_err(|e| CliError::Output(std::io::Error::other(e)))?;
     }
     match cli.verb {
+        Verb::Demo(arguments) => demo::run(&arguments, &context),
+        Verb::Simulate(arguments) => simulate::run(&arguments, &context),
+        Verb::Calibrate(arguments) => calibrate::run(&arguments, &context),
+        Verb::Validate(arguments) => validate::run(&arguments),
+        Verb::Score(arguments) => score::run(&arguments, &context),
+        Verb::Apply(arguments) => apply::run(&arguments, &context),
+        Verb::Report(arguments) => report::run(&arguments, &context),
         Verb::New(arguments) => new::run(&arguments),
         Verb::Check(arguments) => check::run(&arguments, &context),
         Verb::Schema => schema::run(),

@@ -1,7 +1,37 @@
 //! Files: the only part of the library that reads or writes.
+//!
+//! A dataset is a folder ([`dataset`]) whose observations are a recording in the Robot Operating System's own
+//! format ([`recording`], [`playback`]), so that others' tools open it. Whatever is written appears whole or not
+//! at all ([`file`](mod@file), [`folder`]); whatever goes wrong names the file ([`error`]).
+
+mod bodies;
+pub mod error;
+pub mod file;
+pub mod folder;
+
+pub mod cdr;
+pub mod definitions;
+mod gathering;
+pub mod messages;
+pub mod playback;
+pub mod recording;
+mod schedule;
 
 pub mod diagnostic;
-pub mod scene;
-
 mod format;
+pub mod scene;
 mod tree;
+
+pub mod cloud;
+pub mod dataset;
+pub mod manifest;
+
+pub use dataset::{DatasetWriter, read_dataset, read_session};
+pub use error::IoError;
+pub use file::{read_json, write_file, write_json};
+pub use manifest::{Manifest, Provenance};
+pub use playback::read_recording;
+pub use recording::RecordingWriter;
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,11 @@
-//! All tests of the program as a whole, in one binary.
-#![allow(clippy::unwrap_used)] // A failure in a test should panic where it is.
+//! One binary for all integration tests; each module says what it proves and what it does not.
+#![allow(clippy::unwrap_used, clippy::print_stderr, missing_docs)]
 
 mod bad_input;
 mod cli;
+mod closure;
 mod common;
+mod determinism;
+mod physics;
+mod pipeline;
+mod scenes;

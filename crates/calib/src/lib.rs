@@ -1,1 +1,39 @@
-//! calib
+//! The estimator: where each mirrored beam of a 2D scanner goes, and how well that is known.
+//!
+//! A board of plane (c, n) gives one equation per element (Cooper, Raquet, Patton 2018, Eqs. 3, 6–8):
+//!
+//! ```text
+//! z = r_raw − E_a − E_c − E_r = d + n·(c − P_L1)/(n·v(θ_a, φ)) + noise
+//! Δx = (HᵀH)⁻¹Hᵀ(z − r(x̂)),  H = [∂r/∂θ_a  ∂r/∂φ]
+//! ```
+//!
+//! [`calibrate`] runs the paper's steps 4–6 and 11–13: it places the sensor in the rig ([`pose`]), sorts the elements
+//! ([`screen`]), solves each deflected one on the boards that it hits ([`solve`], [`recursive`]), says what the boards
+//! leave open ([`observability`]) and how far the answer can be off ([`covariance`]). The crate knows the model, not
+//! the simulator: it cannot see the truth. It reads no file, prints nothing and draws nothing at random.
+
+mod ahead;
+mod calibrate;
+mod choose;
+pub mod common;
+pub mod covariance;
+mod element;
+pub mod error;
+pub mod initial;
+pub mod jacobian;
+mod judge;
+mod mount_data;
+pub mod observability;
+pub mod observations;
+pub mod options;
+pub mod pose;
+pub mod recursive;
+pub mod screen;
+pub mod solve;
+pub mod spread;
+
+pub use calibrate::calibrate;
+pub use covariance::{Budget, MountUncertainty};
+pub use element::LEAST_BOARDS;
+pub use error::CalibError;
+pub use options::{JacobianForm, Method, Options};

@@ -1,0 +1,193 @@
+//! The whole procedure on one dataset: mounting, screening, and every element in turn.
+
+use crate::element::Workspace;
+use crate::error::CalibError;
+use crate::observations::{BoardInSensor, azimuth};
+use crate::options::{Method, Options};
+use crate::pose;
+use crate::screen::{Candidate, Screen};
+use catoptric_model::session::{NominalFacet, Session};
+use catoptric_model::{
+    BeamEstimate, Calibration, Dataset, MirrorPlane, PoseRecord, Status, Summary, beam, calibration, mirror,
+};
+use nalgebra::{Unit, Vector3};
+
+/// Solved elements from which a facet's plane as built is taken.
+const LEAST_ELEMENTS: usize = 5;
+
+/// Calibrates a recorded experiment: one entry for every beam of the scanner, in order.
+///
+/// Every element that is not solved says why. The angles are those of the frame `sensor`; `rig_from_sensor` is the
+/// mounting as estimated, with its covariance.
+///
+/// # Errors
+/// [`CalibError`] if the dataset's parts do not fit together or its session holds impossible numbers.
+///
+/// ```
+/// use catoptric_calib::{CalibError, Method, Options, calibrate};
+/// use catoptric_model::{Dataset, Status};
+///
+/// fn solved(dataset: &Dataset) -> Result<usize, CalibError> {
+///     let calibration = calibrate(dataset, Method::Beam, &Options::default())?;
+///     Ok(calibration.beams.iter().filter(|b| b.status == Status::Solved).count())
+/// }
+/// ```
+pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result<Calibration, CalibError> {
+    dataset.check()?;
+    let session = &dataset.session;
+    check_session(session)?;
+    let drawn: Vec<MirrorPlane> = session
+        .facets
+        .iter()
+        .map(plane_as_drawn)
+        .collect::<Result<_, _>>()?;
+    let summaries: Vec<Vec<Summary>> = dataset.poses.iter().map(PoseRecord::summarize).collect();
+    let mount = pose::estimate(dataset, &summaries);
+    let boards: Vec<Option<BoardInSensor>> = dataset
+        .poses
+        .iter()
+        .map(|p| BoardInSensor::of(p, session, &mount.rig_from_sensor))
+        .collect();
+    let screen = Screen::new(dataset, &summaries, &mount, &boards);
+    let candidates: Vec<Candidate> = (0..session.scanner.beams).map(|b| screen.classify(b)).collect();
+    let work = Workspace {
+        dataset,
+        summaries: &summaries,
+        boards: &boards,
+        rig_from_sensor: mount.rig_from_sensor,
+        mount: &mount.uncertainty,
+        method,
+        options,
+    };
+    // The drawing decides which boards an element can hit only until its neighbors tell how the facet was built.
+    let by_batch = Workspace {
+        method: Method::Beam,
+        ..work
+    };
+    let first = estimates(&by_batch, &candidates, &drawn);
+    let built: Vec<MirrorPlane> = session
+        .facets
+        .iter()
+        .zip(&drawn)
+        .map(|(facet, drawn)| plane_as_built(session, facet, &first).unwrap_or(*drawn))
+        .collect();
+    Ok(Calibration {
+        schema_version: calibration::SCHEMA_VERSION,
+        method: method.name().to_owned(),
+        frame: "sensor".to_owned(),
+        beams: estimates(&work, &candidates, &built),
+        facets: Vec::new(),
+        rig_from_sensor: Some(mount.to_file()),
+        bias: None,
+    })
+}
+
+fn check_session(session: &Session) -> Result<(), CalibError> {
+    let believed = &session.believed;
+    let positive = [
+        ("scanner.beams", session.scanner.beams as f64),
+        ("scanner.step_deg", session.scanner.step_deg),
+        ("scanner.range_max_m", session.scanner.range_max_m),
+    ];
+    let not_negative = [
+        (
+            "scanner.divergence_full_mrad",
+            session.scanner.divergence_full_mrad,
+        ),
+        ("believed.range_noise_sd_mm", believed.range_noise_sd_mm),
+        ("believed.drift_sd_mm", believed.drift_sd_mm),
+        ("believed.marker_sd_mm", believed.marker_sd_mm),
+        ("believed.distance_bias_sd_mm", believed.distance_bias_sd_mm),
+        ("believed.angle_gain_sd_mm", believed.angle_gain_sd_mm),
+        ("believed.color_bias_sd_mm", believed.color_bias_sd_mm),
+        (
+            "bare_structure.distance_sd_mm",
+            session.bare_structure.distance_sd_mm,
+        ),
+    ];
+    let fail = |key: &str, needed, found| {
+        Err(CalibError::Session {
+            key: key.to_owned(),
+            needed,
+            found,
+        })
+    };
+    for (key, found) in positive {
+        if !(found.is_finite() && found > 0.0) {
+            return fail(key, "a positive number", found);
+        }
+    }
+    for (key, found) in not_negative {
+        if !(found.is_finite() && found >= 0.0) {
+            return fail(key, "a number that is not negative", found);
+        }
+    }
+    Ok(())
+}
+
+fn plane_as_drawn(facet: &NominalFacet) -> Result<MirrorPlane, CalibError> {
+    let plane = facet.plane().ok_or_else(|| CalibError::Facet {
+        name: facet.name.clone(),
+        corners: facet.corners_mm.len(),
+    })?;
+    Ok(MirrorPlane::through(plane.point, plane.normal))
+}
+
+/// The plane that most of a facet's solved elements agree on: medians, which a few strays do not move.
+fn plane_as_built(session: &Session, facet: &NominalFacet, solved: &[BeamEstimate]) -> Option<MirrorPlane> {
+    let mut planes: Vec<MirrorPlane> = Vec::new();
+    for estimate in solved.iter().filter(|e| e.facet.as_ref() == Some(&facet.name)) {
+        let Some(deflection) = estimate.deflection() else {
+            continue;
+        };
+        let azimuth = azimuth(session, estimate.beam);
+        let exit = deflection.exit_direction(azimuth);
+        if let Some(normal) = mirror::normal_between(&beam::direction(azimuth), &exit) {
+            planes.push(MirrorPlane::through(deflection.deflection_point(azimuth), normal));
+        }
+    }
+    let median = |value: &dyn Fn(&MirrorPlane) -> f64| {
+        let mut values: Vec<f64> = planes.iter().map(value).collect();
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied()
+    };
+    let normal = Vector3::new(
+        median(&|p| p.normal.x)?,
+        median(&|p| p.normal.y)?,
+        median(&|p| p.normal.z)?,
+    );
+    let plane = MirrorPlane {
+        normal: Unit::try_new(normal, f64::MIN_POSITIVE)?,
+        offset: median(&|p| p.offset)?,
+    };
+    (planes.len() >= LEAST_ELEMENTS).then_some(plane)
+}
+
+/// The estimate of every element, with facets at the given planes.
+fn estimates(work: &Workspace, candidates: &[Candidate], mirrors: &[MirrorPlane]) -> Vec<BeamEstimate> {
+    let facets = &work.dataset.session.facets;
+    let of_one = |(beam, candidate): (usize, &Candidate)| match candidate {
+        Candidate::Direct(reason) => BeamEstimate::without_angles(beam, Status::Direct, Some(reason.clone())),
+        Candidate::Rejected(reason) => {
+            BeamEstimate::without_angles(beam, Status::Rejected, Some(reason.clone()))
+        }
+        Candidate::Deflected(near) => {
+            let mut tried = near
+                .iter()
+                .map(|f| work.estimate(beam, &facets[*f], &mirrors[*f]));
+            let nearest = tried.next();
+            match nearest {
+                Some(solved) if solved.status == Status::Solved => solved,
+                // At the seam of two facets the neighbor may be the one that was met.
+                other => tried
+                    .find(|e| e.status == Status::Solved)
+                    .or(other)
+                    .unwrap_or_else(|| {
+                        let reason = "no facet is near it".to_owned();
+                        BeamEstimate::without_angles(beam, Status::Rejected, Some(reason))
+                    }),
+            }
+        }
+    };
+    candidates.iter().enumerate().map(of_one).collect()
+}

@@ -1,0 +1,60 @@
+//! Errors of the believed biases, which all boards and the mounting share.
+
+use catoptric_model::Session;
+use nalgebra::RowDVector;
+
+/// The uncertain numbers behind E_r, E_a and E_c, each with its standard deviation: the nodes of the distance table,
+/// then A_a, then E_c of each color a board has.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CommonErrors<'a> {
+    session: &'a Session,
+    colors: Vec<&'a str>,
+}
+
+impl<'a> CommonErrors<'a> {
+    /// The uncertain numbers of a session.
+    pub fn of(session: &'a Session) -> Self {
+        let mut colors: Vec<&str> = session.boards.iter().map(|b| b.color.as_str()).collect();
+        colors.sort_unstable();
+        colors.dedup();
+        Self { session, colors }
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.session.believed.bias.distance.range_m.len() + 1 + self.colors.len()
+    }
+
+    /// Never: A_a is always among them.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Error of a corrected range that one standard deviation of each number causes, in metres.
+    ///
+    /// A_a is uncertain with A_a + B_a, the error at normal incidence, held: its column is cos θ_N − 1.
+    pub fn row(&self, range: f64, cos_incidence: f64, color: &str) -> RowDVector<f64> {
+        let beliefs = &self.session.believed;
+        let nodes = beliefs.bias.distance.range_m.len();
+        let mut row = RowDVector::zeros(self.len());
+        for (node, weight) in beliefs.bias.distance.weights(range) {
+            if node < nodes {
+                row[node] += weight * beliefs.distance_bias_sd_mm * 1e-3;
+            }
+        }
+        row[nodes] = (cos_incidence - 1.0) * beliefs.angle_gain_sd_mm * 1e-3;
+        if let Some(place) = self.colors.iter().position(|c| *c == color) {
+            row[nodes + 1 + place] = beliefs.color_bias_sd_mm * 1e-3;
+        }
+        row
+    }
+
+    /// Variance of E_c for a color that no board of the session has, in square metres; zero for a listed one.
+    pub fn unlisted_variance(&self, color: &str) -> f64 {
+        if self.colors.contains(&color) {
+            0.0
+        } else {
+            (self.session.believed.color_bias_sd_mm * 1e-3).powi(2)
+        }
+    }
+}

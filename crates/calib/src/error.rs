@@ -1,0 +1,35 @@
+//! What can keep a calibration from starting. An element that cannot be solved is data, not an error.
+
+use catoptric_model::ModelError;
+
+/// A dataset or a request that no calibration can be made from.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CalibError {
+    /// The dataset's parts do not fit together.
+    #[error(transparent)]
+    Dataset(#[from] ModelError),
+    /// A number of the session that cannot be what it is said to be.
+    #[error("session: {key} is {found}, needed: {needed}")]
+    Session {
+        /// Which number.
+        key: String,
+        /// What it has to be.
+        needed: &'static str,
+        /// What it is.
+        found: f64,
+    },
+    /// A nominal facet whose corners span no plane.
+    #[error("session: facet {name:?} needs at least three corners that span a plane, it has {corners}")]
+    Facet {
+        /// Its name.
+        name: String,
+        /// How many corners it has.
+        corners: usize,
+    },
+    /// A name that is no method's.
+    #[error("no method is called {name:?}; there are beam and recursive")]
+    UnknownMethod {
+        /// The name asked for.
+        name: String,
+    },
+}

@@ -1,0 +1,100 @@
+//! A start without a guess: 1/s_k = (n_k/(n_k·(c_k − P_L1)))·v is linear in the exit direction v.
+
+use crate::observations::Observation;
+use catoptric_model::{Deflection, RangeBias};
+use nalgebra::{Matrix3, SymmetricEigen, Unit, Vector3};
+
+/// Smallest ratio of singular values at which the linear system counts as of rank three.
+const LEAST_CONDITION: f64 = 1e-2;
+
+/// A direction found in closed form.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClosedForm {
+    /// The exit direction v.
+    pub direction: Unit<Vector3<f64>>,
+    /// |v| − 1 before it was normalized: nothing in the linear system makes it zero except the truth.
+    pub excess: f64,
+}
+
+/// Least squares for v over at least three boards, from a nominal deflection that only places P_L1 and the biases.
+///
+/// `None` if the boards do not determine v.
+pub fn closed_form(
+    nominal: &Deflection,
+    beam_azimuth: f64,
+    observations: &[Observation],
+    bias: &RangeBias,
+) -> Option<ClosedForm> {
+    let from = nominal.deflection_point(beam_azimuth);
+    let v = nominal.exit_direction(beam_azimuth);
+    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for o in observations {
+        let plane = &o.board.plane;
+        let z = bias.correct(o.mean, o.mean.0, plane.cos_incidence(&v), o.board.color);
+        let s = z.0 - nominal.distance;
+        // Multiplied by s, so that every row weighs its range error alike: s·q·v = 1.
+        let row = plane.normal.into_inner() * (s / plane.normal.dot(&(plane.point - from)));
+        normal += row * row.transpose();
+        right += row;
+    }
+    let values = SymmetricEigen::new(normal).eigenvalues;
+    if observations.len() < 3 || values.min() < LEAST_CONDITION * LEAST_CONDITION * values.max() {
+        return None;
+    }
+    let found = normal.try_inverse()? * right;
+    Some(ClosedForm {
+        direction: Unit::try_new(found, f64::MIN_POSITIVE)?,
+        excess: found.norm() - 1.0,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::observations::BoardView;
+    use catoptric_model::{BoardPlane, RawRange, beam, range};
+    use nalgebra::Point3;
+
+    fn found(normals: [[f64; 3]; 3]) -> Option<ClosedForm> {
+        let truth = Deflection {
+            azimuth: 0.2,
+            elevation: 0.9,
+            distance: 0.07,
+        };
+        let observations = normals.map(|n| {
+            let plane = BoardPlane::new(Point3::new(1.0, 0.4, 1.4), Unit::new_normalize(Vector3::from(n)));
+            Observation {
+                board: BoardView {
+                    plane,
+                    markers: &[],
+                    color: "white",
+                    noise_sd: 0.0,
+                    count: 1,
+                },
+                mean: RawRange(range::predict(&truth, 0.3, &plane).expect("it meets the board")),
+            }
+        });
+        let guess = Deflection {
+            azimuth: -0.4,
+            elevation: 0.3,
+            distance: 0.07,
+        };
+        let found = closed_form(&guess, 0.3, &observations, &RangeBias::default())?;
+        assert!(beam::angle_between(&found.direction, &truth.exit_direction(0.3)) < 1e-10);
+        Some(found)
+    }
+
+    #[test]
+    fn exact_data_need_no_guess_and_give_a_unit_vector() {
+        let found = found([[-0.9, 0.0, -0.4], [-0.5, 0.6, -0.6], [-0.5, -0.6, -0.6]]);
+        assert!(found.expect("three orientations suffice").excess.abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_hinge_is_no_start() {
+        assert_eq!(
+            found([[-0.9, 0.0, -0.4], [-0.6, 0.0, -0.6], [-0.2, 0.0, -0.9]]),
+            None
+        );
+    }
+}

@@ -1,0 +1,136 @@
+//! Can an estimate be believed? Its residuals, its weakest direction, and the known room (step 13).
+
+use crate::ahead::{AGREEMENT_FLOOR, ahead};
+use crate::choose::{Attempt, GATE_FLOOR, GATE_SIGMAS};
+use crate::element::{Failure, Fit, lost, rejected};
+use crate::observations::{BoardView, Observation};
+use crate::spread;
+use catoptric_model::{BeamEstimate, Deflection, PoseKind, RawRange, Status};
+use nalgebra::Matrix2;
+
+/// How much larger than expected the residuals of a good element may be. A solution from three boards leaves one
+/// Gaussian number: one in a million exceeds five standard deviations.
+const RESIDUAL_FACTOR: f64 = 5.0;
+
+/// Residual that no belief covers, in metres: whole millimetres, beam size, laws that miss their own tables.
+const RESIDUAL_FLOOR: f64 = 4e-3;
+
+impl Attempt<'_> {
+    /// Largest credible rms residual of a fit, and the expected one, in metres.
+    fn residual_limit(&self, fit: &Fit) -> Option<(f64, f64)> {
+        let observations = self.observations(&fit.poses);
+        let residuals = self
+            .budget(&fit.solution.deflection, &observations)?
+            .residual_covariance()?;
+        let expected = (residuals.trace().max(0.0) / fit.poses.len() as f64).sqrt();
+        Some((RESIDUAL_FACTOR * expected + RESIDUAL_FLOOR, expected))
+    }
+
+    pub(crate) fn residuals_agree(&self, fit: &Fit) -> bool {
+        self.residual_limit(fit)
+            .is_some_and(|(limit, _)| fit.rms() <= limit)
+    }
+
+    /// The estimate, if nothing speaks against it.
+    pub(crate) fn judge(&self, fit: &Fit) -> Result<BeamEstimate, Failure> {
+        let solution = &fit.solution;
+        let observations = self.observations(&fit.poses);
+        let readings: usize = observations.iter().map(|o| o.board.count).sum();
+        let found = BeamEstimate {
+            facet: Some(self.facet.name.clone()),
+            poses: Some(fit.poses.len()),
+            readings: Some(readings),
+            iterations: Some(solution.iterations),
+            rms_residual_m: Some(fit.rms()),
+            ..BeamEstimate::without_angles(self.beam, Status::Solved, None)
+        };
+        let budget = self
+            .budget(&solution.deflection, &observations)
+            .ok_or_else(lost)?;
+        if let Some(weakness) = self.weakness(&solution.deflection, &fit.poses) {
+            return Ok(BeamEstimate {
+                status: Status::Unobservable,
+                reason: Some(weakness.reason),
+                null_direction: Some(weakness.null_direction),
+                ..found
+            });
+        }
+        if !solution.converged {
+            let reason = format!("no steady estimate after {} steps", solution.iterations);
+            return Err(Failure {
+                status: Status::NotConverged,
+                reason,
+            });
+        }
+        let (limit, expected) = self.residual_limit(fit).ok_or_else(lost)?;
+        if fit.rms() > limit {
+            return Err(rejected(format!(
+                "inconsistent ranges: rms residual {:.1} mm over {} boards, {:.1} mm expected",
+                1e3 * fit.rms(),
+                fit.poses.len(),
+                1e3 * expected
+            )));
+        }
+        let covariance = budget.sandwich().ok_or_else(lost)?;
+        self.check_room(&solution.deflection, &covariance)?;
+        // One number for all readings, as the paper has it: their pooled noise.
+        let pooled: f64 = observations
+            .iter()
+            .map(|o| o.board.count as f64 * o.board.noise_sd.powi(2))
+            .sum();
+        let noise = budget.noise_covariance((pooled / readings as f64).sqrt());
+        let symmetric = |m: Matrix2<f64>| {
+            let off = 0.5 * (m[(0, 1)] + m[(1, 0)]);
+            [[m[(0, 0)], off], [off, m[(1, 1)]]]
+        };
+        Ok(BeamEstimate {
+            azimuth_rad: Some(solution.deflection.azimuth),
+            elevation_rad: Some(solution.deflection.elevation),
+            distance_m: Some(solution.deflection.distance),
+            covariance_rad2: Some(symmetric(covariance)),
+            noise_covariance_rad2: noise.map(symmetric),
+            ..found
+        })
+    }
+
+    /// Step 13: the known room has to be where the estimate puts it.
+    fn check_room(&self, found: &Deflection, covariance: &Matrix2<f64>) -> Result<(), Failure> {
+        let (origin, v) = (
+            found.deflection_point(self.azimuth),
+            found.exit_direction(self.azimuth),
+        );
+        for (pose, record) in self.work.dataset.poses.iter().enumerate() {
+            let summary = self.summary(pose);
+            if record.label.kind != PoseKind::Room || summary.count <= summary.missing {
+                continue;
+            }
+            let room_from_sensor = record.room_from_rig * self.work.rig_from_sensor;
+            let Some((wall, color)) = ahead(self.session, &room_from_sensor, None, &origin, &v) else {
+                continue;
+            };
+            let observation = [Observation {
+                board: BoardView {
+                    plane: wall.plane,
+                    markers: &[],
+                    color,
+                    noise_sd: spread::noise_sd(summary, self.noise),
+                    count: summary.count,
+                },
+                mean: RawRange(summary.mean),
+            }];
+            let budget = self.budget(found, &observation).ok_or_else(lost)?;
+            let residuals = self.element(&observation).residuals(found).unwrap_or_default();
+            let variance = budget.covariance[(0, 0)]
+                + (&budget.jacobian * covariance * budget.jacobian.transpose())[(0, 0)];
+            let limit = AGREEMENT_FLOOR + GATE_FLOOR + wall.spread + GATE_SIGMAS * variance.sqrt();
+            if let Some(residual) = residuals.first().filter(|r| r.abs() > limit) {
+                return Err(rejected(format!(
+                    "contradicts the known room: expected {:.3} m, found {:.3} m",
+                    summary.mean - residual,
+                    summary.mean
+                )));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,215 @@
+//! Which readings of which boards place the sensor in the rig, and what each of them says.
+
+use crate::common::CommonErrors;
+use crate::covariance::plane_fit;
+use crate::jacobian;
+use crate::observations::{BoardInSensor, azimuth, cone_half_angle};
+use crate::spread;
+use catoptric_model::session::MountTolerance;
+use catoptric_model::{Dataset, Pose, PoseKind, PoseRecord, RawRange, Summary, beam};
+use nalgebra::{DMatrix, DVector, Point3};
+
+/// Beams this close to a served range may meet a mirror as built: half a spot and some facet tilt.
+const CLEAR_OF_FACETS: usize = 12;
+
+/// Noise of a mean below which readings are not weighted further, in metres: whole millimetres, 1/√12 mm.
+const LEAST_NOISE: f64 = 2.9e-4;
+
+/// A board read on fewer beams than this does not tell its own plane from another.
+const LEAST_RAYS: usize = 3;
+
+/// Standard deviations within which a residual is taken as the board's own.
+const GATE_SIGMAS: f64 = 6.0;
+
+/// Residual that is always taken as the board's own, in metres: beam size and incidence, none of them modelled.
+const GATE_FLOOR: f64 = 0.02;
+
+/// One mean of a beam over a board.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Ray {
+    pub(crate) beam: usize,
+    azimuth: f64,
+    mean: f64,
+    /// Variance of the mean by noise, in square metres.
+    variance: f64,
+}
+
+/// A pose of a board and the beams that read it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct DirectBoard {
+    pub(crate) pose: usize,
+    pub(crate) rays: Vec<Ray>,
+}
+
+/// How strictly beams are chosen: motions of the sensor that must be allowed for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Selection {
+    shift: f64,
+    turn: f64,
+}
+
+/// A board's readings linearized at a mounting.
+pub(crate) struct Block {
+    /// ∂r/∂(motion of the sensor), one row per ray.
+    pub(crate) jacobian: DMatrix<f64>,
+    /// Side by side: the Jacobian, the residuals, the common errors' columns.
+    pub(crate) right_side: DMatrix<f64>,
+    /// 1σ of drift and of the plane's offset and two tilts, as they change the readings.
+    pub(crate) board_errors: DMatrix<f64>,
+    /// Noise of each mean.
+    pub(crate) variance: DVector<f64>,
+}
+
+/// The poses recorded for the mounting, and what to choose from.
+pub(crate) struct Selector<'a> {
+    dataset: &'a Dataset,
+    summaries: &'a [Vec<Summary>],
+    pub(crate) common: CommonErrors<'a>,
+    /// Whether each beam is far from every facet.
+    clear: Vec<bool>,
+}
+
+impl Selection {
+    /// Three tolerances of the drawing.
+    pub(crate) fn initial(tolerance: &MountTolerance) -> Self {
+        let largest = |sd: &[f64; 3]| sd.iter().fold(0.0, |a: f64, b| a.max(*b));
+        Self {
+            shift: 3e-3 * largest(&tolerance.translation_sd_mm),
+            turn: 3.0 * largest(&tolerance.rotation_sd_deg).to_radians(),
+        }
+    }
+
+    pub(crate) fn narrower(&self) -> Self {
+        let halved = |x: f64| if x < 1e-4 { 0.0 } else { 0.3 * x };
+        Self {
+            shift: halved(self.shift),
+            turn: halved(self.turn),
+        }
+    }
+
+    pub(crate) fn is_narrowest(&self) -> bool {
+        self.shift == 0.0 && self.turn == 0.0
+    }
+}
+
+impl<'a> Selector<'a> {
+    pub(crate) fn new(dataset: &'a Dataset, summaries: &'a [Vec<Summary>]) -> Self {
+        let clear = (0..dataset.session.scanner.beams)
+            .map(|b| {
+                dataset.session.facets.iter().all(|f| {
+                    b + CLEAR_OF_FACETS < f.beams[0] || b > f.beams[1].saturating_add(CLEAR_OF_FACETS)
+                })
+            })
+            .collect();
+        Self {
+            dataset,
+            summaries,
+            common: CommonErrors::of(&dataset.session),
+            clear,
+        }
+    }
+
+    /// The beams that read the boards, for a mounting known as well as `stage` says.
+    pub(crate) fn select(&self, rig_from_sensor: &Pose, stage: &Selection) -> Vec<DirectBoard> {
+        self.dataset
+            .poses
+            .iter()
+            .enumerate()
+            .filter(|(_, record)| record.label.kind == PoseKind::Direct)
+            .filter_map(|(pose, record)| {
+                let board = BoardInSensor::of(record, &self.dataset.session, rig_from_sensor)?;
+                let rays: Vec<Ray> = (0..record.beams)
+                    .filter(|b| self.clear[*b] && is_within(record, *b))
+                    .filter_map(|b| self.ray(&board, b, &self.summaries[pose][b], stage))
+                    .collect();
+                (rays.len() >= LEAST_RAYS).then_some(DirectBoard { pose, rays })
+            })
+            .collect()
+    }
+
+    fn ray(&self, board: &BoardInSensor, beam: usize, summary: &Summary, stage: &Selection) -> Option<Ray> {
+        let (session, believed) = (&self.dataset.session, &self.dataset.session.believed);
+        let noise = believed.range_noise_sd_mm * 1e-3;
+        if summary.count == 0 || summary.missing > summary.count || spread::is_abnormal(summary, noise) {
+            return None;
+        }
+        let azimuth = azimuth(session, beam);
+        let u = beam::direction(azimuth);
+        let hit = board.hit(&Point3::origin(), &u)?;
+        let radius = cone_half_angle(session) * hit.distance;
+        if !board.holds(&hit, radius, stage.shift + stage.turn * hit.distance) {
+            return None;
+        }
+        let cos_incidence = board.plane.cos_incidence(&u);
+        let z = believed
+            .bias
+            .correct(RawRange(summary.mean), hit.distance, cos_incidence, &board.color);
+        let tan = (1.0 / (cos_incidence * cos_incidence) - 1.0).max(0.0).sqrt();
+        let variance =
+            (spread::noise_sd(summary, noise).powi(2) / summary.count as f64).max(LEAST_NOISE * LEAST_NOISE);
+        let marker = 1e-3 * believed.marker_sd_mm / cos_incidence;
+        let common = self.common.row(hit.distance, cos_incidence, &board.color);
+        let sd = (variance + (1e-3 * believed.drift_sd_mm).powi(2) + marker * marker + common.norm_squared())
+            .sqrt();
+        let unplaced = stage.shift / cos_incidence + stage.turn * hit.distance * tan;
+        let gate = GATE_FLOOR.max(GATE_SIGMAS * sd) + unplaced;
+        ((z.0 - hit.distance).abs() <= gate).then_some(Ray {
+            beam,
+            azimuth,
+            mean: summary.mean,
+            variance,
+        })
+    }
+
+    /// The readings of a board linearized at a mounting; `None` if a ray no longer meets it.
+    pub(crate) fn linearize(&self, board: &DirectBoard, rig_from_sensor: &Pose) -> Option<Block> {
+        let session = &self.dataset.session;
+        let seen = BoardInSensor::of(&self.dataset.poses[board.pose], session, rig_from_sensor)?;
+        let (rows, width) = (board.rays.len(), self.common.len());
+        let drift = session.believed.drift_sd_mm * 1e-3;
+        let marker = session.believed.marker_sd_mm * 1e-3;
+        let mut jacobian = DMatrix::zeros(rows, 6);
+        let mut right_side = DMatrix::zeros(rows, 7 + width);
+        let mut board_errors = DMatrix::zeros(rows, 4);
+        for (row, ray) in board.rays.iter().enumerate() {
+            let u = beam::direction(ray.azimuth);
+            let hit = seen.hit(&Point3::origin(), &u)?;
+            let cos_incidence = seen.plane.cos_incidence(&u);
+            let z =
+                session
+                    .believed
+                    .bias
+                    .correct(RawRange(ray.mean), hit.distance, cos_incidence, &seen.color);
+            let gradient = jacobian::of_mount(&hit.point, &seen.plane.normal, &u);
+            jacobian.set_row(row, &gradient);
+            right_side.view_mut((row, 0), (1, 6)).copy_from(&gradient);
+            right_side[(row, 6)] = z.0 - hit.distance;
+            let common = self.common.row(hit.distance, cos_incidence, &seen.color);
+            right_side.view_mut((row, 7), (1, width)).copy_from(&common);
+            board_errors[(row, 0)] = drift;
+            let (a, cofactor) = plane_fit(&seen.markers, &hit.point, &seen.plane.normal);
+            // A square root of the cofactor turns three correlated errors into three of unit variance.
+            let root = cofactor.symmetric_eigen();
+            let closing = seen.plane.normal.dot(&u);
+            for column in 0..3 {
+                let sd = root.eigenvalues[column].max(0.0).sqrt() * marker;
+                board_errors[(row, 1 + column)] = a.dot(&root.eigenvectors.column(column)) * sd / closing;
+            }
+        }
+        let variance = DVector::from_iterator(rows, board.rays.iter().map(|r| r.variance));
+        Some(Block {
+            jacobian,
+            right_side,
+            board_errors,
+            variance,
+        })
+    }
+}
+
+/// Whether the experimenter set the board up for this beam, as far as the label says.
+fn is_within(record: &PoseRecord, beam: usize) -> bool {
+    record
+        .label
+        .beams
+        .is_none_or(|[first, last]| (first..=last).contains(&beam))
+}

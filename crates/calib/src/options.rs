@@ -1,0 +1,77 @@
+//! Which estimator runs, and how far it iterates.
+
+use crate::error::CalibError;
+use std::str::FromStr;
+
+/// How the angles of an element are estimated from its ranges.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Method {
+    /// Batch Gauss–Newton per element, Eqs. (7)–(8): what the paper prints and calls RLS.
+    Beam,
+    /// Recursive least squares per element, reading after reading: what the paper names.
+    Recursive,
+}
+
+impl Method {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Beam, Self::Recursive];
+
+    /// The word that files and commands use.
+    ///
+    /// ```
+    /// use catoptric_calib::Method;
+    /// assert_eq!("recursive".parse(), Ok(Method::Recursive));
+    /// assert_eq!(Method::Beam.name(), "beam");
+    /// ```
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Beam => "beam",
+            Self::Recursive => "recursive",
+        }
+    }
+}
+
+impl FromStr for Method {
+    type Err = CalibError;
+
+    fn from_str(name: &str) -> Result<Self, CalibError> {
+        Self::ALL
+            .into_iter()
+            .find(|m| m.name() == name)
+            .ok_or_else(|| CalibError::UnknownMethod {
+                name: name.to_owned(),
+            })
+    }
+}
+
+/// How the derivatives of the range equation are formed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum JacobianForm {
+    /// By differentiating Eq. (6).
+    #[default]
+    Analytic,
+    /// By the central differences of Eq. (7), with δ = 10⁻³ rad.
+    CentralDifference,
+}
+
+/// What a calibration may be told besides the method.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Form of the Jacobian H.
+    pub jacobian: JacobianForm,
+    /// The iteration ends with a step of (θ_a, φ) shorter than this, in radians.
+    pub step_tolerance_rad: f64,
+    /// Steps after which an element counts as not converged.
+    pub max_iterations: usize,
+}
+
+impl Default for Options {
+    /// A step of 10⁻¹³ rad is a few roundings of the range; ten steps are usual, fifty are a failure.
+    fn default() -> Self {
+        Self {
+            jacobian: JacobianForm::default(),
+            step_tolerance_rad: 1e-13,
+            max_iterations: 50,
+        }
+    }
+}

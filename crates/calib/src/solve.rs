@@ -1,0 +1,196 @@
+//! The angles of one element from its ranges (step 11): batch Gauss–Newton, Eqs. (7)–(8).
+//!
+//! Every step corrects the readings (Eq. 3) and places the mirror at the current estimate, so that data without noise
+//! return the truth itself and not a neighbor of it.
+
+use crate::jacobian;
+use crate::observations::Observation;
+use crate::options::Options;
+use catoptric_model::{CorrectedRange, Deflection, RangeBias, beam, range};
+use nalgebra::{Matrix2, SymmetricEigen, Unit, Vector2, Vector3};
+
+/// Lever arm, in metres per radian, below which a direction counts as undetermined within the iteration.
+///
+/// A residual of a millimetre along such a lever would turn the beam by 11°: no step is taken along it. Elements with
+/// levers several times longer are already reported as unobservable.
+const SHORTEST_LEVER: f64 = 5e-3;
+
+/// Longest step of one iteration, in radians; more would leave the range equation's linear neighborhood.
+const LONGEST_STEP: f64 = 0.5;
+
+/// Smallest |m·u| at which a mirror's thickness is divided by it; a flatter mirror would not be met by the spot.
+const LEAST_FACING: f64 = 0.05;
+
+/// Step 3: range to the structure before the mirror was glued on, and the mirror's thickness along its normal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BareDistance {
+    /// Distance from the sensor origin to the bare structure, in metres.
+    pub distance: f64,
+    /// Thickness t of the mirror, in metres.
+    pub thickness: f64,
+}
+
+impl BareDistance {
+    /// Distance d to the mirror's face for a beam that leaves it in direction v: bare − t/|m·u|.
+    ///
+    /// The normal m is along v − u, so |m·u| = √((1 − u·v)/2), here as |v − u|/2, which keeps its digits.
+    #[doc(alias = "d")]
+    pub fn to_mirror(&self, beam_azimuth: f64, exit: &Unit<Vector3<f64>>) -> f64 {
+        let facing = 0.5 * (exit.into_inner() - beam::direction(beam_azimuth).into_inner()).norm();
+        self.distance - self.thickness / facing.max(LEAST_FACING)
+    }
+}
+
+/// One element to be solved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Element<'a> {
+    /// Base azimuth θ_b, in radians.
+    pub azimuth: f64,
+    /// What it read of the boards it meets.
+    pub observations: &'a [Observation<'a>],
+    /// Where its mirror is.
+    pub distance: BareDistance,
+    /// The believed biases.
+    pub bias: &'a RangeBias,
+}
+
+/// What an iteration came to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solution {
+    /// θ_a, φ and d.
+    pub deflection: Deflection,
+    /// Steps taken.
+    pub iterations: usize,
+    /// Whether the last step was as short as asked for.
+    pub converged: bool,
+    /// z − r̂ of each board, in metres.
+    pub residuals: Vec<f64>,
+}
+
+/// One board linearized at an estimate.
+pub(crate) struct Row {
+    /// (∂r/∂θ_a, ∂r/∂φ).
+    pub(crate) gradient: Vector2<f64>,
+    /// Predicted range r̂, in metres.
+    pub(crate) predicted: f64,
+    /// E_a + E_c + E_r at the estimate, in metres.
+    pub(crate) bias: f64,
+}
+
+impl Element<'_> {
+    /// The estimate with its distance d brought up to date.
+    pub fn place(&self, azimuth: f64, elevation: f64) -> Deflection {
+        let bare = Deflection {
+            azimuth,
+            elevation,
+            distance: self.distance.distance,
+        };
+        let distance = self
+            .distance
+            .to_mirror(self.azimuth, &bare.exit_direction(self.azimuth));
+        Deflection { distance, ..bare }
+    }
+
+    /// The boards linearized at an estimate; `None` if the ray misses one.
+    pub(crate) fn linearize(&self, at: &Deflection, options: &Options) -> Option<Vec<Row>> {
+        let v = at.exit_direction(self.azimuth);
+        self.observations
+            .iter()
+            .map(|o| {
+                let plane = &o.board.plane;
+                let gradient = jacobian::gradient(options.jacobian, at, self.azimuth, plane)?.angles();
+                let predicted = range::predict(at, self.azimuth, plane)?;
+                let bias = self
+                    .bias
+                    .terms(predicted, plane.cos_incidence(&v), o.board.color)
+                    .total();
+                Some(Row {
+                    gradient,
+                    predicted,
+                    bias,
+                })
+            })
+            .collect()
+    }
+
+    /// z − r̂ of each board at an estimate, with z corrected by Eq. (3), in metres; `None` if the ray misses one.
+    pub fn residuals(&self, at: &Deflection) -> Option<Vec<f64>> {
+        let v = at.exit_direction(self.azimuth);
+        self.observations
+            .iter()
+            .map(|o| {
+                let predicted = range::predict(at, self.azimuth, &o.board.plane)?;
+                let cos_incidence = o.board.plane.cos_incidence(&v);
+                let CorrectedRange(z) = self.bias.correct(o.mean, predicted, cos_incidence, o.board.color);
+                Some(z - predicted)
+            })
+            .collect()
+    }
+
+    /// A solution at an estimate, with the added azimuth within (−π, π].
+    pub(crate) fn finish(&self, at: &Deflection, iterations: usize, converged: bool) -> Option<Solution> {
+        let exit = at.exit_direction(self.azimuth);
+        let deflection = Deflection::from_exit(self.azimuth, &exit, at.distance);
+        Some(Solution {
+            residuals: self.residuals(&deflection)?,
+            deflection,
+            iterations,
+            converged,
+        })
+    }
+}
+
+/// Batch Gauss–Newton: Δx = (HᵀH)⁻¹Hᵀ(z − r̂), Eq. (8), over all readings, repeated until the step is short.
+///
+/// The mean of a board's readings, weighted by their number, gives the same sums as the readings one by one. `None` if
+/// the ray misses a board on the way.
+#[doc(alias = "RLS")]
+pub fn batch(element: &Element, start: &Deflection, options: &Options) -> Option<Solution> {
+    let mut at = element.place(start.azimuth, start.elevation);
+    for iteration in 1..=options.max_iterations {
+        let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
+        for (row, o) in element.linearize(&at, options)?.iter().zip(element.observations) {
+            let weight = o.board.count as f64;
+            normal += row.gradient * row.gradient.transpose() * weight;
+            right += row.gradient * (weight * (o.mean.0 - row.bias - row.predicted));
+        }
+        let total: f64 = element.observations.iter().map(|o| o.board.count as f64).sum();
+        let step = determined_step(&(normal / total), &(right / total), libm_cos(at.elevation));
+        at = element.place(at.azimuth + step.x, at.elevation + step.y);
+        if step.norm() < options.step_tolerance_rad {
+            return element.finish(&at, iteration, true);
+        }
+    }
+    element.finish(&at, options.max_iterations, false)
+}
+
+/// The step along the directions that the boards determine, in (θ_a, φ).
+pub(crate) fn determined_step(
+    normal: &Matrix2<f64>,
+    right: &Vector2<f64>,
+    cos_elevation: f64,
+) -> Vector2<f64> {
+    let (values, vectors) = levers(normal, cos_elevation);
+    // In the tangent plane (cos φ·δθ, δφ) both components are angles on the sphere.
+    let scale = Vector2::new(1.0 / cos_elevation, 1.0);
+    let right = right.component_mul(&scale);
+    let mut step = Vector2::zeros();
+    for (value, vector) in values.iter().zip(vectors.column_iter()) {
+        if *value > SHORTEST_LEVER * SHORTEST_LEVER {
+            step += vector * (vector.dot(&right) / value);
+        }
+    }
+    step.component_mul(&scale).cap_magnitude(LONGEST_STEP)
+}
+
+/// Squared lever arms and their directions in the tangent plane (cos φ·δθ, δφ), from HᵀH in (θ_a, φ).
+pub fn levers(normal: &Matrix2<f64>, cos_elevation: f64) -> (Vector2<f64>, Matrix2<f64>) {
+    let scale = Matrix2::from_diagonal(&Vector2::new(1.0 / cos_elevation, 1.0));
+    let eigen = SymmetricEigen::new(scale * normal * scale);
+    (eigen.eigenvalues, eigen.eigenvectors)
+}
+
+/// cos φ of an elevation, the same on every machine; kept off zero, where azimuth means nothing.
+pub(crate) fn libm_cos(elevation: f64) -> f64 {
+    beam::direction(elevation).x.abs().max(1e-6)
+}

@@ -1,0 +1,236 @@
+//! A dataset is a folder: what the experimenter knows, what was recorded, and apart from both the truth.
+//!
+//! ```text
+//! manifest.json         where it comes from, SHA-256 of every file
+//! session.toml          what the experimenter knows
+//! observations.mcap     what was recorded
+//! truth/                scene.toml, truth.json, returns.csv: delete it and the dataset is blind
+//! ```
+//!
+//! Reading never opens `truth/`.
+
+use super::error::IoError;
+use super::file::{sha256, sha256_file, to_json};
+use super::folder::{Occupant, StagedFile, StagedFolder, list};
+use super::manifest::{Manifest, Provenance};
+use super::playback::parse_recording;
+use super::recording::RecordingWriter;
+use catoptric_model::{Dataset, Session, Stretch, session};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+/// Name of the manifest in a dataset.
+pub const MANIFEST: &str = "manifest.json";
+/// Name of what the experimenter knows.
+pub const SESSION: &str = "session.toml";
+/// Name of what was recorded.
+pub const OBSERVATIONS: &str = "observations.mcap";
+/// Name of the resolved scene.
+pub const SCENE: &str = "truth/scene.toml";
+/// Name of the truth about every beam.
+pub const TRUTH: &str = "truth/truth.json";
+/// Name of the truth about every reading.
+pub const RETURNS: &str = "truth/returns.csv";
+
+/// A dataset being written. It appears as a whole in [`finish`](Self::finish); dropped before, it never does.
+pub struct DatasetWriter {
+    // The recording is dropped before the folder that it is written in.
+    recording: RecordingWriter<StagedFile>,
+    folder: StagedFolder,
+}
+
+impl DatasetWriter {
+    /// Begins a dataset that will appear at `out`, and writes what the experimenter knows.
+    ///
+    /// Missing folders above it are created. An empty folder at its place is taken; a dataset only with `replace`
+    /// and if nothing was added to it, and it stays until the new one is whole.
+    ///
+    /// # Errors
+    /// [`IoError::Exists`] or [`IoError::Foreign`] if something stands in the way, [`IoError::Content`] if the names
+    /// in the session cannot be topics, otherwise what went wrong in writing.
+    pub fn create(out: &Path, replace: bool, session: &Session) -> Result<Self, IoError> {
+        let folder = StagedFolder::create(out, occupant(out, replace)?)?;
+        let shown = folder.shown(SESSION);
+        let text = toml::to_string(session).map_err(|e| IoError::content(shown, e.to_string()))?;
+        folder.write(SESSION, text.as_bytes())?;
+        let observations = folder.open(OBSERVATIONS)?;
+        let recording = RecordingWriter::create(observations, &folder.shown(OBSERVATIONS), session)?;
+        Ok(Self { recording, folder })
+    }
+
+    /// Appends a stretch to the observations.
+    ///
+    /// # Errors
+    /// [`IoError`] as [`RecordingWriter::write_stretch`].
+    pub fn write_stretch(&mut self, stretch: &Stretch) -> Result<(), IoError> {
+        self.recording.write_stretch(stretch)
+    }
+
+    /// Writes the resolved scene.
+    ///
+    /// # Errors
+    /// [`IoError`] if writing fails.
+    pub fn write_scene(&mut self, toml: &str) -> Result<(), IoError> {
+        self.folder.write(SCENE, toml.as_bytes())
+    }
+
+    /// Writes the truth about every beam.
+    ///
+    /// # Errors
+    /// [`IoError`] if it has no JSON form or writing fails.
+    pub fn write_truth(&mut self, truth: &impl Serialize) -> Result<(), IoError> {
+        let bytes = to_json(self.folder.shown(TRUTH), truth)?;
+        self.folder.write(TRUTH, &bytes)
+    }
+
+    /// Opens a file such as [`RETURNS`] to be written row by row; call its `finish` when all is written.
+    ///
+    /// # Errors
+    /// [`IoError`] if the file exists already or cannot be created.
+    pub fn open_file(&mut self, relative: &str) -> Result<StagedFile, IoError> {
+        self.folder.open(relative)
+    }
+
+    /// Ends the recording, writes the manifest and moves the dataset to its place.
+    ///
+    /// # Errors
+    /// [`IoError`] if writing fails; then nothing of it is left and what was there before is untouched.
+    pub fn finish(self, provenance: Provenance) -> Result<Manifest, IoError> {
+        let Self { recording, folder } = self;
+        recording.finish()?.finish()?;
+        let mut files = BTreeMap::new();
+        for (name, path) in folder.files()? {
+            let hash = sha256_file(&path).map_err(|e| IoError::read(folder.shown(&name), e))?;
+            files.insert(name, hash);
+        }
+        let manifest = Manifest::new(provenance, SCENE, files);
+        let bytes = to_json(folder.shown(MANIFEST), &manifest)?;
+        folder.write(MANIFEST, &bytes)?;
+        folder.publish()?;
+        Ok(manifest)
+    }
+}
+
+/// What stands at the place of a dataset, if it may be overwritten.
+fn occupant(out: &Path, replace: bool) -> Result<Occupant, IoError> {
+    let path = out.to_owned();
+    let foreign = |what| IoError::Foreign {
+        path: path.clone(),
+        what,
+    };
+    match fs::symlink_metadata(out) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Occupant::Nothing),
+        Err(e) => return Err(IoError::read(out, e)),
+        Ok(there) if there.is_symlink() => return Err(foreign("is a link")),
+        Ok(there) if !there.is_dir() => return Err(foreign("is a file, not a folder")),
+        Ok(_) => {}
+    }
+    let mut entries = fs::read_dir(out).map_err(|e| IoError::read(out, e))?;
+    if entries.next().is_none() {
+        return Ok(Occupant::Nothing);
+    }
+    let manifest = fs::read(out.join(MANIFEST)).ok();
+    let Some(ours) = manifest.and_then(|bytes| serde_json::from_slice::<Manifest>(&bytes).ok()) else {
+        return Err(foreign("holds files that are not a dataset of ours"));
+    };
+    if !replace {
+        return Err(IoError::Exists { path });
+    }
+    let files = list(out).map_err(|e| IoError::read(out, e))?;
+    if files
+        .iter()
+        .any(|(name, _)| name != MANIFEST && !ours.files.contains_key(name))
+    {
+        return Err(foreign(
+            "holds a dataset and other files that would be lost with it",
+        ));
+    }
+    Ok(Occupant::Replaceable)
+}
+
+/// Reads what the experimenter knows.
+///
+/// # Errors
+/// [`IoError`] with line, column and key if `session.toml` is not a session.
+pub fn read_session(dataset: &Path) -> Result<Session, IoError> {
+    let hashes = read_hashes(dataset)?;
+    parse_session(dataset, &read_checked(dataset, SESSION, hashes.as_ref())?)
+}
+
+/// Reads the session and the observations, frame by frame.
+///
+/// # Errors
+/// [`IoError`] as [`read_dataset`].
+pub fn read_stretches(dataset: &Path) -> Result<(Session, Vec<Stretch>), IoError> {
+    let hashes = read_hashes(dataset)?;
+    let session = parse_session(dataset, &read_checked(dataset, SESSION, hashes.as_ref())?)?;
+    let recording = read_checked(dataset, OBSERVATIONS, hashes.as_ref())?;
+    let stretches = parse_recording(&recording, &dataset.join(OBSERVATIONS), &session)?;
+    Ok((session, stretches))
+}
+
+/// Reads a dataset and checks that its parts fit together. The truth is not looked at.
+///
+/// # Errors
+/// [`IoError`] names the file that is missing, changed since the manifest was written, not what it should be, or
+/// does not fit the others. A dataset without a manifest, somebody else's, is taken as it is.
+pub fn read_dataset(dataset: &Path) -> Result<Dataset, IoError> {
+    let (session, stretches) = read_stretches(dataset)?;
+    let fail = |source| IoError::Inconsistent {
+        path: dataset.to_owned(),
+        source,
+    };
+    let records = stretches.into_iter().map(Stretch::into_record);
+    let poses = records.collect::<Result<_, _>>().map_err(fail)?;
+    let dataset = Dataset { session, poses };
+    dataset.check().map_err(fail)?;
+    Ok(dataset)
+}
+
+/// The hashes of the manifest, if there is one.
+fn read_hashes(dataset: &Path) -> Result<Option<BTreeMap<String, String>>, IoError> {
+    let path = dataset.join(MANIFEST);
+    match fs::read(&path) {
+        Ok(bytes) => {
+            let manifest: Manifest = serde_json::from_slice(&bytes).map_err(|e| IoError::json(&path, &e))?;
+            Ok(Some(manifest.files))
+        }
+        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(e) => Err(IoError::read(path, e)),
+    }
+}
+
+/// The bytes of a file, which must be those that the manifest knows.
+fn read_checked(
+    dataset: &Path,
+    name: &str,
+    hashes: Option<&BTreeMap<String, String>>,
+) -> Result<Vec<u8>, IoError> {
+    let path = dataset.join(name);
+    let bytes = fs::read(&path).map_err(|e| IoError::read(&path, e))?;
+    match hashes {
+        Some(hashes) if hashes.get(name) != Some(&sha256(&bytes)) => Err(IoError::Changed {
+            path,
+            manifest: dataset.join(MANIFEST),
+        }),
+        _ => Ok(bytes),
+    }
+}
+
+fn parse_session(dataset: &Path, bytes: &[u8]) -> Result<Session, IoError> {
+    let path = dataset.join(SESSION);
+    let text = std::str::from_utf8(bytes)
+        .map_err(|e| IoError::content(&path, format!("not UTF-8 from byte {}", e.valid_up_to())))?;
+    let session: Session = toml::from_str(text).map_err(|e| IoError::toml(&path, text, &e))?;
+    if session.schema_version != session::SCHEMA_VERSION {
+        let (found, known) = (session.schema_version, session::SCHEMA_VERSION);
+        return Err(IoError::content(
+            path,
+            format!("schema_version is {found}, this program reads {known}"),
+        ));
+    }
+    Ok(session)
+}

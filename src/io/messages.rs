@@ -1,0 +1,299 @@
+//! The messages of a recording as bytes: encoding what we write, decoding what we need.
+//!
+//! Fields stand in the order of [`definitions`](super::definitions). Times are nanoseconds since 1970, lengths metres.
+
+use super::cdr::{CdrError, CdrReader, CdrWriter};
+use catoptric_model::beam;
+use catoptric_model::frame::{Pose, PoseData};
+use catoptric_model::session::ScannerSheet;
+use nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion};
+
+/// Frame of the scanner.
+pub const LASER_FRAME: &str = "laser";
+
+/// Frame of motion capture.
+pub const ROOM_FRAME: &str = "room";
+
+/// Nanoseconds in a second.
+pub const NS_PER_S: u64 = 1_000_000_000;
+
+/// A marker that is identified by name and by index (`USE_BOTH`).
+const NAME_AND_INDEX: i8 = 2;
+
+/// The data type of a `PointField` of 32-bit numbers (`FLOAT32`).
+const FLOAT32: u8 = 7;
+
+/// A message whose bytes are not what its type says, or whose values cannot be.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MessageError {
+    /// The bytes.
+    #[error(transparent)]
+    Cdr(#[from] CdrError),
+    /// A pose that is none.
+    #[error("a pose with a position that is not finite or a quaternion of length {length}")]
+    NotAPose {
+        /// Length of the quaternion, which should be 1.
+        length: f64,
+    },
+    /// A time before 1970.
+    #[error("a time stamp of {seconds} s")]
+    BadTime {
+        /// Seconds since 1970.
+        seconds: i32,
+    },
+}
+
+/// A scan as it was recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scan {
+    /// When the scan began, in nanoseconds.
+    pub stamp: u64,
+    /// Azimuth of the first beam, in radians.
+    pub angle_min: f64,
+    /// Azimuth between beams, in radians.
+    pub angle_increment: f64,
+    /// Time from scan to scan, in seconds.
+    pub scan_time: f64,
+    /// Readings in metres, with the codes of REP-117.
+    pub ranges: Vec<f64>,
+}
+
+/// A marker with its label "subject/marker".
+#[derive(Debug, Clone, PartialEq)]
+pub struct LabelledMarker {
+    /// Label.
+    pub name: String,
+    /// Place in the template of its body.
+    pub index: usize,
+    /// Place in the room, in metres.
+    pub point: Point3<f64>,
+}
+
+/// A frame and where it stands in another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameTransform<'a> {
+    /// Frame in which it stands.
+    pub parent: &'a str,
+    /// The frame.
+    pub child: &'a str,
+    /// `parent_from_child`.
+    pub pose: Pose,
+}
+
+/// Azimuth of a beam: (i − (n − 1)/2)·step, in radians.
+pub fn azimuth(scanner: &ScannerSheet, beam: usize) -> f64 {
+    (beam as f64 - (scanner.beams as f64 - 1.0) / 2.0) * scanner.step_deg.to_radians()
+}
+
+/// The nearest 32-bit number, as messages hold them; one NaN for all, so that equal readings are equal bytes.
+pub(super) fn single(value: f64) -> f32 {
+    if value.is_nan() {
+        return f32::NAN;
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "messages hold 32-bit numbers")]
+    let nearest = value as f32;
+    nearest
+}
+
+fn write_stamp(cdr: &mut CdrWriter, stamp: u64) {
+    // A time past 2038 does not fit the message type.
+    cdr.i32(i32::try_from(stamp / NS_PER_S).unwrap_or(i32::MAX));
+    cdr.u32(u32::try_from(stamp % NS_PER_S).unwrap_or(0));
+}
+
+fn write_header(cdr: &mut CdrWriter, stamp: u64, frame: &str) {
+    write_stamp(cdr, stamp);
+    cdr.string(frame);
+}
+
+fn write_numbers(cdr: &mut CdrWriter, values: &[f64]) {
+    for v in values {
+        cdr.f64(*v);
+    }
+}
+
+/// A `sensor_msgs/msg/LaserScan`.
+pub fn encode_scan(stamp: u64, scanner: &ScannerSheet, period_s: f64, ranges: &[f64]) -> Vec<u8> {
+    let mut cdr = CdrWriter::new();
+    write_header(&mut cdr, stamp, LASER_FRAME);
+    let last = scanner.beams.saturating_sub(1);
+    for value in [
+        azimuth(scanner, 0),
+        azimuth(scanner, last),
+        scanner.step_deg.to_radians(),
+        period_s * scanner.step_deg / 360.0, // the mirror turns once in a period
+        period_s,
+        scanner.range_min_m,
+        scanner.range_max_m,
+    ] {
+        cdr.f32(single(value));
+    }
+    cdr.length(ranges.len());
+    for r in ranges {
+        cdr.f32(single(*r));
+    }
+    cdr.length(0); // no intensities
+    cdr.into_bytes()
+}
+
+/// A `sensor_msgs/msg/PointCloud2` of the scan plane: x, y, z of the readings that are ranges.
+pub fn encode_points(stamp: u64, scanner: &ScannerSheet, ranges: &[f64]) -> Vec<u8> {
+    const STEP: u32 = 12;
+    let mut data = Vec::new();
+    let mut count = 0;
+    for (i, r) in ranges.iter().enumerate().filter(|(_, r)| r.is_finite()) {
+        let point = beam::direction(azimuth(scanner, i)).into_inner() * *r;
+        for coordinate in &point {
+            data.extend_from_slice(&single(*coordinate).to_le_bytes());
+        }
+        count += 1;
+    }
+    let mut cdr = CdrWriter::new();
+    write_header(&mut cdr, stamp, LASER_FRAME);
+    cdr.u32(1); // height: unordered
+    cdr.u32(count);
+    cdr.length(3);
+    for (name, offset) in [("x", 0), ("y", 4), ("z", 8)] {
+        cdr.string(name);
+        cdr.u32(offset);
+        cdr.u8(FLOAT32);
+        cdr.u32(1);
+    }
+    cdr.bool(false); // little endian
+    cdr.u32(STEP);
+    cdr.u32(STEP * count);
+    cdr.byte_sequence(&data);
+    cdr.bool(true); // every point is finite
+    cdr.into_bytes()
+}
+
+/// A `geometry_msgs/msg/PoseStamped` in the room frame.
+pub fn encode_pose(stamp: u64, room_from_body: &Pose) -> Vec<u8> {
+    let pose = PoseData::from(room_from_body);
+    let mut cdr = CdrWriter::new();
+    write_header(&mut cdr, stamp, ROOM_FRAME);
+    write_numbers(&mut cdr, &pose.translation_m);
+    write_numbers(&mut cdr, &pose.rotation_xyzw);
+    cdr.into_bytes()
+}
+
+/// A `mocap4r2_msgs/msg/Markers` in the room frame.
+pub fn encode_markers(stamp: u64, frame_number: u32, markers: &[LabelledMarker]) -> Vec<u8> {
+    let mut cdr = CdrWriter::new();
+    write_header(&mut cdr, stamp, ROOM_FRAME);
+    cdr.u32(frame_number);
+    cdr.length(markers.len());
+    for marker in markers {
+        cdr.i8(NAME_AND_INDEX);
+        cdr.i32(i32::try_from(marker.index).unwrap_or(i32::MAX));
+        cdr.string(&marker.name);
+        write_numbers(&mut cdr, marker.point.coords.as_slice());
+    }
+    cdr.into_bytes()
+}
+
+/// A `tf2_msgs/msg/TFMessage`.
+pub fn encode_transforms(stamp: u64, transforms: &[FrameTransform<'_>]) -> Vec<u8> {
+    let mut cdr = CdrWriter::new();
+    cdr.length(transforms.len());
+    for transform in transforms {
+        let pose = PoseData::from(&transform.pose);
+        write_header(&mut cdr, stamp, transform.parent);
+        cdr.string(transform.child);
+        write_numbers(&mut cdr, &pose.translation_m);
+        write_numbers(&mut cdr, &pose.rotation_xyzw);
+    }
+    cdr.into_bytes()
+}
+
+fn read_stamp(cdr: &mut CdrReader<'_>) -> Result<u64, MessageError> {
+    let (seconds, nanoseconds) = (cdr.i32()?, cdr.u32()?);
+    let whole = u64::try_from(seconds).map_err(|_| MessageError::BadTime { seconds })?;
+    Ok(whole * NS_PER_S + u64::from(nanoseconds))
+}
+
+/// Opens a message that begins with a header and returns the header's time.
+fn open(message: &[u8]) -> Result<(u64, CdrReader<'_>), MessageError> {
+    let mut cdr = CdrReader::new(message)?;
+    let stamp = read_stamp(&mut cdr)?;
+    cdr.string()?; // the frame: each topic has one
+    Ok((stamp, cdr))
+}
+
+fn read_point(cdr: &mut CdrReader<'_>) -> Result<Point3<f64>, MessageError> {
+    Ok(Point3::new(cdr.f64()?, cdr.f64()?, cdr.f64()?))
+}
+
+/// Reads a `LaserScan`.
+///
+/// # Errors
+/// [`MessageError`] if the bytes are not one.
+pub fn decode_scan(message: &[u8]) -> Result<Scan, MessageError> {
+    let (stamp, mut cdr) = open(message)?;
+    let mut numbers = [0.0; 7];
+    for n in &mut numbers {
+        *n = f64::from(cdr.f32()?);
+    }
+    let [angle_min, _, angle_increment, _, scan_time, _, _] = numbers;
+    let length = cdr.length(size_of::<f32>())?;
+    let ranges = (0..length)
+        .map(|_| cdr.f32().map(f64::from))
+        .collect::<Result<_, _>>()?;
+    Ok(Scan {
+        stamp,
+        angle_min,
+        angle_increment,
+        scan_time,
+        ranges,
+    })
+}
+
+/// Reads the time and the pose of a `PoseStamped`, bit by bit if its quaternion has unit length.
+///
+/// # Errors
+/// [`MessageError`] if the bytes are not one or the numbers are no pose.
+pub fn decode_pose(message: &[u8]) -> Result<(u64, Pose), MessageError> {
+    // Others' files may hold rounded quaternions; ours are unit to the last bits.
+    const ROUNDED: f64 = 1e-3;
+    const EXACT: f64 = 1e-12;
+    let (stamp, mut cdr) = open(message)?;
+    let position = read_point(&mut cdr)?;
+    let [x, y, z, w] = [cdr.f64()?, cdr.f64()?, cdr.f64()?, cdr.f64()?];
+    let q = Quaternion::new(w, x, y, z);
+    let length = q.norm();
+    let finite = position.iter().all(|c| c.is_finite());
+    if !finite || !length.is_finite() || (length - 1.0).abs() > ROUNDED {
+        return Err(MessageError::NotAPose { length });
+    }
+    let rotation = if (length - 1.0).abs() > EXACT {
+        UnitQuaternion::new_normalize(q)
+    } else {
+        UnitQuaternion::new_unchecked(q)
+    };
+    Ok((
+        stamp,
+        Pose::from_parts(Translation3::from(position.coords), rotation),
+    ))
+}
+
+/// Reads the time and the markers of a `Markers`.
+///
+/// # Errors
+/// [`MessageError`] if the bytes are not one.
+pub fn decode_markers(message: &[u8]) -> Result<(u64, Vec<LabelledMarker>), MessageError> {
+    /// Kind, index, length of the label and three coordinates, without padding.
+    const SMALLEST: usize = 1 + 4 + 4 + 24;
+    let (stamp, mut cdr) = open(message)?;
+    cdr.u32()?; // frame number
+    let length = cdr.length(SMALLEST)?;
+    let markers = (0..length)
+        .map(|_| {
+            cdr.i8()?;
+            let index = usize::try_from(cdr.i32()?).unwrap_or(0);
+            let name = cdr.string()?.to_owned();
+            let point = read_point(&mut cdr)?;
+            Ok(LabelledMarker { name, index, point })
+        })
+        .collect::<Result<_, MessageError>>()?;
+    Ok((stamp, markers))
+}

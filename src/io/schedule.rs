@@ -1,0 +1,73 @@
+//! In which order the messages of a stretch are written: by time, and at one time by kind.
+
+use super::messages::NS_PER_S;
+use catoptric_model::Stretch;
+use std::collections::BTreeMap;
+
+/// When every recording begins, in nanoseconds since 1970: fixed, so that equal experiments are equal files.
+pub const EPOCH_NS: u64 = 1_518_000_000 * NS_PER_S;
+
+/// A message of a stretch; what happens at one time is written in this order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Event {
+    Label,
+    Transforms,
+    Points,
+    Scan(usize),
+    Pose { track: usize, frame: usize },
+    Markers,
+}
+
+/// The frames of the tracks that are of one time, as (track, frame).
+pub(super) type Simultaneous = Vec<(usize, usize)>;
+
+/// Whole nanoseconds of a time that was checked to be finite and not negative.
+pub(super) fn nanoseconds(seconds: f64) -> u64 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
+    let ns = (seconds * NS_PER_S as f64).round() as u64;
+    ns
+}
+
+/// The frames of all bodies by time.
+pub(super) fn simultaneous_frames(stretch: &Stretch) -> BTreeMap<u64, Simultaneous> {
+    let mut by_time: BTreeMap<u64, Simultaneous> = BTreeMap::new();
+    for (t, track) in stretch.tracks.iter().enumerate() {
+        for (f, frame) in track.frames.iter().enumerate() {
+            let time = EPOCH_NS + nanoseconds(frame.time_s);
+            by_time.entry(time).or_default().push((t, f));
+        }
+    }
+    by_time
+}
+
+/// Every message of a stretch in the order it is written.
+pub(super) fn schedule(
+    stretch: &Stretch,
+    start: u64,
+    frames: &BTreeMap<u64, Simultaneous>,
+) -> Vec<(u64, Event)> {
+    let first = frames.keys().next().map_or(start, |t| start.min(*t));
+    let mut events = vec![(first, Event::Label), (start, Event::Transforms)];
+    if stretch.label.scans > 0 {
+        events.push((start, Event::Points));
+    }
+    for k in 0..stretch.label.scans {
+        let time = start + nanoseconds(k as f64 * stretch.scan_period_s);
+        events.push((time, Event::Scan(k)));
+    }
+    for (time, members) in frames {
+        let mut with_markers = false;
+        for &(track, frame) in members {
+            let seen = &stretch.tracks[track].frames[frame];
+            with_markers |= !seen.markers.is_empty();
+            if seen.pose.is_some() {
+                events.push((*time, Event::Pose { track, frame }));
+            }
+        }
+        if with_markers {
+            events.push((*time, Event::Markers));
+        }
+    }
+    events.sort_unstable();
+    events
+}

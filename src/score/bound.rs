@@ -1,0 +1,54 @@
+//! The bound an element's error is measured by, at the true angles.
+
+use catoptric_calib::covariance::budget;
+use catoptric_calib::observations::BoardInSensor;
+use catoptric_calib::{observations, pose};
+use catoptric_model::{Dataset, Pose, PoseKind, PoseRecord};
+use catoptric_sim::Truth;
+use nalgebra::{Matrix2, Point3};
+use std::collections::BTreeMap;
+
+/// The least covariance of (θ_a, φ), in rad², that an unbiased per-element estimate from these boards can have, for
+/// every beam that is deflected once.
+///
+/// The boards are those that the true ray meets farther from the edge than its spot; the mounting is as uncertain as
+/// this dataset leaves it. A method that ties elements together, by their facet, may do better.
+pub(super) fn at_truth(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize, Matrix2<f64>> {
+    let session = &dataset.session;
+    let summaries: Vec<_> = dataset.poses.iter().map(PoseRecord::summarize).collect();
+    let mount = pose::estimate(dataset, &summaries).uncertainty;
+    let rig_from_sensor = Pose::from(&truth.rig_from_sensor);
+    let boards: Vec<_> = dataset
+        .poses
+        .iter()
+        .zip(&summaries)
+        .filter(|(record, _)| record.label.kind == PoseKind::Facet)
+        .filter_map(|(record, summary)| {
+            Some((BoardInSensor::of(record, session, &rig_from_sensor)?, summary))
+        })
+        .collect();
+    let cone = observations::cone_half_angle(session);
+    let noise_sd = session.believed.range_noise_sd_mm * 1e-3;
+    let mut bounds = BTreeMap::new();
+    for beam in &truth.beams {
+        let Some(deflection) = beam.deflection() else {
+            continue;
+        };
+        let azimuth = observations::azimuth(session, beam.beam);
+        let exit = deflection.exit_direction(azimuth);
+        let origin: Point3<f64> = deflection.deflection_point(azimuth);
+        let views: Vec<_> = boards
+            .iter()
+            .filter_map(|(board, summary)| {
+                let count = summary.get(beam.beam)?.count;
+                let hit = board.hit(&origin, &exit)?;
+                let spot = cone * (deflection.distance + hit.distance);
+                (count > 0 && board.holds(&hit, spot, 0.0)).then(|| board.view(noise_sd, count))
+            })
+            .collect();
+        if let Some(bound) = budget(session, &mount, azimuth, &deflection, &views).and_then(|b| b.bound()) {
+            bounds.insert(beam.beam, bound);
+        }
+    }
+    bounds
+}

@@ -1,0 +1,161 @@
+//! What needs no truth: how far the points that a calibration makes lie from boards and walls that were surveyed.
+
+use super::statistics::{mean, rms};
+use catoptric_calib::observations::{self, BoardInSensor};
+use catoptric_model::{Calibration, CorrectedRange, Dataset, Deflection, Pose, PoseKind, PoseRecord};
+use catoptric_model::{RangeBias, RawRange, beam};
+use nalgebra::Unit;
+use serde::Serialize;
+
+/// Distances of lifted points from the surfaces they lie on, counted positive behind the surface, in millimetres.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SurfaceResidual {
+    /// Stretches that contributed.
+    pub stretches: usize,
+    /// Elements that contributed.
+    pub elements: usize,
+    /// Readings that contributed.
+    pub readings: usize,
+    /// Mean over the readings: what they share.
+    pub mean: f64,
+    /// Root mean square over the readings.
+    pub rms: f64,
+}
+
+/// What a beam is expected to meet.
+struct Surface {
+    predicted: f64,
+    cos_incidence: f64,
+    color: String,
+}
+
+/// Mean and mean square of one element's residuals over one stretch.
+struct Visit {
+    beam: usize,
+    stretch: usize,
+    readings: usize,
+    mean: f64,
+    mean_square: f64,
+}
+
+/// Point-to-board residual of every reading of the solved elements on the boards of their facets.
+///
+/// An element is on a board if its outgoing ray, as calibrated, meets the board's face farther from the edge than
+/// its spot. A reading there is corrected by all of Eq. 3, since board and incidence are known, and its residual is
+/// the distance of the lifted point from the board's plane, cos θ_N·(r − d − s).
+pub fn boards(dataset: &Dataset, calibration: &Calibration) -> SurfaceResidual {
+    let rig_from_sensor = mount(dataset, calibration);
+    let cone = observations::cone_half_angle(&dataset.session);
+    collect(dataset, calibration, PoseKind::Facet, |pose| {
+        let board = BoardInSensor::of(pose, &dataset.session, &rig_from_sensor);
+        move |beam: usize, deflection: &Deflection| {
+            let board = board.as_ref()?;
+            let exit = deflection.exit_direction(beam::azimuth(beam));
+            let hit = board.hit(&deflection.deflection_point(beam::azimuth(beam)), &exit)?;
+            let predicted = deflection.distance + hit.distance;
+            board.holds(&hit, cone * predicted, 0.0).then(|| Surface {
+                predicted,
+                cos_incidence: board.plane.cos_incidence(&exit),
+                color: board.color.clone(),
+            })
+        }
+    })
+}
+
+/// Point-to-wall residual of every reading of the solved elements in the empty room: data no method fits angles to.
+pub fn walls(dataset: &Dataset, calibration: &Calibration) -> SurfaceResidual {
+    let rig_from_sensor = mount(dataset, calibration);
+    let room = &dataset.session.room;
+    collect(dataset, calibration, PoseKind::Room, |pose| {
+        let room_from_sensor = pose.room_from_rig * rig_from_sensor;
+        move |beam: usize, deflection: &Deflection| {
+            let origin = room_from_sensor * deflection.deflection_point(beam::azimuth(beam));
+            let exit = deflection.exit_direction(beam::azimuth(beam));
+            let exit = Unit::new_unchecked(room_from_sensor * exit.into_inner());
+            let (s, wall) = room.cast(&origin, &exit)?;
+            Some(Surface {
+                predicted: deflection.distance + s,
+                cos_incidence: wall.cos_incidence(&exit),
+                color: room.color.clone(),
+            })
+        }
+    })
+}
+
+/// The mounting used: as calibrated, or as drawn where the calibration has none.
+pub fn mount(dataset: &Dataset, calibration: &Calibration) -> Pose {
+    match &calibration.rig_from_sensor {
+        Some(estimate) => estimate.pose(),
+        None => Pose::from(&dataset.session.nominal_rig_from_sensor),
+    }
+}
+
+/// The biases used: as calibrated, or as believed where the calibration has none.
+pub fn bias<'a>(dataset: &'a Dataset, calibration: &'a Calibration) -> &'a RangeBias {
+    calibration
+        .bias
+        .as_ref()
+        .unwrap_or(&dataset.session.believed.bias)
+}
+
+/// Residuals over all stretches of a kind; `expect` says what a beam meets in one of them.
+fn collect<E>(
+    dataset: &Dataset,
+    calibration: &Calibration,
+    kind: PoseKind,
+    expect: impl Fn(&PoseRecord) -> E,
+) -> SurfaceResidual
+where
+    E: Fn(usize, &Deflection) -> Option<Surface>,
+{
+    let bias = bias(dataset, calibration);
+    let mut visits = Vec::new();
+    for pose in dataset.of_kind(kind) {
+        let expect = expect(pose);
+        for estimate in calibration.beams.iter().filter(|b| b.beam < pose.beams) {
+            let Some(deflection) = estimate.deflection() else {
+                continue;
+            };
+            let Some(on) = expect(estimate.beam, &deflection) else {
+                continue;
+            };
+            let residuals: Vec<f64> = pose
+                .readings(estimate.beam)
+                .filter(|r| r.is_finite())
+                .map(|r| {
+                    let CorrectedRange(corrected) =
+                        bias.correct(RawRange(r), on.predicted, on.cos_incidence, &on.color);
+                    on.cos_incidence * (corrected - on.predicted) * 1e3
+                })
+                .collect();
+            if !residuals.is_empty() {
+                visits.push(Visit {
+                    beam: estimate.beam,
+                    stretch: pose.label.pose,
+                    readings: residuals.len(),
+                    mean: mean(residuals.iter().copied()),
+                    mean_square: rms(residuals.iter().copied()).powi(2),
+                });
+            }
+        }
+    }
+    summarize(&visits)
+}
+
+fn summarize(visits: &[Visit]) -> SurfaceResidual {
+    let count = |key: fn(&Visit) -> usize| {
+        let distinct: std::collections::BTreeSet<usize> = visits.iter().map(key).collect();
+        distinct.len()
+    };
+    let readings: usize = visits.iter().map(|v| v.readings).sum();
+    let weighted = |value: fn(&Visit) -> f64| {
+        visits.iter().map(|v| v.readings as f64 * value(v)).sum::<f64>() / readings as f64
+    };
+    SurfaceResidual {
+        stretches: count(|v| v.stretch),
+        elements: count(|v| v.beam),
+        readings,
+        mean: weighted(|v| v.mean),
+        rms: weighted(|v| v.mean_square).sqrt(),
+    }
+}

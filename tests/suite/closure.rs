@@ -1,0 +1,82 @@
+//! The estimator on data without errors: every angle must come back.
+//!
+//! This is the inverse crime, committed on purpose: the simulator is reduced to the estimator's own model (pencil
+//! beams, no errors), so it proves conventions, derivatives and convergence, and says nothing about accuracy.
+
+use crate::scenes::{PROTOTYPE, TWO_MIRROR, layouts, scene, without_errors};
+use catoptric::calib::{self, Method, Options};
+use catoptric::model::{Status, beam};
+use catoptric::sim::truth::BeamClass;
+use catoptric::sim::{Laboratory, Scene, Truth};
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+
+/// Largest error of θ_a and φ over all deflected beams, or what is wrong with the first that did not come back.
+fn worst_error(truth: &Truth, calibration: &catoptric::model::Calibration) -> Result<f64, String> {
+    let mut worst: f64 = 0.0;
+    for true_beam in truth.beams.iter().filter(|b| b.status == BeamClass::Deflected) {
+        let found = calibration.beam(true_beam.beam).ok_or("an element is missing")?;
+        if found.status != Status::Solved {
+            return Err(format!(
+                "beam {} is {:?}: {:?}",
+                true_beam.beam, found.status, found.reason
+            ));
+        }
+        let (found, true_one) = (
+            found.deflection().ok_or("no angles")?,
+            true_beam.deflection().ok_or("no truth")?,
+        );
+        worst = worst
+            .max((found.azimuth - true_one.azimuth).abs())
+            .max((found.elevation - true_one.elevation).abs());
+    }
+    for true_beam in truth.beams.iter().filter(|b| b.status == BeamClass::Direct) {
+        let status = calibration.beam(true_beam.beam).map(|b| b.status);
+        if status == Some(Status::Solved) {
+            return Err(format!("beam {} is direct and was solved", true_beam.beam));
+        }
+    }
+    Ok(worst)
+}
+
+fn close(scene: &Scene, seed: u64) -> Result<(), TestCaseError> {
+    let laboratory = Laboratory::new(scene, seed).map_err(|e| TestCaseError::reject(e.to_string()))?;
+    let dataset = laboratory
+        .dataset()
+        .map_err(|e| TestCaseError::fail(e.to_string()))?;
+    let truth = laboratory
+        .truth()
+        .map_err(|e| TestCaseError::fail(e.to_string()))?;
+    for method in Method::ALL {
+        let calibration = calib::calibrate(&dataset, method, &Options::default())
+            .map_err(|e| TestCaseError::fail(e.to_string()))?;
+        let worst = worst_error(&truth, &calibration).map_err(TestCaseError::fail)?;
+        prop_assert!(worst < 1e-9, "{}: off by {worst:e} rad", method.name());
+        prop_assert_eq!(calibration.beams.len(), beam::COUNT);
+    }
+    Ok(())
+}
+
+#[test]
+fn the_repositorys_scenes_close() {
+    for text in [PROTOTYPE, TWO_MIRROR] {
+        let scene = without_errors(scene(text));
+        close(&scene, scene.seed).expect("the scene closes");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 200,
+        max_global_rejects: 2000,
+        failure_persistence: None,
+        // The same 200 layouts on every run: a failure here is a change of ours.
+        rng_seed: RngSeed::Fixed(2018),
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn random_layouts_close(scene in layouts(), seed in any::<u64>()) {
+        close(&scene, seed)?;
+    }
+}

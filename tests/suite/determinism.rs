@@ -1,0 +1,43 @@
+//! The same scene and seed give the same numbers, on any number of threads, in any order.
+
+use crate::scenes::{PROTOTYPE, scene};
+use catoptric::sim::Laboratory;
+
+#[test]
+fn a_stretch_recorded_alone_is_the_stretch_recorded_in_turn() {
+    let mut scene = scene(PROTOTYPE);
+    scene.experiment.scans_per_pose = 3;
+    let laboratory = Laboratory::new(&scene, 5).expect("the scene is good");
+    let in_turn: Vec<_> = (0..laboratory.stretches())
+        .map(|i| laboratory.stretch(i).expect("recorded"))
+        .collect();
+    let again = Laboratory::new(&scene, 5).expect("the scene is good");
+    for number in [40, 3, 17] {
+        assert_eq!(again.stretch(number).expect("recorded"), in_turn[number]);
+    }
+    let other = Laboratory::new(&scene, 6).expect("the scene is good");
+    assert_ne!(other.stretch(3).expect("recorded").ranges, in_turn[3].ranges);
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let mut scene = scene(PROTOTYPE);
+    scene.experiment.scans_per_pose = 2;
+    scene.experiment.poses_per_group = 3;
+    let record = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("threads can be had");
+        pool.install(|| {
+            let laboratory = Laboratory::new(&scene, 1).expect("the scene is good");
+            (
+                laboratory.dataset().expect("recorded"),
+                laboratory.truth().expect("known"),
+            )
+        })
+    };
+    let one = record(1);
+    assert_eq!(one, record(2));
+    assert_eq!(one, record(7));
+}
