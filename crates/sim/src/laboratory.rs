@@ -19,7 +19,7 @@ use catoptric_model::session::{self, Session};
 use catoptric_model::{
     Dataset, Deflection, Pose, PoseData, PoseKind, PoseLabel, RangeBias, Rectangle, Stretch, beam,
 };
-use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 /// A scene ready to be recorded.
@@ -352,25 +352,22 @@ impl Laboratory {
     /// Step 3: mean ranges to the bare structure, corrected with the incidence that the drawing gives.
     fn bare_structure(&self) -> Result<session::BareStructure, SimError> {
         let thickness = self.scene.superstructure.mirror.thickness_mm;
-        let nominal = Structure::nominal(&self.scene)?;
-        let setting = Setting::new(&self.scene, &nominal, Mirrors::Removed, Vec::new())?;
+        let facet_normals = self.drawn_normals()?;
         let number = self.planned.iter().position(|p| p.kind == PoseKind::Bare);
         let stretch = number.map(|number| self.stretch(number)).transpose()?;
         let record = stretch.and_then(|s| s.into_record().ok());
         let summaries = record.map(|r| r.summarize()).unwrap_or_default();
         let mut distance_m = vec![0.0; beam::COUNT];
         let mut variance: f64 = 0.0;
-        for (beam, summary) in summaries.iter().enumerate().filter(|(_, s)| s.count > 0) {
-            let path = self.sensor.chief_path(&setting, beam);
-            // Beams that the drawing sends past the structure may still meet its edge; they are taken face-on.
-            let (expected, cos) = match path.end {
-                End::Hit(hit) => (path.length, placement::cos_incidence(&hit, &path.last)),
-                End::Escaped | End::Trapped => (summary.mean, 1.0),
+        for (beam, summary) in summaries.iter().enumerate() {
+            let Some(normal) = facet_normals[beam] else {
+                continue;
             };
-            if summary.mean > FARTHEST_STRUCTURE {
+            if summary.count == 0 || summary.mean > FARTHEST_STRUCTURE {
                 continue;
             }
-            distance_m[beam] = summary.mean - self.believed.terms(expected, cos, "structure").total();
+            let cos = normal.dot(&beam::direction(beam::azimuth(beam))).abs();
+            distance_m[beam] = summary.mean - self.believed.terms(summary.mean, cos, "structure").total();
             variance = variance.max(self.bare_variance(summary.count, cos));
         }
         Ok(session::BareStructure {
@@ -379,6 +376,25 @@ impl Laboratory {
             first_beam: 0,
             distance_m,
         })
+    }
+
+    /// For every beam, the drawn normal of the facet that serves it or is nearest to it within a few beams.
+    fn drawn_normals(&self) -> Result<Vec<Option<Unit<Vector3<f64>>>>, SimError> {
+        let facets = self.nominal_facets()?;
+        let away = |f: &session::NominalFacet, beam: usize| {
+            f.beams[0]
+                .saturating_sub(beam)
+                .max(beam.saturating_sub(f.beams[1]))
+        };
+        let nearest = |beam| {
+            facets
+                .iter()
+                .min_by_key(|f| away(f, beam))
+                .filter(|f| away(f, beam) <= NEAR_FACET)
+        };
+        Ok((0..beam::COUNT)
+            .map(|beam| Some(nearest(beam)?.plane()?.normal))
+            .collect())
     }
 
     /// Variance that the experimenter ascribes to a bare distance, in square metres.
@@ -491,6 +507,9 @@ impl Laboratory {
 
 /// Bare readings beyond this are not of the structure, in metres.
 const FARTHEST_STRUCTURE: f64 = 0.3;
+
+/// How many beams beyond the drawn ones a bare distance is still noted for: as built, the edges move.
+const NEAR_FACET: usize = 12;
 
 /// Where a board really stands when a person means to put it somewhere.
 fn misplaced(scene: &Scene, seed: u64, number: usize, meant: &Pose) -> Pose {

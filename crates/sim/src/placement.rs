@@ -4,7 +4,6 @@
 //! several poses: its tilt direction goes round evenly, its tilt and its distance vary, and it must stand in the room
 //! and catch the whole group with some margin. The mirrors as built are not known here.
 
-use crate::cast::Hit;
 use crate::error::SimError;
 use crate::footprint::Ray;
 use crate::optics::{End, Mirrors, Path, Setting};
@@ -427,11 +426,6 @@ fn given(scene: &Scene, paths: &[Path], pose: &BoardPose, index: usize) -> Resul
         beams,
         board: Some((board, level * turn)),
     })
-}
-
-/// Cosine of the incidence of a hit, which the bare measurement's correction needs.
-pub fn cos_incidence(hit: &Hit, ray: &Ray) -> f64 {
-    hit.normal.dot(&ray.direction).abs()
 }
 
 #[cfg(test)]
