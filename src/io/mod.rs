@@ -17,6 +17,11 @@ pub mod playback;
 pub mod recording;
 mod schedule;
 
+pub mod diagnostic;
+mod format;
+pub mod scene;
+mod tree;
+
 pub mod cloud;
 pub mod dataset;
 pub mod manifest;

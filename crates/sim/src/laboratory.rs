@@ -175,7 +175,11 @@ impl Laboratory {
     /// # Errors
     /// An unknown color.
     pub fn stretch(&self, number: usize) -> Result<Stretch, SimError> {
-        let returns = self.returns(number)?;
+        Ok(self.record(number, &self.returns(number)?))
+    }
+
+    /// Records a stretch from what [`Laboratory::returns`] found for it.
+    pub fn record(&self, number: usize, returns: &Returns) -> Stretch {
         let planned = &self.planned[number];
         let drift = self.drift(number);
         let first_scan: usize = self.planned[..number].iter().map(|p| p.scans).sum();
@@ -190,14 +194,14 @@ impl Laboratory {
         }
         let scan_period_s = 1.0 / scanner::SCAN_RATE_HZ;
         let start_s = first_scan as f64 * scan_period_s + number as f64 * self.scene.experiment.pause_s;
-        Ok(Stretch {
+        Stretch {
             label: self.label(number),
             start_s,
             scan_period_s,
             beams: beam::COUNT,
             ranges,
             tracks: self.tracks(number, start_s, planned.scans as f64 * scan_period_s),
-        })
+        }
     }
 
     fn label(&self, number: usize) -> PoseLabel {

@@ -1,6 +1,7 @@
 //! The virtual laboratory: a 2D LiDAR with mirrors, target boards and motion capture, simulated ray by ray.
 
 pub mod cast;
+pub mod check;
 pub mod color;
 pub mod detect;
 pub mod error;

@@ -1,0 +1,191 @@
+//! What every beam meets in the drawing.
+
+use crate::layout;
+use crate::placement;
+use crate::scene::Scene;
+use crate::structure;
+use catoptric_model::beam;
+use catoptric_model::frame::yaw_pitch_roll;
+use catoptric_model::{Deflection, MirrorPlane, Pose};
+use nalgebra::{Point3, Translation3, Unit, Vector3};
+
+/// What the beams of a scan are for, from the drawing alone.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Outline {
+    /// The facets and the beams that the drawing sends to them.
+    pub facets: Vec<ServedFacet>,
+    /// Beams that meet neither facet nor post.
+    pub direct_beams: usize,
+    /// Beams that end on a post or on the back of a facet.
+    pub blocked_beams: usize,
+}
+
+/// What a facet is for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ServedFacet {
+    /// Name.
+    pub name: String,
+    /// Number of beams whose chief ray the drawing sends to it.
+    pub beams: usize,
+}
+
+/// What the beams of a scan are for, from the drawing alone.
+pub fn outline(scene: &Scene) -> Outline {
+    let met = Obstacles::of(scene).met_by_beams();
+    let facets: Vec<ServedFacet> = scene
+        .superstructure
+        .facet
+        .iter()
+        .enumerate()
+        .map(|(i, facet)| ServedFacet {
+            name: facet.name.clone(),
+            beams: met.iter().filter(|m| **m == Some(Meets::Facet(i))).count(),
+        })
+        .collect();
+    let direct_beams = met.iter().filter(|m| m.is_none()).count();
+    let served: usize = facets.iter().map(|f| f.beams).sum();
+    Outline {
+        facets,
+        direct_beams,
+        blocked_beams: beam::COUNT - direct_beams - served,
+    }
+}
+
+/// What a beam meets first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Meets {
+    /// The reflecting side of a facet.
+    Facet(usize),
+    /// The other side of a facet.
+    Back(usize),
+    /// A post.
+    Post(usize),
+}
+
+/// A facet as drawn.
+pub(super) struct Face {
+    pub(super) corners: Vec<Point3<f64>>,
+    pub(super) plane: MirrorPlane,
+}
+
+/// An opaque box: its frame, its half extents.
+struct Block {
+    post_from_sensor: Pose,
+    half: Vector3<f64>,
+}
+
+/// Everything around the scanner, in the sensor frame of the drawing.
+pub(super) struct Obstacles {
+    pub(super) facets: Vec<Option<Face>>,
+    posts: Vec<Block>,
+}
+
+impl Face {
+    /// `None` if the corners span no plane.
+    pub(super) fn new(corners: Vec<Point3<f64>>) -> Option<Self> {
+        let normal = Unit::try_new(layout::area_vector(&corners), f64::MIN_POSITIVE)?;
+        let plane = MirrorPlane::through(*corners.first()?, normal);
+        Some(Self { corners, plane })
+    }
+
+    /// Whether a point of the plane lies inside the convex outline.
+    fn contains(&self, point: &Point3<f64>) -> bool {
+        let edges = self.corners.iter().zip(self.corners.iter().cycle().skip(1));
+        edges
+            .into_iter()
+            .all(|(a, b)| (b - a).cross(&(point - a)).dot(&self.plane.normal) >= 0.0)
+    }
+
+    /// Distance at which a beam meets the outline, from either side.
+    pub(super) fn distance(&self, u: &Unit<Vector3<f64>>) -> Option<f64> {
+        let d = self.plane.offset / self.plane.normal.dot(u);
+        (d.is_finite() && d > 0.0 && self.contains(&Point3::from(u.into_inner() * d))).then_some(d)
+    }
+
+    /// What the facet does to a beam that meets its reflecting side.
+    pub(super) fn deflect(&self, u: &Unit<Vector3<f64>>) -> Option<Deflection> {
+        self.distance(u)?;
+        self.plane.deflect(*u)
+    }
+}
+
+impl Block {
+    /// Distance at which a beam meets the box (slab method). From inside there is none: that post is reported by
+    /// itself, and what it would hide is not worth a word.
+    fn distance(&self, u: &Unit<Vector3<f64>>) -> Option<f64> {
+        let origin = self.post_from_sensor * Point3::origin();
+        let v = self.post_from_sensor * u.into_inner();
+        let (mut enter, mut leave) = (0.0_f64, f64::INFINITY);
+        for axis in 0..3 {
+            if v[axis] == 0.0 {
+                if origin[axis].abs() > self.half[axis] {
+                    return None;
+                }
+                continue;
+            }
+            let a = (-self.half[axis] - origin[axis]) / v[axis];
+            let b = (self.half[axis] - origin[axis]) / v[axis];
+            enter = enter.max(a.min(b));
+            leave = leave.min(a.max(b));
+        }
+        (enter > 0.0 && enter <= leave).then_some(enter)
+    }
+}
+
+impl Obstacles {
+    pub(super) fn of(scene: &Scene) -> Self {
+        let structure = &scene.superstructure;
+        let face = |shape| layout::corners(shape).and_then(Face::new);
+        let facets = structure.facet.iter().map(|f| face(&f.shape)).collect();
+        let posts = structure.post.iter().map(|post| {
+            let center = Vector3::from(post.center_mm) * 1e-3;
+            let turn = yaw_pitch_roll(post.yaw_deg.to_radians(), 0.0, 0.0);
+            Block {
+                post_from_sensor: Pose::from_parts(Translation3::from(center), turn).inverse(),
+                half: Vector3::from(post.size_mm) * 0.5e-3,
+            }
+        });
+        Self {
+            facets,
+            posts: posts.collect(),
+        }
+    }
+
+    /// What one beam meets first.
+    pub(super) fn met_by(&self, u: &Unit<Vector3<f64>>) -> Option<Meets> {
+        let facets = self.facets.iter().enumerate().filter_map(|(i, face)| {
+            let face = face.as_ref()?;
+            let side = if face.plane.normal.dot(u) < 0.0 {
+                Meets::Facet(i)
+            } else {
+                Meets::Back(i)
+            };
+            Some((face.distance(u)?, side))
+        });
+        let posts = self.posts.iter().enumerate();
+        let posts = posts.filter_map(|(i, post)| Some((post.distance(u)?, Meets::Post(i))));
+        facets
+            .chain(posts)
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, what)| what)
+    }
+
+    /// What every beam of a scan meets first.
+    pub(super) fn met_by_beams(&self) -> Vec<Option<Meets>> {
+        (0..beam::COUNT)
+            .map(|i| self.met_by(&beam::direction(beam::azimuth(i))))
+            .collect()
+    }
+
+    /// Whether the scanner's origin is inside a post.
+    pub(super) fn post_holds_origin(&self, post: usize) -> bool {
+        let block = &self.posts[post];
+        let origin = block.post_from_sensor * Point3::origin();
+        (0..3).all(|axis| origin[axis].abs() <= block.half[axis])
+    }
+}
+
+/// Where the drawing puts the sensor in the room.
+pub(super) fn nominal_room_from_sensor(scene: &Scene) -> Pose {
+    placement::room_from_rig(&scene.room) * structure::nominal_mount(scene)
+}

@@ -1,0 +1,341 @@
+//! Mirrors, posts and markers: whether each is a body, and whether light can reach it.
+
+use super::outline::{Face, Meets, Obstacles};
+use super::values::distinct;
+use super::{Findings, Path};
+use crate::layout;
+use crate::scene::{Facet, FacetShape, Marker, RectangleShape, Scene, Wedge};
+use catoptric_model::beam;
+use nalgebra::{Point3, Unit, Vector3};
+
+/// Corners nearer than this are one corner, and a polygon narrower than this is a line: no cutter is better.
+/// Corners that are written to 0.01 mm lie in a plane to within this.
+const CUTTING_ERROR_M: f64 = 1e-5;
+
+/// Markers nearer than this to one line do not fix the turn about it: cameras see a marker to some tenths of it.
+const MARKER_SPREAD_M: f64 = 1e-3;
+
+/// Half the field of view of the scan, in degrees.
+pub(super) const SCAN_HALF_DEG: f64 = 135.0;
+
+pub(super) fn check(scene: &Scene, found: &mut Findings) {
+    let structure = Path::of("superstructure");
+    let obstacles = Obstacles::of(scene);
+    let met = obstacles.met_by_beams();
+    for (i, facet) in scene.superstructure.facet.iter().enumerate() {
+        let path = structure.key("facet").index(i).key("shape");
+        let before = found.0.len();
+        match &facet.shape {
+            FacetShape::Wedge(wedge) => check_wedge(wedge, &path.key("wedge"), found),
+            FacetShape::Rectangle(shape) => check_rectangle(shape, &path.key("rectangle"), found),
+            FacetShape::Polygon(shape) => {
+                let corners = layout::corners(&facet.shape).unwrap_or_default();
+                let path = path.key("polygon").key("corners_mm");
+                if shape.corners_mm.len() >= 3 {
+                    check_polygon(&corners, &path, found);
+                }
+            }
+        }
+        // What light does at a facet that is none would only repeat what was said.
+        if found.0.len() == before
+            && let Some(face) = &obstacles.facets[i]
+        {
+            check_reach(scene, i, face, &met, found);
+        }
+    }
+    for (i, post) in scene.superstructure.post.iter().enumerate() {
+        if obstacles.post_holds_origin(i) {
+            found.add(
+                &structure.key("post").index(i).key("center_mm"),
+                format_args!(
+                    "puts post {:?} over the origin of the scanner; no beam could leave",
+                    post.name
+                ),
+                None,
+            );
+        }
+    }
+    let path = structure.key("marker");
+    check_markers(&scene.superstructure.marker, &path, "the rig", found);
+    for (i, board) in scene.board.iter().enumerate() {
+        // Without any, the laboratory puts five markers itself.
+        if !board.marker.is_empty() {
+            let path = Path::of("board").index(i).key("marker");
+            check_markers(&board.marker, &path, &format!("board {:?}", board.name), found);
+        }
+    }
+}
+
+fn check_wedge(wedge: &Wedge, path: &Path, found: &mut Findings) {
+    let [first, last] = wedge.azimuth_deg;
+    let azimuths = path.key("azimuth_deg");
+    if first >= last {
+        found.add(
+            &azimuths,
+            format_args!("runs from {first}° to {last}°; the smaller azimuth comes first"),
+            (first > last).then(|| format!("write [{last}, {first}]")),
+        );
+        return;
+    }
+    if first.abs().max(last.abs()) > SCAN_HALF_DEG {
+        found.add(
+            &azimuths,
+            format_args!(
+                "is [{first}, {last}]°; the scan reaches from -{SCAN_HALF_DEG}° to {SCAN_HALF_DEG}°"
+            ),
+            "a mirror behind the scanner would get no light".to_owned(),
+        );
+        return;
+    }
+    if last - first < beam::STEP.to_degrees() {
+        let radians = last.abs().max(first.abs()) <= std::f64::consts::PI;
+        let in_degrees = || {
+            let [a, b] = [first, last].map(|v| rounded(v.to_degrees()));
+            format!("angles are in degrees; if these were radians, write [{a}, {b}]")
+        };
+        found.add(
+            &azimuths,
+            format_args!(
+                "spans {}°; a mirror needs at least the {}° between two beams",
+                rounded(last - first),
+                beam::STEP.to_degrees()
+            ),
+            radians.then(in_degrees),
+        );
+        return;
+    }
+    if layout::corners(&FacetShape::Wedge(wedge.clone())).is_none() {
+        let middle = 0.5 * (first + last);
+        let u = beam::direction(middle.to_radians());
+        let v = beam::spherical(
+            wedge.exit_azimuth_deg.to_radians(),
+            wedge.exit_elevation_deg.to_radians(),
+        );
+        let turn = beam::angle_between(&u, &v).to_degrees();
+        found.add(
+            path,
+            format_args!(
+                "describes no mirror: turning the beam at {middle}° by {}° takes a plane that not all beams \
+                 from {first}° to {last}° meet",
+                rounded(turn)
+            ),
+            "turn the beam farther, narrow azimuth_deg or lower height_mm".to_owned(),
+        );
+    }
+}
+
+fn check_rectangle(shape: &RectangleShape, path: &Path, found: &mut Findings) {
+    let Some(corners) = layout::corners(&FacetShape::Rectangle(shape.clone())) else {
+        let path = path.key("normal");
+        found.add(
+            &path,
+            "has length 0; a normal of any other length is allowed",
+            None,
+        );
+        return;
+    };
+    let help = "turn the normal round: it points from the mirror towards the scanner's side";
+    check_side(&corners, &path.key("normal"), help, found);
+}
+
+fn check_polygon(corners: &[Point3<f64>], path: &Path, found: &mut Findings) {
+    let count = distinct_points(corners);
+    if count < 3 {
+        found.add(
+            path,
+            format_args!("has {count} different corners; at least 3 are needed"),
+            None,
+        );
+        return;
+    }
+    if spread(corners) < CUTTING_ERROR_M {
+        found.add(
+            path,
+            format_args!(
+                "lists {} corners on one line; a mirror needs corners that span a plane",
+                corners.len()
+            ),
+            "move at least one corner off the line".to_owned(),
+        );
+        return;
+    }
+    let area = layout::area_vector(corners);
+    // The two lobes of a bow tie cancel; what rounding leaves of them has no direction.
+    let Some(normal) = Unit::try_new(area, CUTTING_ERROR_M * spread(corners)) else {
+        found.add(
+            path,
+            "crosses itself; list the corners in order around the mirror",
+            None,
+        );
+        return;
+    };
+    let center = corners.iter().map(|c| c.coords).sum::<Vector3<f64>>() / corners.len() as f64;
+    let off_plane = |c: &Point3<f64>| normal.dot(&(c.coords - center)).abs();
+    let worst = corners.iter().map(off_plane).fold(0.0, f64::max);
+    if worst > CUTTING_ERROR_M {
+        found.add(
+            path,
+            format_args!(
+                "lists corners that are {} mm off one plane; {} mm is allowed",
+                rounded(worst * 1e3),
+                CUTTING_ERROR_M * 1e3
+            ),
+            "mirrors are plane; three corners always are".to_owned(),
+        );
+        return;
+    }
+    if let Some(corner) = outside_corner(corners, &normal) {
+        found.add(
+            &path.index(corner),
+            "makes the outline concave, or it is out of order; corners go round a convex polygon",
+            "a concave mirror is two convex facets".to_owned(),
+        );
+        return;
+    }
+    let help = "list the corners in the opposite order: counter-clockwise seen from the scanner's side";
+    check_side(corners, path, help, found);
+}
+
+/// A corner that makes the outline other than convex: one at which it turns the wrong way, or else one that is on the
+/// wrong side of some edge. There is neither in a convex polygon that goes round once.
+fn outside_corner(corners: &[Point3<f64>], normal: &Unit<Vector3<f64>>) -> Option<usize> {
+    let n = corners.len();
+    let outside = |corner: usize, edge: usize| {
+        let (a, b) = (corners[edge], corners[(edge + 1) % n]);
+        Unit::try_new(normal.cross(&(b - a)), CUTTING_ERROR_M)
+            .is_some_and(|inward| inward.dot(&(corners[corner] - a)) < -CUTTING_ERROR_M)
+    };
+    let turns_back = |c: &usize| outside((*c + 1) % n, (*c + n - 1) % n);
+    (0..n)
+        .find(turns_back)
+        .or_else(|| (0..n).find(|c| (0..n).any(|edge| outside(*c, edge))))
+}
+
+/// The scanner must be on the reflecting side.
+fn check_side(corners: &[Point3<f64>], path: &Path, help: &str, found: &mut Findings) {
+    let Some(face) = Face::new(corners.to_vec()) else {
+        return;
+    };
+    if face.plane.offset.abs() < CUTTING_ERROR_M {
+        found.add(
+            path,
+            "puts the mirror's plane through the origin of the scanner, which sees it edge-on",
+            "move the mirror off the origin".to_owned(),
+        );
+    } else if face.plane.offset > 0.0 {
+        found.add(
+            path,
+            "makes the reflecting side face away from the scanner",
+            help.to_owned(),
+        );
+    }
+}
+
+fn check_reach(scene: &Scene, index: usize, face: &Face, met: &[Option<Meets>], found: &mut Findings) {
+    if met.contains(&Some(Meets::Facet(index))) {
+        return;
+    }
+    let path = Path::of("superstructure").key("facet").index(index);
+    let name = |facet: &Facet| format!("{:?}", facet.name);
+    let reached: Vec<usize> = (0..beam::COUNT)
+        .filter(|i| face.distance(&beam::direction(beam::azimuth(*i))).is_some())
+        .collect();
+    if let Some(hider) = reached.iter().find_map(|i| met[*i]) {
+        let hider = match hider {
+            Meets::Facet(i) | Meets::Back(i) => {
+                format!("facet {}", name(&scene.superstructure.facet[i]))
+            }
+            Meets::Post(i) => format!("post {:?}", scene.superstructure.post[i].name),
+        };
+        let message = format!("gets no light: all its beams end at {hider} before they reach it");
+        found.add(&path, message, None);
+        return;
+    }
+    let (low, high) = extent(face.corners.iter().map(|c| c.z * 1e3));
+    if low > 0.0 || high < 0.0 {
+        found.add(
+            &path,
+            format_args!(
+                "is not reached by any beam: it lies between z = {} mm and {} mm, the scan plane is z = 0",
+                rounded(low),
+                rounded(high)
+            ),
+            None,
+        );
+        return;
+    }
+    let (low, high) = extent(face.corners.iter().map(|c| libm::atan2(c.y, c.x).to_degrees()));
+    found.add(
+        &path,
+        format_args!(
+            "is not reached by any beam: its corners are at azimuths {}° to {}°, the scan reaches from \
+             -{SCAN_HALF_DEG}° to {SCAN_HALF_DEG}° in steps of {}°",
+            rounded(low),
+            rounded(high),
+            beam::STEP.to_degrees()
+        ),
+        None,
+    );
+}
+
+fn check_markers(markers: &[Marker], path: &Path, body: &str, found: &mut Findings) {
+    distinct(path, markers.iter().map(|m| m.name.as_str()), found);
+    let points: Vec<Point3<f64>> = markers
+        .iter()
+        .map(|m| Point3::from(Vector3::from(m.position_mm) * 1e-3))
+        .collect();
+    if markers.len() < 3 {
+        found.add(
+            path,
+            format_args!("gives {body} {} markers; at least 3 are needed", markers.len()),
+            "three markers that are not on one line fix a pose; four or more survive a dropout".to_owned(),
+        );
+    } else if spread(&points) < MARKER_SPREAD_M {
+        found.add(
+            path,
+            format_args!(
+                "puts all markers of {body} within {} mm of one line; its turn about that line would not show",
+                MARKER_SPREAD_M * 1e3
+            ),
+            "move at least one marker off the line".to_owned(),
+        );
+    }
+}
+
+fn distinct_points(points: &[Point3<f64>]) -> usize {
+    let mut seen: Vec<&Point3<f64>> = Vec::new();
+    for p in points {
+        if seen.iter().all(|s| (*s - p).norm() > CUTTING_ERROR_M) {
+            seen.push(p);
+        }
+    }
+    seen.len()
+}
+
+/// Greatest distance of a point from the line through the two that are farthest apart, in metres.
+fn spread(points: &[Point3<f64>]) -> f64 {
+    let pairs = points
+        .iter()
+        .enumerate()
+        .flat_map(|(i, a)| points[..i].iter().map(move |b| (a, b)));
+    let longest = pairs.max_by(|x, y| (x.0 - x.1).norm().total_cmp(&(y.0 - y.1).norm()));
+    let line = longest.and_then(|(a, b)| Some((a, Unit::try_new(b - a, f64::MIN_POSITIVE)?)));
+    let Some((start, along)) = line else {
+        return 0.0;
+    };
+    points
+        .iter()
+        .map(|p| (p - start).cross(&along).norm())
+        .fold(0.0, f64::max)
+}
+
+fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+        (low.min(v), high.max(v))
+    })
+}
+
+/// Three decimals: as much as a message needs.
+pub(super) fn rounded(value: f64) -> f64 {
+    (value * 1e3).round() / 1e3
+}

@@ -1,0 +1,195 @@
+//! Names, colors, tables and pairs of limits.
+
+use super::{Findings, Path, suggestion};
+use crate::color;
+use crate::scene::{NoiseTable, Scene};
+use catoptric_model::dataset::RIG_SUBJECT;
+
+pub(super) fn check(scene: &Scene, found: &mut Findings) {
+    names(scene, found);
+    colors(scene, found);
+    tables(scene, found);
+    shares(scene, found);
+    let experiment = Path::of("experiment");
+    order(
+        &scene.experiment.tilt_deg,
+        &experiment.key("tilt_deg"),
+        "°",
+        found,
+    );
+    order(&scene.experiment.range_m, &experiment.key("range_m"), " m", found);
+}
+
+/// A name that is used twice says nothing about which one is meant.
+pub(super) fn distinct<'a>(list: &Path, names: impl Iterator<Item = &'a str>, found: &mut Findings) {
+    let mut seen: Vec<&str> = Vec::new();
+    for (i, name) in names.enumerate() {
+        let path = list.index(i).key("name");
+        if name.trim().is_empty() {
+            found.add(&path, "is empty; a name needs at least one letter", None);
+        } else if let Some(first) = seen.iter().position(|s| *s == name) {
+            found.add(
+                &path,
+                format_args!("is {name:?}, the name that `{list}[{first}]` has already"),
+                "every name may be used once".to_owned(),
+            );
+        }
+        seen.push(name);
+    }
+}
+
+fn names(scene: &Scene, found: &mut Findings) {
+    if scene.name.trim().is_empty() {
+        found.add(
+            &Path::of("name"),
+            "is empty; a name needs at least one letter",
+            None,
+        );
+    }
+    let structure = Path::of("superstructure");
+    let facets = &scene.superstructure.facet;
+    let posts = &scene.superstructure.post;
+    distinct(
+        &structure.key("facet"),
+        facets.iter().map(|f| f.name.as_str()),
+        found,
+    );
+    distinct(
+        &structure.key("post"),
+        posts.iter().map(|p| p.name.as_str()),
+        found,
+    );
+    let boards = Path::of("board");
+    distinct(&boards, scene.board.iter().map(|b| b.name.as_str()), found);
+    for (i, board) in scene.board.iter().enumerate() {
+        let path = boards.index(i).key("name");
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        if !board.name.chars().all(plain) {
+            found.add(
+                &path,
+                format_args!("is {:?}; letters, digits, `_` and `-` are allowed", board.name),
+                "the name becomes a topic of the recording, /mocap/NAME".to_owned(),
+            );
+        }
+        // "markers" is the topic of the labelled markers of all bodies.
+        if board.name == RIG_SUBJECT || board.name == "markers" {
+            found.add(
+                &path,
+                format_args!("is {:?}, which the recording needs for itself", board.name),
+                "choose another name".to_owned(),
+            );
+        }
+    }
+}
+
+fn colors(scene: &Scene, found: &mut Findings) {
+    let known: Vec<&str> = color::BUILT_IN
+        .into_iter()
+        .chain(scene.color.keys().map(String::as_str))
+        .collect();
+    let mut used = vec![(Path::of("room").key("color"), scene.room.color.as_str())];
+    for (i, post) in scene.superstructure.post.iter().enumerate() {
+        let path = Path::of("superstructure").key("post").index(i).key("color");
+        used.push((path, &post.color));
+    }
+    for (i, board) in scene.board.iter().enumerate() {
+        used.push((Path::of("board").index(i).key("color"), &board.color));
+    }
+    for name in scene.errors.color.keys() {
+        used.push((Path::of("errors").key("color").key(name), name));
+    }
+    for (path, name) in used {
+        if !known.contains(&name) {
+            let help = suggestion(name, "colors", known.iter().copied());
+            found.add(
+                &path,
+                format_args!("names the color {name:?}, which is neither built in nor under `color`"),
+                format!("{help}; a new one is a table [color.{name}] with its reflectivity"),
+            );
+        }
+    }
+}
+
+fn tables(scene: &Scene, found: &mut Findings) {
+    let errors = Path::of("errors");
+    let noise = |table: &NoiseTable, path: &Path, found: &mut Findings| {
+        columns(&table.range_m, &table.sd_mm, path, "sd_mm", found);
+    };
+    noise(&scene.errors.noise, &errors.key("noise"), found);
+    for (name, color) in &scene.color {
+        if let Some(table) = &color.noise {
+            noise(table, &Path::of("color").key(name).key("noise"), found);
+        }
+    }
+    let distance = &scene.errors.distance;
+    columns(
+        &distance.range_m,
+        &distance.error_mm,
+        &errors.key("distance"),
+        "error_mm",
+        found,
+    );
+}
+
+fn columns(range_m: &[f64], values: &[f64], path: &Path, column: &str, found: &mut Findings) {
+    if range_m.len() != values.len() {
+        found.add(
+            &path.key(column),
+            format_args!(
+                "has {} entries, `{path}.range_m` has {}",
+                values.len(),
+                range_m.len()
+            ),
+            "a table has one value for every distance".to_owned(),
+        );
+    }
+    let path = path.key("range_m");
+    for (i, pair) in range_m.windows(2).enumerate() {
+        if pair[1] <= pair[0] {
+            found.add(
+                &path.index(i + 1),
+                format_args!("is {} m, not more than the {} m before it", pair[1], pair[0]),
+                "distances must be strictly increasing".to_owned(),
+            );
+        }
+    }
+    if let Some(first) = range_m.first().filter(|r| **r < 0.0) {
+        found.add(
+            &path.index(0),
+            format_args!("is {first} m; a distance is 0 or more"),
+            None,
+        );
+    }
+}
+
+/// Shares of which none at all would leave nothing to detect.
+fn shares(scene: &Scene, found: &mut Findings) {
+    let light = Path::of("light");
+    for (path, value) in [
+        (light.key("optics_transmission"), scene.light.optics_transmission),
+        (light.key("air_transmission"), scene.light.air_transmission),
+        (
+            Path::of("detection").key("threshold_reflectivity"),
+            scene.detection.threshold_reflectivity,
+        ),
+    ] {
+        if value <= 0.0 {
+            found.add(
+                &path,
+                format_args!("is {value}; more than 0 and at most 1 is allowed"),
+                None,
+            );
+        }
+    }
+}
+
+fn order(limits: &[f64; 2], path: &Path, unit: &str, found: &mut Findings) {
+    let [least, greatest] = limits;
+    if least > greatest {
+        found.add(
+            path,
+            format_args!("runs from {least}{unit} down to {greatest}{unit}"),
+            format!("write the smaller one first: [{greatest}, {least}]"),
+        );
+    }
+}

@@ -1,0 +1,71 @@
+//! `catoptric apply`: from a stretch of scans and a calibration to a point cloud.
+
+use super::Context;
+use super::error::CliError;
+use super::files::read_calibration;
+use super::output::{counted, print};
+use catoptric::apply::{CloudFrame, apply};
+use catoptric::io;
+use catoptric::io::IoError;
+use catoptric::io::cloud::{CloudFormat, cloud_bytes};
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+/// Arguments of `apply`.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// The dataset.
+    dataset: PathBuf,
+    /// The calibration.
+    calibration: PathBuf,
+    /// The cloud to write; the name's end says how.
+    #[arg(long, value_name = "cloud.ply|cloud.pcd")]
+    out: PathBuf,
+    /// Frame of the points.
+    #[arg(long, value_enum, default_value_t = FrameName::Room)]
+    frame: FrameName,
+    /// The pose whose scans are taken; those of the empty room by default.
+    #[arg(long, value_name = "N")]
+    pose: Option<usize>,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum FrameName {
+    /// The laser base frame
+    Sensor,
+    /// The marker body on the superstructure
+    Rig,
+    /// The frame of motion capture
+    Room,
+}
+
+pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
+    let invalid = |message: String| CliError::Invalid { message, help: None };
+    let path = &arguments.out;
+    let format = CloudFormat::of_path(path).map_err(|e| invalid(e.to_string()))?;
+    let dataset = io::read_dataset(&arguments.dataset)?;
+    let calibration = read_calibration(&arguments.calibration)?;
+    let frame = match arguments.frame {
+        FrameName::Sensor => CloudFrame::Sensor,
+        FrameName::Rig => CloudFrame::Rig,
+        FrameName::Room => CloudFrame::Room,
+    };
+    let cloud = apply(&dataset, &calibration, arguments.pose, frame).map_err(|e| invalid(e.to_string()))?;
+    let bytes = cloud_bytes(format, &cloud).map_err(|e| IoError::write(path, e))?;
+    io::write_file(path, &bytes)?;
+    if cloud.mount_is_nominal {
+        context.say("the calibration has no mounting: the drawing's was taken");
+    }
+    print(&format!(
+        "wrote {}: {} in the {} frame, pose {}; left out: {} without a range, {} of {} without a direction\n\
+         next: open {} in a viewer such as CloudCompare or Open3D\n",
+        path.display(),
+        counted(cloud.points.len(), "point"),
+        frame.word(),
+        cloud.pose,
+        counted(cloud.without_range, "reading"),
+        cloud.without_direction,
+        counted(cloud.unsolved_elements, "element"),
+        path.display(),
+    ))
+}

@@ -1,0 +1,84 @@
+//! `catoptric calibrate`: from a dataset to a calibration. The truth is not looked at.
+
+use super::Context;
+use super::error::CliError;
+use super::interrupt;
+use super::output::{counted, print, quoted};
+use catoptric::calib::{self, JacobianForm, Method, Options};
+use catoptric::io;
+use catoptric::model::{Calibration, Status};
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Arguments of `calibrate`.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// The dataset.
+    dataset: PathBuf,
+    /// How the angles of an element are estimated.
+    #[arg(long, value_enum, default_value_t = MethodName::Beam)]
+    method: MethodName,
+    /// The calibration to write.
+    #[arg(long, value_name = "calibration.json")]
+    out: PathBuf,
+    /// How derivatives are formed; both end at the same answer.
+    #[arg(long, value_enum, default_value_t = JacobianName::Analytic)]
+    jacobian: JacobianName,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum MethodName {
+    /// All readings of an element at once, Eqs. 7 and 8
+    Beam,
+    /// One reading after the other, recursive least squares
+    Recursive,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum JacobianName {
+    /// By differentiating Eq. 6
+    Analytic,
+    /// By the central differences of Eq. 7
+    Central,
+}
+
+pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
+    let dataset = io::read_dataset(&arguments.dataset)?;
+    interrupt::check()?;
+    let method = match arguments.method {
+        MethodName::Beam => Method::Beam,
+        MethodName::Recursive => Method::Recursive,
+    };
+    let options = Options {
+        jacobian: match arguments.jacobian {
+            JacobianName::Analytic => JacobianForm::Analytic,
+            JacobianName::Central => JacobianForm::CentralDifference,
+        },
+        ..Options::default()
+    };
+    let begin = Instant::now();
+    let calibration = calib::calibrate(&dataset, method, &options)?;
+    interrupt::check()?;
+    context.detail(&format!("calibrated in {:.2} s", begin.elapsed().as_secs_f64()));
+    io::write_json(&arguments.out, &calibration)?;
+    print(&format!(
+        "wrote {}: {}\nnext: catoptric score {} {}\n",
+        arguments.out.display(),
+        summary(&calibration),
+        quoted(&arguments.dataset),
+        quoted(&arguments.out)
+    ))
+}
+
+/// "481 beams solved, 550 direct, …": how many elements have each status.
+pub(crate) fn summary(calibration: &Calibration) -> String {
+    let count = |status| calibration.beams.iter().filter(|b| b.status == status).count();
+    let mut parts = vec![format!("{} solved", counted(count(Status::Solved), "beam"))];
+    for status in Status::ALL {
+        if status != Status::Solved && count(status) > 0 {
+            parts.push(format!("{} {}", count(status), status.word().replace('_', " ")));
+        }
+    }
+    parts.join(", ")
+}

@@ -1,0 +1,76 @@
+//! `catoptric check`: whether a scene can be simulated, and how large the experiment will be.
+
+use super::Context;
+use super::error::CliError;
+use super::output::{counted, print, quoted};
+use catoptric::io::scene;
+use catoptric::model::beam;
+use catoptric::sim::Laboratory;
+use catoptric::sim::check::{Outline, outline};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `check`.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// The scene, TOML or JSON.
+    scene: PathBuf,
+    /// Change a value first: experiment.scans_per_pose=20, superstructure.facet.0.name=left.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+}
+
+pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
+    let scene = scene::load(&arguments.scene, &arguments.set)?;
+    let outline = outline(&scene);
+    // Setting the experiment up finds what no single value shows: a board that fits nowhere.
+    let laboratory = Laboratory::new(&scene, scene.seed)?;
+    // The bare structure and the empty room are stretches without a board.
+    let poses = laboratory.stretches().saturating_sub(2);
+    let mut text = format!(
+        "ok: {}: {}{}, {}, {}, {}, {}\n",
+        scene.name,
+        counted(outline.facets.len(), "facet"),
+        served(&outline),
+        counted(scene.board.len(), "board"),
+        counted(poses, "pose"),
+        counted(laboratory.scans(), "scan"),
+        counted(laboratory.scans() * beam::COUNT, "reading"),
+    );
+    if context.global.verbose > 0 {
+        for facet in &outline.facets {
+            text.push_str(&format!("  {}: {}\n", facet.name, counted(facet.beams, "beam")));
+        }
+        text.push_str(&format!(
+            "  undeflected: {}\n",
+            counted(outline.direct_beams, "beam")
+        ));
+        text.push_str(&format!(
+            "  blocked: {}\n",
+            counted(outline.blocked_beams, "beam")
+        ));
+    }
+    let sets: String = arguments
+        .set
+        .iter()
+        .map(|s| format!(" --set {}", quoted(s.as_ref())))
+        .collect();
+    let stem = arguments.scene.file_stem().unwrap_or(arguments.scene.as_os_str());
+    let dataset = format!("{}-dataset", stem.to_string_lossy());
+    text.push_str(&format!(
+        "next: catoptric simulate {} --out {}{sets}\n",
+        quoted(&arguments.scene),
+        quoted(dataset.as_ref()),
+    ));
+    print(&text)
+}
+
+/// How many beams the drawing sends to each facet.
+fn served(outline: &Outline) -> String {
+    let beams = || outline.facets.iter().map(|f| f.beams);
+    match (beams().min(), beams().max()) {
+        (Some(least), Some(most)) if least == most => format!(" of {}", counted(least, "beam")),
+        (Some(least), Some(most)) => format!(" of {least} to {}", counted(most, "beam")),
+        _ => String::new(),
+    }
+}

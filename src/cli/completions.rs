@@ -1,0 +1,20 @@
+//! `catoptric completions`: what a shell needs to complete the command line.
+
+use super::Cli;
+use super::error::CliError;
+use super::output::print;
+use clap::{Args, CommandFactory};
+use clap_complete::Shell;
+
+/// Arguments of `completions`.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// The shell.
+    shell: Shell,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut Cli::command(), "catoptric", &mut script);
+    print(&String::from_utf8_lossy(&script))
+}

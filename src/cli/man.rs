@@ -1,0 +1,32 @@
+//! `catoptric man`: the manual pages.
+
+use super::Cli;
+use super::error::CliError;
+use super::output::print;
+use clap::{Args, CommandFactory};
+use std::path::PathBuf;
+
+/// Arguments of `man`.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// Write the pages of all verbs into this folder instead of printing the first one.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
+    let Some(folder) = &arguments.out else {
+        let mut page = Vec::new();
+        clap_mangen::Man::new(Cli::command())
+            .render(&mut page)
+            .map_err(CliError::Output)?;
+        return print(&String::from_utf8_lossy(&page));
+    };
+    let write_error = |source| CliError::Write {
+        path: folder.clone(),
+        source,
+    };
+    std::fs::create_dir_all(folder).map_err(write_error)?;
+    clap_mangen::generate_to(Cli::command(), folder).map_err(write_error)?;
+    print(&format!("wrote the manual pages to {}\n", folder.display()))
+}

@@ -1,0 +1,144 @@
+//! The command line: its arguments, and one file for each verb.
+
+mod apply;
+mod calibrate;
+mod check;
+mod completions;
+mod demo;
+mod error;
+mod files;
+mod interrupt;
+mod man;
+mod new;
+mod output;
+mod progress;
+mod report;
+mod schema;
+mod score;
+mod simulate;
+mod validate;
+
+use clap::{ArgAction, Args, Parser, Subcommand};
+use error::CliError;
+use std::io::Write;
+use std::process::ExitCode;
+
+/// Said at the end of every help.
+const EXIT_CODES: &str = "Exit codes: 0 ok · 1 the verdict is \"not good enough\" · 2 usage or invalid input · \
+                          3 input/output · 130 interrupted";
+
+/// Simulator and calibration testbed for 2D LiDARs that see in 3D through mirrors.
+#[derive(Debug, Parser)]
+#[command(name = "catoptric", version, after_help = EXIT_CODES, arg_required_else_help = true)]
+struct Cli {
+    #[command(flatten)]
+    global: Global,
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+/// Options of every verb.
+#[derive(Debug, Clone, Args)]
+struct Global {
+    /// Threads to compute with; all of the machine's by default. Changes speed, never results.
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// Say more on stderr.
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    verbose: u8,
+    /// Say nothing on stderr but errors.
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// The whole story on the built-in scene: simulate, calibrate, score, report
+    Demo(demo::Arguments),
+    /// Write a commented scene to start from
+    New(new::Arguments),
+    /// Read a scene and say everything that is wrong with it
+    Check(check::Arguments),
+    /// Simulate an experiment and write what it would have recorded
+    Simulate(simulate::Arguments),
+    /// Estimate where every mirrored beam goes
+    Calibrate(calibrate::Arguments),
+    /// Say whether a calibration is well formed and physically sane
+    Validate(validate::Arguments),
+    /// Compare a calibration with the truth, or, without one, with boards and walls
+    Score(score::Arguments),
+    /// Turn a scan into a point cloud
+    Apply(apply::Arguments),
+    /// Write a page to read about calibrations and their scores
+    Report(report::Arguments),
+    /// Print the JSON Schema of scenes
+    Schema,
+    /// Print completions for a shell
+    Completions(completions::Arguments),
+    /// Print the manual page, or write all of them
+    Man(man::Arguments),
+}
+
+/// What every verb is given beside its own arguments.
+#[derive(Debug)]
+struct Context {
+    global: Global,
+}
+
+impl Context {
+    /// Says something on stderr, unless asked to be quiet.
+    fn say(&self, text: &str) {
+        if !self.global.quiet {
+            // With stderr closed there is nobody left to tell.
+            let _ = writeln!(anstream::stderr(), "{text}");
+        }
+    }
+
+    /// Says more, for those who asked for it.
+    fn detail(&self, text: &str) {
+        if self.global.verbose > 0 {
+            self.say(text);
+        }
+    }
+}
+
+/// Runs the program.
+pub(crate) fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help on a closed pipe has nobody to read it; there is nothing to add.
+            let _ = error.print();
+            return u8::try_from(error.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from);
+        }
+    };
+    match run(cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => error.report(),
+    }
+}
+
+fn run(cli: Cli) -> Result<(), CliError> {
+    interrupt::install();
+    let context = Context { global: cli.global };
+    if let Some(threads) = context.global.threads {
+        // Fails only if a pool exists already, and this is the first statement that could make one.
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
+        pool.build_global()
+            .map_err(|e| CliError::Output(std::io::Error::other(e)))?;
+    }
+    match cli.verb {
+        Verb::Demo(arguments) => demo::run(&arguments, &context),
+        Verb::Simulate(arguments) => simulate::run(&arguments, &context),
+        Verb::Calibrate(arguments) => calibrate::run(&arguments, &context),
+        Verb::Validate(arguments) => validate::run(&arguments),
+        Verb::Score(arguments) => score::run(&arguments, &context),
+        Verb::Apply(arguments) => apply::run(&arguments, &context),
+        Verb::Report(arguments) => report::run(&arguments, &context),
+        Verb::New(arguments) => new::run(&arguments),
+        Verb::Check(arguments) => check::run(&arguments, &context),
+        Verb::Schema => schema::run(),
+        Verb::Completions(arguments) => completions::run(&arguments),
+        Verb::Man(arguments) => man::run(&arguments),
+    }
+}

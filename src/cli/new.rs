@@ -1,0 +1,71 @@
+//! `catoptric new`: a commented scene to start from.
+
+use super::error::CliError;
+use super::output::{print, quoted};
+use catoptric::io::scene::{self, Layout};
+use clap::{Args, ValueEnum};
+use std::fs::OpenOptions;
+use std::io::{ErrorKind, Write};
+use std::path::PathBuf;
+
+/// Arguments of `new`.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// The file to write; it must not exist.
+    #[arg(value_name = "NAME.toml")]
+    name: PathBuf,
+    /// The mirrors to start from.
+    #[arg(long, value_enum, default_value_t = LayoutName::Prototype)]
+    layout: LayoutName,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum LayoutName {
+    /// Eight facets around the scanner
+    Prototype,
+    /// Two mirrors beside a 270° scanner
+    TwoMirror,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
+    let path = &arguments.name;
+    if path.extension().is_none_or(|e| e != "toml") {
+        return Err(CliError::Invalid {
+            message: format!(
+                "{} does not end in .toml, which scenes are written in",
+                path.display()
+            ),
+            help: Some(format!("catoptric new {}", quoted(&path.with_extension("toml")))),
+        });
+    }
+    let text = scene::scene_template(match arguments.layout {
+        LayoutName::Prototype => Layout::Prototype,
+        LayoutName::TwoMirror => Layout::TwoMirror,
+    });
+    // `create_new` leaves no moment in which another program's file could be overwritten.
+    let file = OpenOptions::new().write(true).create_new(true).open(path);
+    let mut file = file.map_err(|source| match source.kind() {
+        ErrorKind::AlreadyExists => CliError::Invalid {
+            message: format!("{} exists already and is left as it is", path.display()),
+            help: Some("choose another name, or remove the file first".to_owned()),
+        },
+        _ => CliError::Write {
+            path: path.clone(),
+            source,
+        },
+    })?;
+    let written = file.write_all(text.as_bytes()).and_then(|()| file.sync_all());
+    if let Err(source) = written {
+        // Half a scene is worse than none.
+        let _ = std::fs::remove_file(path);
+        return Err(CliError::Write {
+            path: path.clone(),
+            source,
+        });
+    }
+    print(&format!(
+        "wrote {}\nnext: catoptric check {}\n",
+        path.display(),
+        quoted(path)
+    ))
+}

@@ -1,0 +1,54 @@
+//! `catoptric report`: one page to read about calibrations and their scores.
+
+use super::Context;
+use super::error::CliError;
+use super::files::{read_calibration, read_truth};
+use super::interrupt;
+use super::output::print;
+use catoptric::apply::{CloudFrame, apply};
+use catoptric::io;
+use catoptric::score::score;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `report`.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// The dataset.
+    dataset: PathBuf,
+    /// The calibrations; the fans of the first are drawn.
+    #[arg(required = true)]
+    calibrations: Vec<PathBuf>,
+    /// The page to write.
+    #[arg(long, value_name = "report.html")]
+    out: PathBuf,
+}
+
+pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
+    let dataset = io::read_dataset(&arguments.dataset)?;
+    let truth = read_truth(&arguments.dataset)?;
+    let mut results = Vec::new();
+    for path in &arguments.calibrations {
+        interrupt::check()?;
+        let calibration = read_calibration(path)?;
+        let result = score(&dataset, &calibration, truth.as_ref());
+        results.push((calibration, result));
+    }
+    let cloud = results
+        .first()
+        .map(|(calibration, _)| apply(&dataset, calibration, None, CloudFrame::Room));
+    let cloud = match cloud {
+        Some(Ok(cloud)) => Some(cloud),
+        Some(Err(error)) => {
+            context.say(&format!("without a cloud: {error}"));
+            None
+        }
+        None => None,
+    };
+    let html = catoptric::report::report(&dataset, truth.as_ref(), &results, cloud.as_ref());
+    io::write_file(&arguments.out, html.as_bytes())?;
+    print(&format!(
+        "wrote {path}\nnext: open {path} in a browser\n",
+        path = arguments.out.display()
+    ))
+}

@@ -1,0 +1,9 @@
+//! `catoptric schema`: the JSON Schema of scenes, for editors.
+
+use super::error::CliError;
+use super::output::print;
+use catoptric::io::scene;
+
+pub(crate) fn run() -> Result<(), CliError> {
+    print(&format!("{:#}\n", scene::json_schema()))
+}

@@ -1,0 +1,140 @@
+//! `catoptric score`: a calibration against the truth; on blind data, against boards and walls.
+
+use super::Context;
+use super::error::CliError;
+use super::files::{read_calibration, read_truth};
+use super::output::{print, quoted};
+use catoptric::io;
+use catoptric::score::{Score, Verdict, score};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `score`.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// The dataset.
+    dataset: PathBuf,
+    /// The calibration.
+    calibration: PathBuf,
+    /// Fail if the per-axis error is greater than this, in degrees.
+    #[arg(long, value_name = "X", value_parser = positive)]
+    max_rms_deg: Option<f64>,
+    /// Print the score as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("a number greater than 0 is needed".to_owned()),
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
+    let dataset = io::read_dataset(&arguments.dataset)?;
+    let truth = read_truth(&arguments.dataset)?;
+    let calibration = read_calibration(&arguments.calibration)?;
+    let mut result = score(&dataset, &calibration, truth.as_ref());
+    if let Some(limit) = arguments.max_rms_deg {
+        result = result.with_limit(limit);
+    }
+    if arguments.json {
+        let json = serde_json::to_string_pretty(&result).map_err(|e| CliError::Output(e.into()))?;
+        print(&format!("{json}\n"))?;
+        for warning in &result.warnings {
+            context.detail(warning);
+        }
+    } else {
+        print(&format!(
+            "{}next: catoptric report {} {} --out report.html\n",
+            words(&result),
+            quoted(&arguments.dataset),
+            quoted(&arguments.calibration)
+        ))?;
+    }
+    match result.verdict {
+        Verdict::Pass | Verdict::Blind => Ok(()),
+        Verdict::Fail => {
+            let reason = result.warnings.first().cloned().unwrap_or_default();
+            Err(CliError::Verdict(format!("not good enough: {reason}")))
+        }
+    }
+}
+
+/// A score in a few lines.
+fn words(score: &Score) -> String {
+    let verdict = match score.verdict {
+        Verdict::Pass => "pass",
+        Verdict::Fail => "fail",
+        Verdict::Blind => "blind",
+    };
+    let mut text = format!("{verdict}: method {}\n", score.method);
+    let mut line = |name: &str, value: String| text.push_str(&format!("  {name:<22}{value}\n"));
+    let beams = &score.beams;
+    line(
+        "elements",
+        match (beams.deflected, beams.missed, beams.wrong) {
+            (Some(deflected), Some(missed), Some(wrong)) => format!(
+                "{deflected} deflected: {} solved, {} abstained, {missed} missed; {wrong} false",
+                beams.solved, beams.abstained
+            ),
+            _ => format!("{} solved, {} abstained", beams.solved, beams.abstained),
+        },
+    );
+    for (name, residual) in [("boards", &score.boards_mm), ("walls", &score.walls_mm)] {
+        line(
+            name,
+            format!("{} rms from point to plane", figure(residual.rms, 2, " mm")),
+        );
+    }
+    if score.verdict != Verdict::Blind {
+        against_truth(score, &mut line);
+    }
+    for warning in &score.warnings {
+        text.push_str(&format!("  {warning}\n"));
+    }
+    text
+}
+
+/// The figures that take a truth.
+fn against_truth(score: &Score, line: &mut impl FnMut(&str, String)) {
+    line("direction, per axis", degrees(score.per_axis_rms_deg));
+    line("  best possible", degrees(score.crlb_per_axis_deg));
+    line("  common to all", degrees(score.common_mode_deg));
+    line("  in the room", degrees(score.per_axis_rms_room_deg));
+    line(
+        "distance",
+        format!("{} rms", figure(score.distance_mm.rms, 2, " mm")),
+    );
+    line(
+        "point",
+        format!(
+            "{} at 1 m, {} at 4 m, {} at 10 m",
+            figure(score.point_mm.at_1m, 1, " mm"),
+            figure(score.point_mm.at_4m, 1, " mm"),
+            figure(score.point_mm.at_10m, 1, " mm")
+        ),
+    );
+    line(
+        "stated covariance",
+        format!(
+            "mean NEES {}, {} inside the 95 % ellipse",
+            figure(score.nees_mean, 2, ""),
+            figure(100.0 * score.coverage_95, 1, " %")
+        ),
+    );
+}
+
+fn degrees(value: f64) -> String {
+    format!("{} rms", figure(value, 4, "°"))
+}
+
+/// A number for people; a dash where there is none.
+pub(crate) fn figure(value: f64, decimals: usize, unit: &str) -> String {
+    if value.is_finite() {
+        format!("{value:.decimals$}{unit}")
+    } else {
+        "–".to_owned()
+    }
+}

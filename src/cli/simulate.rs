@@ -1,0 +1,267 @@
+//! `catoptric simulate`: from a scene to a dataset.
+
+use super::Context;
+use super::error::CliError;
+use super::interrupt;
+use super::output::{counted, print, quoted};
+use super::progress::Progress;
+use catoptric::io::{self, DatasetWriter, IoError, Provenance, dataset, scene};
+use catoptric::model::{Stretch, beam};
+use catoptric::sim::laboratory::Returns;
+use catoptric::sim::optics::Role;
+use catoptric::sim::{Laboratory, Scene, SimError, noise};
+use clap::Args;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Stretches in flight for every thread: enough that none waits for the writer, few enough to stay in memory.
+const WINDOW_PER_THREAD: usize = 2;
+
+/// Arguments of `simulate`.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// The scene, TOML or JSON.
+    scene: PathBuf,
+    /// The folder to write.
+    #[arg(long, value_name = "DATASET")]
+    out: PathBuf,
+    /// Seed of every random draw, instead of the scene's.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Change a value first: experiment.scans_per_pose=20, superstructure.facet.0.name=left.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Print figures of the run as JSON.
+    #[arg(long)]
+    json: bool,
+    /// Replace a dataset that is there already.
+    #[arg(long)]
+    replace: bool,
+    /// Write also what every beam met, truth/returns.csv.
+    #[arg(long)]
+    returns: bool,
+}
+
+/// Figures of a run: what `simulate --json` prints.
+#[derive(Debug, Default, Serialize)]
+pub(crate) struct Figures {
+    pub(crate) scans: usize,
+    pub(crate) beams: usize,
+    pub(crate) sub_rays: usize,
+    /// Straight pieces of sub-rays, counted by the way of each beam's first echo.
+    pub(crate) segments: usize,
+    pub(crate) build_s: f64,
+    /// Summed over threads, as is `sample_s`.
+    pub(crate) trace_s: f64,
+    pub(crate) sample_s: f64,
+    pub(crate) write_s: f64,
+    pub(crate) bytes: u64,
+    pub(crate) threads: usize,
+}
+
+/// What is to be written, and where.
+pub(crate) struct Recording<'a> {
+    /// The scene with its final seed.
+    pub(crate) scene: &'a Scene,
+    /// The command in canonical form, for the manifest.
+    pub(crate) command_line: String,
+    /// The dataset's folder.
+    pub(crate) out: &'a Path,
+    /// Whether a dataset there may be replaced.
+    pub(crate) replace: bool,
+    /// Whether the truth about every return is written as well.
+    pub(crate) returns: bool,
+}
+
+pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
+    let mut scene = scene::load(&arguments.scene, &arguments.set)?;
+    scene.seed = arguments.seed.unwrap_or(scene.seed);
+    let figures = record(
+        &Recording {
+            scene: &scene,
+            command_line: command_line(arguments, scene.seed),
+            out: &arguments.out,
+            replace: arguments.replace,
+            returns: arguments.returns,
+        },
+        context,
+    )?;
+    if arguments.json {
+        let json = serde_json::to_string(&figures).map_err(|e| CliError::Output(e.into()))?;
+        return print(&format!("{json}\n"));
+    }
+    let out = quoted(&arguments.out);
+    print(&format!(
+        "wrote {}: {} of {}, seed {}\nnext: catoptric calibrate {out} --out calibration.json\n",
+        arguments.out.display(),
+        counted(figures.scans, "scan"),
+        counted(figures.beams, "beam"),
+        scene.seed,
+    ))
+}
+
+/// The command without what differs between machines and changes nothing: folders, threads, what is printed.
+fn command_line(arguments: &Arguments, seed: u64) -> String {
+    let scene = arguments.scene.file_name().unwrap_or(arguments.scene.as_os_str());
+    let mut line = format!("catoptric simulate {} --seed {seed}", quoted(scene.as_ref()));
+    for set in &arguments.set {
+        line.push_str(&format!(" --set {}", quoted(set.as_ref())));
+    }
+    if arguments.returns {
+        line.push_str(" --returns");
+    }
+    line
+}
+
+/// Simulates an experiment and writes its dataset: stretches are computed in parallel and written in order.
+pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Figures, CliError> {
+    let begin = Instant::now();
+    let laboratory = Laboratory::new(recording.scene, recording.scene.seed)?;
+    let (session, truth) = (laboratory.session()?, laboratory.truth()?);
+    let mut figures = Figures {
+        scans: laboratory.scans(),
+        beams: beam::COUNT,
+        sub_rays: laboratory.sub_rays(),
+        build_s: begin.elapsed().as_secs_f64(),
+        threads: rayon::current_num_threads(),
+        ..Figures::default()
+    };
+    let mut write_time = Duration::ZERO;
+    let mut timed = |work: &mut dyn FnMut() -> Result<(), CliError>| {
+        let begin = Instant::now();
+        let result = work();
+        write_time += begin.elapsed();
+        result
+    };
+    let mut writer = DatasetWriter::create(recording.out, recording.replace, &session)?;
+    let resolved = scene::to_toml(recording.scene)
+        .map_err(|e| IoError::content(recording.out.join(dataset::SCENE), e.to_string()))?;
+    writer.write_scene(&resolved)?;
+    writer.write_truth(&truth)?;
+    let mut rows = match recording.returns {
+        true => Some(writer.open_file(dataset::RETURNS)?),
+        false => None,
+    };
+    let returns_path = recording.out.join(dataset::RETURNS);
+    if let Some(rows) = &mut rows {
+        rows.write_all(RETURNS_HEADER.as_bytes())
+            .map_err(|e| IoError::write(&returns_path, e))?;
+    }
+    let mut progress = Progress::new(context, "simulating", laboratory.stretches());
+    let all: Vec<usize> = (0..laboratory.stretches()).collect();
+    for window in all.chunks(WINDOW_PER_THREAD * figures.threads) {
+        interrupt::check()?;
+        let recorded: Vec<Recorded> = window
+            .par_iter()
+            .map(|number| Recorded::of(&laboratory, *number))
+            .collect::<Result<_, SimError>>()?;
+        for (number, recorded) in window.iter().zip(&recorded) {
+            figures.trace_s += recorded.trace.as_secs_f64();
+            figures.sample_s += recorded.sample.as_secs_f64();
+            figures.segments += figures.sub_rays * segments(&recorded.returns);
+            timed(&mut || {
+                writer.write_stretch(&recorded.stretch)?;
+                if let Some(rows) = &mut rows {
+                    let text = rows_of(*number, &recorded.returns, recording.scene);
+                    rows.write_all(text.as_bytes())
+                        .map_err(|e| IoError::write(&returns_path, e))?;
+                }
+                Ok(())
+            })?;
+        }
+        progress.advance(window.len());
+    }
+    drop(progress);
+    interrupt::check()?;
+    let finish = Instant::now();
+    if let Some(rows) = rows {
+        rows.finish()?;
+    }
+    let manifest = writer.finish(Provenance {
+        seed: recording.scene.seed,
+        command_line: recording.command_line.clone(),
+        rng_rule: noise::RULE.to_owned(),
+    })?;
+    figures.write_s = (write_time + finish.elapsed()).as_secs_f64();
+    let names = manifest.files.keys().map(String::as_str);
+    for name in names.chain([dataset::MANIFEST]) {
+        let path = recording.out.join(name);
+        let file = std::fs::metadata(&path).map_err(|e| io::IoError::read(&path, e))?;
+        figures.bytes += file.len();
+    }
+    context.detail(&format!(
+        "built in {:.2} s, traced in {:.2} s, sampled in {:.2} s, written in {:.2} s",
+        figures.build_s, figures.trace_s, figures.sample_s, figures.write_s
+    ));
+    Ok(figures)
+}
+
+/// A stretch, what it was made from, and how long that took.
+struct Recorded {
+    returns: Returns,
+    stretch: Stretch,
+    trace: Duration,
+    sample: Duration,
+}
+
+impl Recorded {
+    fn of(laboratory: &Laboratory, number: usize) -> Result<Self, SimError> {
+        let begin = Instant::now();
+        let returns = laboratory.returns(number)?;
+        let trace = begin.elapsed();
+        let stretch = laboratory.record(number, &returns);
+        Ok(Self {
+            returns,
+            stretch,
+            trace,
+            sample: begin.elapsed() - trace,
+        })
+    }
+}
+
+fn segments(returns: &Returns) -> usize {
+    let pieces = |r: &Option<_>| {
+        r.as_ref()
+            .map_or(1, |r: &catoptric::sim::reading::Return| r.facets.len() + 1)
+    };
+    returns.iter().map(pieces).sum()
+}
+
+/// First line of truth/returns.csv. A reading is geometric + mixed + detection + the three biases + the drift of its
+/// pose + noise, rounded; a beam without an echo has no row.
+const RETURNS_HEADER: &str = "pose,beam,surface,facets,geometric_m,cos_incidence,power_w,share,mixed_m,detection_m,\
+                              distance_bias_m,angle_bias_m,color_bias_m,noise_sd_m\n";
+
+fn rows_of(pose: usize, returns: &Returns, scene: &Scene) -> String {
+    let name = |facet: &usize| scene.superstructure.facet[*facet].name.as_str();
+    let mut text = String::new();
+    for (beam, found) in returns.iter().enumerate() {
+        let Some(r) = found else { continue };
+        let surface = match r.role {
+            Role::Facet(_) => "facet",
+            Role::Structure => "structure",
+            Role::Board => "board",
+            Role::Wall => "wall",
+        };
+        let facets: Vec<&str> = r.facets.iter().map(name).collect();
+        // Names of facets are free text: a comma or a quote in one must not end the field.
+        let facets = format!("\"{}\"", facets.join(">").replace('"', "\"\""));
+        text.push_str(&format!(
+            "{pose},{beam},{surface},{facets},{},{},{},{},{},{},{},{},{},{}\n",
+            r.geometric,
+            r.cos_incidence,
+            r.power,
+            r.share,
+            r.mixed,
+            r.detection,
+            r.bias.distance,
+            r.bias.angle,
+            r.bias.color,
+            r.noise_sd,
+        ));
+    }
+    text
+}

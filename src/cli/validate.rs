@@ -1,0 +1,43 @@
+//! `catoptric validate`: whether a calibration, whoever wrote it, is well formed and physically sane.
+
+use super::calibrate::summary;
+use super::error::CliError;
+use super::output::{counted, print, quoted};
+use catoptric::io;
+use catoptric::model::Calibration;
+use catoptric::validate::{Severity, validate};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `validate`.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// The calibration.
+    calibration: PathBuf,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
+    let path = &arguments.calibration;
+    let calibration: Calibration = io::read_json(path)?;
+    let problems = validate(&calibration);
+    let errors = problems.iter().filter(|p| p.severity == Severity::Error).count();
+    if errors > 0 {
+        let list: Vec<String> = problems.iter().map(|p| format!("  {p}")).collect();
+        return Err(CliError::Invalid {
+            message: format!(
+                "{}: {}\n{}",
+                path.display(),
+                counted(errors, "error"),
+                list.join("\n")
+            ),
+            help: None,
+        });
+    }
+    let mut text = String::new();
+    for problem in &problems {
+        text.push_str(&format!("{problem}\n"));
+    }
+    text.push_str(&format!("ok: {}: {}\n", path.display(), summary(&calibration)));
+    text.push_str(&format!("next: catoptric score DATASET {}\n", quoted(path)));
+    print(&text)
+}

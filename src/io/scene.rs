@@ -1,0 +1,248 @@
+//! Scene files: TOML for people, JSON for programs, both through the same types.
+//!
+//! A scene is read in three steps, and every problem of the first step that finds any is reported: the format
+//! against the schema, then the sense of it ([`catoptric_sim::check`]).
+
+use super::diagnostic::{Diagnostic, Diagnostics, Place, position};
+use super::format;
+use super::tree::{self, Node, Source};
+use catoptric_sim::Scene;
+use catoptric_sim::check::{self, Problem};
+use std::path::{Path, PathBuf};
+
+/// Why there is no scene.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneErrors {
+    /// The file could not be read.
+    #[error("cannot read {}: {source}{}", path.display(), help.as_ref().map(|h| format!("\nhelp: {h}")).unwrap_or_default())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+        /// What to do about it.
+        help: Option<String>,
+    },
+    /// The scene is not valid.
+    #[error(transparent)]
+    Invalid(Box<Diagnostics>),
+}
+
+/// Published layouts that are built in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Layout {
+    /// Eight facets around the scanner, after Cooper's Figure 5.
+    Prototype,
+    /// Two mirrors beside a 270° scanner.
+    TwoMirror,
+}
+
+/// A commented scene to start from.
+pub fn scene_template(layout: Layout) -> &'static str {
+    match layout {
+        Layout::Prototype => include_str!("../../scenes/prototype.toml"),
+        Layout::TwoMirror => include_str!("../../scenes/two-mirror.toml"),
+    }
+}
+
+/// Reads a scene and changes it by `KEY=VALUE` arguments.
+///
+/// # Errors
+/// [`SceneErrors`]: the file cannot be read, or everything that is wrong with it.
+pub fn load(path: &Path, sets: &[String]) -> Result<Scene, SceneErrors> {
+    let bytes = std::fs::read(path).map_err(|source| SceneErrors::Read {
+        help: similar_file(path, &source),
+        path: path.to_owned(),
+        source,
+    })?;
+    let name = path.display().to_string();
+    match String::from_utf8(bytes) {
+        Ok(text) => parse(&text, &name, sets),
+        Err(error) => {
+            let valid = error.utf8_error().valid_up_to();
+            let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
+            let (line, column) = position(&text, valid);
+            Err(invalid(
+                &name,
+                &text,
+                vec![Diagnostic {
+                    place: Place::Position(line, column),
+                    message: "the file is not UTF-8 text".to_owned(),
+                    help: None,
+                }],
+            ))
+        }
+    }
+}
+
+/// Reads a scene from its text; a file name that ends in .json means JSON.
+///
+/// ```
+/// use catoptric::io::scene::{self, SceneErrors};
+/// let text = "schema_version = 1\nnaem = \"mine\"\n";
+/// let Err(SceneErrors::Invalid(problems)) = scene::parse(text, "mine.toml", &[]) else {
+///     panic!("it lacks nearly everything");
+/// };
+/// let typo = problems.list.iter().find(|p| p.message.contains("`naem`")).expect("it is listed");
+/// assert_eq!(problems.position(typo), Some((2, 1)));
+/// assert_eq!(typo.help.as_deref(), Some("did you mean `name`?"));
+/// ```
+///
+/// # Errors
+/// [`SceneErrors::Invalid`] with everything that is wrong.
+pub fn parse(text: &str, file_name: &str, sets: &[String]) -> Result<Scene, SceneErrors> {
+    let is_json = Path::new(file_name)
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    let (file, mut list) = if is_json {
+        match tree::from_json(text) {
+            Ok(node) => (node, Vec::new()),
+            Err(diagnostic) => return Err(invalid(file_name, text, vec![diagnostic])),
+        }
+    } else {
+        tree::from_toml(text)
+    };
+    let mut root = file.clone();
+    for (number, argument) in sets.iter().enumerate() {
+        if let Err(message) = tree::apply_set(&mut root, argument, number) {
+            list.push(Diagnostic {
+                place: Place::Set(argument.clone()),
+                message,
+                help: None,
+            });
+        }
+    }
+    list.extend(departures(&root, text, sets, &list));
+    if !list.is_empty() {
+        return Err(invalid(file_name, text, list));
+    }
+    let scene: Scene = match serde_json::from_value(root.to_json()) {
+        Ok(scene) => scene,
+        // The schema is generated from the type, so this is a difference between the two.
+        Err(error) => {
+            let diagnostic = Diagnostic {
+                place: Place::Key(String::new()),
+                message: error.to_string(),
+                help: None,
+            };
+            return Err(invalid(file_name, text, vec![diagnostic]));
+        }
+    };
+    let problems = check::problems(&scene);
+    if problems.is_empty() {
+        return Ok(scene);
+    }
+    let of_file = problems_without_sets(&file, sets);
+    let diagnostics = problems
+        .into_iter()
+        .map(|p| locate(p, &root, sets, of_file.as_deref()))
+        .collect();
+    Err(invalid(file_name, text, diagnostics))
+}
+
+/// The scene as TOML, with every default written out; it reads back as the same scene.
+///
+/// # Errors
+/// A number that TOML cannot hold.
+pub fn to_toml(scene: &Scene) -> Result<String, toml::ser::Error> {
+    toml::to_string(scene)
+}
+
+/// JSON Schema of a scene.
+pub fn json_schema() -> serde_json::Value {
+    schemars::schema_for!(Scene).to_value()
+}
+
+/// Departures from the schema that a syntax error does not explain.
+fn departures(root: &Node, text: &str, sets: &[String], syntax: &[Diagnostic]) -> Vec<Diagnostic> {
+    let broken_lines: Vec<usize> = syntax
+        .iter()
+        .filter_map(|d| match &d.place {
+            Place::Span(span) => Some(position(text, span.start).0),
+            _ => None,
+        })
+        .collect();
+    let explained = |finding: &format::Finding| match &finding.source {
+        Source::File(span) => {
+            !broken_lines.is_empty()
+                && (finding.missing || broken_lines.contains(&position(text, span.start).0))
+        }
+        _ => false,
+    };
+    let findings = format::check(root, &json_schema());
+    findings
+        .into_iter()
+        .filter(|f| !explained(f))
+        .map(|f| Diagnostic {
+            place: place(&f.source, &f.path.to_string(), sets),
+            message: f.message,
+            help: f.help,
+        })
+        .collect()
+}
+
+/// What is wrong with the file by itself; `None` if it has no sense by itself.
+fn problems_without_sets(file: &Node, sets: &[String]) -> Option<Vec<Problem>> {
+    if sets.is_empty() {
+        return None;
+    }
+    let scene: Scene = serde_json::from_value(file.to_json()).ok()?;
+    Some(check::problems(&scene))
+}
+
+/// The place of a problem: the `--set` that caused it, else where the value is written.
+fn locate(problem: Problem, root: &Node, sets: &[String], of_file: Option<&[Problem]>) -> Diagnostic {
+    let node = root.nearest(&problem.path);
+    let in_file = of_file.is_some_and(|list| list.contains(&problem));
+    let set = match (node.set_within(), sets) {
+        _ if in_file => None,
+        (Some(number), _) => Some(number),
+        // The file has no such problem, so the only argument there is has made it.
+        (None, [_]) if of_file.is_some() => Some(0),
+        (None, _) => None,
+    };
+    let source = set.map_or(node.source.clone(), Source::Set);
+    Diagnostic {
+        place: place(&source, &problem.path.to_string(), sets),
+        message: problem.message,
+        help: problem.help,
+    }
+}
+
+fn place(source: &Source, key: &str, sets: &[String]) -> Place {
+    match source {
+        Source::File(span) => Place::Span(span.clone()),
+        Source::Set(number) => Place::Set(sets[*number].clone()),
+        Source::Unknown => Place::Key(key.to_owned()),
+    }
+}
+
+fn invalid(file: &str, text: &str, mut list: Vec<Diagnostic>) -> SceneErrors {
+    list.sort_by_key(|d| match &d.place {
+        Place::Span(span) => (0, span.start),
+        Place::Position(line, _) => (0, *line),
+        Place::Key(_) => (1, 0),
+        Place::Set(_) => (2, 0),
+    });
+    SceneErrors::Invalid(Box::new(Diagnostics {
+        file: file.to_owned(),
+        text: text.to_owned(),
+        list,
+    }))
+}
+
+/// The file beside a missing one that was probably meant.
+fn similar_file(path: &Path, error: &std::io::Error) -> Option<String> {
+    if error.kind() != std::io::ErrorKind::NotFound {
+        return None;
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    let entries = std::fs::read_dir(folder.unwrap_or(Path::new("."))).ok()?;
+    let names: Vec<String> = entries
+        .filter_map(|e| e.ok()?.file_name().into_string().ok())
+        .collect();
+    let wanted = path.file_name()?.to_str()?;
+    let name = check::nearest(wanted, names.iter().map(String::as_str))?;
+    let name = folder.map_or(PathBuf::from(name), |f| f.join(name));
+    Some(format!("did you mean {}?", name.display()))
+}

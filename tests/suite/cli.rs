@@ -1,0 +1,214 @@
+//! Every verb: exit code, messages, files.
+
+use crate::common::{VALID, catoptric, folder_with, run, stderr, stdout};
+use std::io::Read;
+use std::process::Stdio;
+
+#[test]
+fn new_writes_a_scene_that_check_accepts() {
+    let folder = tempfile::tempdir().unwrap();
+    for layout in ["prototype", "two-mirror"] {
+        let name = format!("{layout}.toml");
+        let output = run(folder.path(), &["new", &name, "--layout", layout]);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        assert_eq!(
+            stdout(&output),
+            format!("wrote {name}\nnext: catoptric check {name}\n")
+        );
+        let text = std::fs::read_to_string(folder.path().join(&name)).unwrap();
+        assert!(
+            text.contains(&format!("name = \"{layout}\"")) && text.contains("# "),
+            "{text}"
+        );
+        let output = run(folder.path(), &["check", &name]);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn new_leaves_an_existing_file_as_it_is() {
+    let (folder, path) = folder_with("mine");
+    let output = run(folder.path(), &["new", "scene.toml"]);
+    assert_eq!(output.status.code(), Some(2));
+    let said = stderr(&output);
+    assert!(
+        said.contains("scene.toml exists already") && said.contains("help: "),
+        "{said}"
+    );
+    assert_eq!(std::fs::read_to_string(path).unwrap(), "mine");
+}
+
+#[test]
+fn new_says_where_it_cannot_write() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), &["new", "no/such/folder/scene.toml"]);
+    assert_eq!(output.status.code(), Some(3));
+    assert!(
+        stderr(&output).contains("cannot write no/such/folder/scene.toml"),
+        "{}",
+        stderr(&output)
+    );
+    let output = run(folder.path(), &["new", "scene.txt"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        stderr(&output).contains("catoptric new scene.toml"),
+        "{}",
+        stderr(&output)
+    );
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn check_tells_the_size_of_the_experiment() {
+    let (folder, _) = folder_with(VALID);
+    let output = run(folder.path(), &["check", "scene.toml"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let said = stdout(&output);
+    let mut lines = said.lines();
+    let first = lines.next().unwrap();
+    assert!(first.starts_with("ok: small: 3 facets of "), "{first}");
+    // Two poses of 10 scans, 100 scans of the room and 100 of the bare structure, 1081 beams each.
+    assert!(
+        first.ends_with(", 1 board, 2 poses, 220 scans, 237 820 readings"),
+        "{first}"
+    );
+    assert_eq!(
+        lines.next(),
+        Some("next: catoptric simulate scene.toml --out scene-dataset")
+    );
+    let output = run(
+        folder.path(),
+        &["check", "scene.toml", "--set", "experiment.scans_per_pose=20"],
+    );
+    assert!(stdout(&output).contains(" 240 scans,"), "{}", stdout(&output));
+    assert!(
+        stdout(&output).ends_with(" --set 'experiment.scans_per_pose=20'\n"),
+        "{}",
+        stdout(&output)
+    );
+    let output = run(folder.path(), &["-v", "check", "scene.toml"]);
+    // 15° in steps of 0.25°; the beams along the two cut edges may fall on either side.
+    let beams: usize = stdout(&output)
+        .lines()
+        .find_map(|l| l.strip_prefix("  wedge: ")?.strip_suffix(" beams")?.parse().ok())
+        .unwrap();
+    assert!((59..=61).contains(&beams), "{beams}");
+}
+
+#[test]
+fn a_wrong_command_line_ends_with_2() {
+    let folder = tempfile::tempdir().unwrap();
+    for arguments in [
+        &["frobnicate"][..],
+        &["check"],
+        &["check", "--frob"],
+        &["--threads", "0", "schema"],
+        &["-v", "-q", "schema"],
+        &["completions", "klingon"],
+        &["new", "a.toml", "--layout", "hexagon"],
+    ] {
+        let output = run(folder.path(), arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(
+            output.stdout.is_empty() && !output.stderr.is_empty(),
+            "{arguments:?}"
+        );
+    }
+    // A slip of the pen is told its neighbour.
+    assert!(stderr(&run(folder.path(), &["chekc"])).contains("check"));
+}
+
+#[test]
+fn help_and_version_are_data() {
+    let folder = tempfile::tempdir().unwrap();
+    let help = run(folder.path(), &["--help"]);
+    assert_eq!(help.status.code(), Some(0));
+    assert!(stdout(&help).contains("Exit codes:"));
+    let version = run(folder.path(), &["--version"]);
+    assert_eq!(
+        stdout(&version),
+        concat!("catoptric ", env!("CARGO_PKG_VERSION"), "\n")
+    );
+}
+
+#[test]
+fn the_schema_describes_every_key_of_a_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), &["schema"]);
+    assert_eq!(output.status.code(), Some(0));
+    let schema: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let scene = catoptric::io::scene::parse(VALID, "scene.toml", &[]).unwrap();
+    let keys = serde_json::to_value(&scene).unwrap();
+    for key in keys.as_object().unwrap().keys() {
+        assert!(schema["properties"][key]["description"].is_string(), "{key}");
+    }
+    assert_eq!(schema["additionalProperties"], false);
+    assert_eq!(
+        schema["$defs"]["Wedge"]["properties"]["azimuth_deg"]["maxItems"],
+        2
+    );
+}
+
+#[test]
+fn completions_and_manual_pages_know_the_verbs() {
+    let folder = tempfile::tempdir().unwrap();
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let output = run(folder.path(), &["completions", shell]);
+        assert_eq!(output.status.code(), Some(0));
+        assert!(stdout(&output).contains("check"), "{shell}");
+    }
+    let output = run(folder.path(), &["man"]);
+    assert!(stdout(&output).contains(".TH catoptric 1"));
+    let output = run(folder.path(), &["man", "--out", "pages"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(folder.path().join("pages/catoptric-check.1").is_file());
+}
+
+#[test]
+fn a_closed_pipe_ends_quietly() {
+    for arguments in [&["schema"][..], &["completions", "bash"], &["man"], &["--help"]] {
+        let child = catoptric()
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn();
+        let mut child = child.unwrap();
+        // Like `| head -c 1`; what does not fit the pipe meets a closed end.
+        let mut pipe = child.stdout.take().unwrap();
+        pipe.read_exact(&mut [0]).unwrap();
+        drop(pipe);
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{arguments:?}: {}",
+            stderr(&output)
+        );
+        assert_eq!(stderr(&output), "", "{arguments:?}");
+    }
+    // A pipe whose reader was never there: the first byte meets the closed end already.
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let output = catoptric()
+        .arg("schema")
+        .stdout(writer)
+        .stderr(Stdio::piped())
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    assert_eq!(stderr(&output), "");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_an_output_error() {
+    let full = std::fs::File::create("/dev/full").unwrap();
+    let output = catoptric()
+        .arg("schema")
+        .stdout(full)
+        .stderr(Stdio::piped())
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(3));
+    assert!(stderr(&output).starts_with("error: "), "{}", stderr(&output));
+}
