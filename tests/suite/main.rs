@@ -6,6 +6,7 @@ mod cli;
 mod closure;
 mod common;
 mod determinism;
+mod paper;
 mod physics;
 mod pipeline;
 mod scenes;

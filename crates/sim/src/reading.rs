@@ -242,11 +242,25 @@ impl Sensor {
                 part.chief = Some((path.length, cos_incidence));
             }
         }
+        if self.sub_rays.iter().all(|s| s.wide != 0.0 || s.narrow != 0.0) {
+            Self::add_chief(&mut parts, &self.chief_path(setting, beam));
+        }
         for part in parts.iter_mut().filter(|p| p.power > 0.0) {
             part.mean_range /= part.power;
             part.mean_cos /= part.power;
         }
         parts
+    }
+
+    /// Lends the chief ray's range to the part it falls on, where the bundle itself holds no chief ray.
+    fn add_chief(parts: &mut [Part], path: &Path) {
+        if let End::Hit(hit) = path.end
+            && let Some(part) = parts
+                .iter_mut()
+                .find(|p| p.surface == hit.surface && p.facets[..p.count] == *path.facets())
+        {
+            part.chief = Some((path.length, hit.normal.dot(&path.last.direction).abs()));
+        }
     }
 
     /// The part that dominates the first echo, the shift that the others cause, and the detector's own.

@@ -243,3 +243,35 @@ fn parts(scene: &Scene, sensor_from_drawing: &Pose) -> Vec<Part> {
     }
     parts
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_surface_is_as_uneven_as_it_is_said_to_be() {
+        let corners = [(-0.02, -0.01), (0.02, -0.01), (0.02, 0.01), (-0.02, 0.01)];
+        let corners = corners.map(|(x, y)| Point3::new(x, y, 0.0)).to_vec();
+        let face = Polygon::new(corners).expect("it has an area");
+        let slope = Slope::new(&face, 0.5e-3, &mut Draws::new(3, Purpose::FacetSlope, 0));
+        let facet = BuiltFacet {
+            name: String::new(),
+            backing: face.clone(),
+            face,
+            slope,
+        };
+        // Over the square around the facet's circle, on which the root mean square is defined.
+        let extent = libm::hypot(0.02, 0.01);
+        let n = 200;
+        let at = |i: i32| extent * (2.0 * (f64::from(i) + 0.5) / f64::from(n) - 1.0);
+        let slopes = (0..n).flat_map(|i| (0..n).map(move |j| Point3::new(at(i), at(j), 0.0)));
+        let square = slopes.map(|p| {
+            let normal = facet.normal_at(&p);
+            0.5 * (normal.x * normal.x + normal.y * normal.y)
+        });
+        let rms = (square.sum::<f64>() / f64::from(n * n)).sqrt();
+        // The definition's own grid of 21 × 21 is coarser: 7 % at most for a cubic.
+        assert!((rms / 0.5e-3 - 1.0).abs() < 0.07 && rms != 0.0, "{rms}");
+        assert!((facet.normal_at(&Point3::origin()).z - 1.0).abs() < 1e-15);
+    }
+}

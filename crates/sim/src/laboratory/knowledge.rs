@@ -1,0 +1,213 @@
+//! What the experimenter knows: the drawing, the surveys, and what steps 1 and 3 found out.
+
+use super::{Laboratory, room};
+use crate::error::SimError;
+use crate::noise::{Draws, Purpose};
+use crate::optics::{Mirrors, Setting};
+use crate::placement;
+use crate::scanner;
+use crate::scene::{ErrorModel, Marker, Scene};
+use crate::structure::{self, Structure};
+use catoptric_model::session::{self, Session};
+use catoptric_model::{PoseData, PoseKind, RangeBias, beam};
+use nalgebra::{Unit, Vector3};
+
+/// Bare readings beyond this are not of the structure, in metres.
+const FARTHEST_STRUCTURE: f64 = 0.3;
+
+/// How many beams beyond the drawn ones a bare distance is still noted for: as built, the edges move.
+const NEAR_FACET: usize = 12;
+
+impl Laboratory {
+    /// What the experimenter knows.
+    ///
+    /// # Errors
+    /// As [`Laboratory::returns`]: the bare structure is measured here.
+    pub fn session(&self) -> Result<Session, SimError> {
+        let scene = &self.scene;
+        let mount = &scene.scanner.mount;
+        // The standard deviation of a uniform error is its limit over √3.
+        let sd = |limit: f64| limit / 3.0_f64.sqrt();
+        let tilt = sd(mount.tilt_tolerance_deg);
+        let [x, y, z] = scene.room.size_m;
+        Ok(Session {
+            schema_version: session::SCHEMA_VERSION,
+            name: scene.name.clone(),
+            scanner: session::ScannerSheet {
+                preset: scene.scanner.preset.name().to_owned(),
+                beams: beam::COUNT,
+                step_deg: 0.25,
+                scan_rate_hz: scanner::SCAN_RATE_HZ,
+                range_min_m: scanner::RANGE_MIN_M,
+                range_max_m: scanner::RANGE_MAX_M,
+                divergence_full_mrad: scene.scanner.beam_shape().wide_full_mrad,
+            },
+            nominal_rig_from_sensor: PoseData::from(&structure::nominal_mount(scene)),
+            mount_tolerance: session::MountTolerance {
+                rotation_sd_deg: [tilt, tilt, sd(mount.yaw_tolerance_deg)],
+                translation_sd_mm: [sd(mount.shift_tolerance_mm); 3],
+            },
+            room: session::RoomSurvey {
+                min_m: [-0.5 * x, -0.5 * y, 0.0],
+                max_m: [0.5 * x, 0.5 * y, z],
+                color: scene.room.color.clone(),
+            },
+            believed: self.beliefs(),
+            bare_structure: self.bare_structure()?,
+            rig_markers: known_markers(&scene.superstructure.marker),
+            facets: self.nominal_facets()?,
+            boards: scene
+                .board
+                .iter()
+                .map(|b| session::BoardSheet {
+                    name: b.name.clone(),
+                    width_mm: b.width_mm,
+                    height_mm: b.height_mm,
+                    color: b.color.clone(),
+                    markers: known_markers(&room::board_markers(b)),
+                })
+                .collect(),
+        })
+    }
+
+    fn beliefs(&self) -> session::Beliefs {
+        let errors = &self.scene.errors;
+        let known = &self.scene.characterization;
+        let perfect = errors.model == ErrorModel::None;
+        let unless_perfect = |value: f64| if perfect { 0.0 } else { value };
+        let biased = matches!(errors.model, ErrorModel::Empirical | ErrorModel::Both);
+        let if_biased = |value: f64| if biased { value } else { 0.0 };
+        let noise = &errors.noise.sd_mm;
+        session::Beliefs {
+            range_noise_sd_mm: unless_perfect(noise.iter().sum::<f64>() / noise.len().max(1) as f64),
+            drift_sd_mm: unless_perfect(errors.drift_sd_mm),
+            marker_sd_mm: self.scene.mocap.profile.errors().constant.norm() / 3.0_f64.sqrt() * 1e3,
+            bias: self.believed.clone(),
+            distance_bias_sd_mm: if_biased(known.distance_sd_mm),
+            angle_gain_sd_mm: if_biased(known.angle_gain_sd_mm),
+            color_bias_sd_mm: if_biased(known.color_sd_mm),
+        }
+    }
+
+    fn nominal_facets(&self) -> Result<Vec<session::NominalFacet>, SimError> {
+        let nominal = Structure::nominal(&self.scene)?;
+        let setting = Setting::new(&self.scene, &nominal, Mirrors::Attached, Vec::new())?;
+        let paths: Vec<_> = (0..beam::COUNT)
+            .map(|b| self.sensor.chief_path(&setting, b))
+            .collect();
+        let served = placement::served_beams(&paths, nominal.facets.len());
+        Ok(nominal
+            .facets
+            .iter()
+            .zip(served)
+            .filter_map(|(facet, beams)| {
+                Some(session::NominalFacet {
+                    name: facet.name.clone(),
+                    corners_mm: facet
+                        .face
+                        .corners
+                        .iter()
+                        .map(|c| (c.coords * 1e3).into())
+                        .collect(),
+                    beams: beams?,
+                })
+            })
+            .collect())
+    }
+
+    /// Step 3: mean ranges to the bare structure, corrected with the incidence that the drawing gives.
+    fn bare_structure(&self) -> Result<session::BareStructure, SimError> {
+        let thickness = self.scene.superstructure.mirror.thickness_mm;
+        let facet_normals = self.drawn_normals()?;
+        let number = self.planned.iter().position(|p| p.kind == PoseKind::Bare);
+        let stretch = number.map(|number| self.stretch(number)).transpose()?;
+        let record = stretch.and_then(|s| s.into_record().ok());
+        let summaries = record.map(|r| r.summarize()).unwrap_or_default();
+        let mut distance_m = vec![0.0; beam::COUNT];
+        let mut variance: f64 = 0.0;
+        for (beam, summary) in summaries.iter().enumerate() {
+            let Some(normal) = facet_normals[beam] else {
+                continue;
+            };
+            if summary.count == 0 || summary.mean > FARTHEST_STRUCTURE {
+                continue;
+            }
+            let cos = normal.dot(&beam::direction(beam::azimuth(beam))).abs();
+            distance_m[beam] = summary.mean - self.believed.terms(summary.mean, cos, "structure").total();
+            variance = variance.max(self.bare_variance(summary.count, cos));
+        }
+        Ok(session::BareStructure {
+            mirror_thickness_mm: thickness,
+            distance_sd_mm: variance.sqrt() * 1e3,
+            first_beam: 0,
+            distance_m,
+        })
+    }
+
+    /// For every beam, the drawn normal of the facet that serves it or is nearest to it within a few beams.
+    fn drawn_normals(&self) -> Result<Vec<Option<Unit<Vector3<f64>>>>, SimError> {
+        let facets = self.nominal_facets()?;
+        let away = |f: &session::NominalFacet, beam: usize| {
+            f.beams[0]
+                .saturating_sub(beam)
+                .max(beam.saturating_sub(f.beams[1]))
+        };
+        let nearest = |beam| {
+            facets
+                .iter()
+                .min_by_key(|f| away(f, beam))
+                .filter(|f| away(f, beam) <= NEAR_FACET)
+        };
+        Ok((0..beam::COUNT)
+            .map(|beam| Some(nearest(beam)?.plane()?.normal))
+            .collect())
+    }
+
+    /// Variance that the experimenter ascribes to a bare distance, in square metres.
+    fn bare_variance(&self, readings: usize, cos: f64) -> f64 {
+        let believed = self.beliefs();
+        let tilt = self.scene.superstructure.as_built.tilt_sd_deg.to_radians();
+        let sin = (1.0 - cos * cos).max(0.0).sqrt();
+        let terms = [
+            believed.range_noise_sd_mm / (readings as f64).sqrt(),
+            believed.drift_sd_mm,
+            believed.distance_bias_sd_mm,
+            believed.color_bias_sd_mm,
+            believed.angle_gain_sd_mm * (1.0 - cos),
+            believed.bias.angle.gain_mm * sin * tilt,
+        ];
+        terms.iter().map(|mm| mm * mm * 1e-6).sum()
+    }
+}
+
+/// The biases as step 1 found them: the true ones, missed by the characterization's uncertainty.
+pub(super) fn believed_bias(scene: &Scene, seed: u64, truth: &RangeBias) -> RangeBias {
+    let mut believed = truth.clone();
+    if *truth == RangeBias::default() {
+        return believed;
+    }
+    let known = &scene.characterization;
+    let mut draws = Draws::new(seed, Purpose::Characterization, 0);
+    for error in &mut believed.distance.error_mm {
+        *error += known.distance_sd_mm * draws.normal();
+    }
+    draws.seek(1 << 20);
+    let gain = known.angle_gain_sd_mm * draws.normal();
+    believed.angle.gain_mm += gain;
+    believed.angle.offset_mm -= gain;
+    for (column, color) in believed.color.values_mut().enumerate() {
+        draws.seek((1 << 21) + column as u64);
+        color.offset_mm += known.color_sd_mm * draws.normal();
+    }
+    believed
+}
+
+fn known_markers(markers: &[Marker]) -> Vec<session::Marker> {
+    markers
+        .iter()
+        .map(|m| session::Marker {
+            name: m.name.clone(),
+            position_mm: m.position_mm,
+        })
+        .collect()
+}

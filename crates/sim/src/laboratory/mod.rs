@@ -1,0 +1,292 @@
+//! The virtual laboratory: a scene and a seed become stretches of scans, the session, and the truth.
+//!
+//! Every stretch is a pure function of (scene, seed, number), so that they can be computed in any order.
+
+mod knowledge;
+mod room;
+mod truth;
+
+pub use room::board_markers;
+
+use crate::cast::Polygon;
+use crate::color;
+use crate::error::SimError;
+use crate::mocap::{self, Body};
+use crate::noise::{Draws, Purpose};
+use crate::optics::{Mirrors, Role, Setting, Target};
+use crate::placement::{self, Planned};
+use crate::reading::{Return, Sensor};
+use crate::scanner;
+use crate::scene::{ErrorModel, Scene};
+use crate::structure::Structure;
+use catoptric_model::dataset::RIG_SUBJECT;
+use catoptric_model::{Dataset, Pose, PoseKind, PoseLabel, RangeBias, Stretch, beam};
+use nalgebra::{Point3, Translation3, UnitQuaternion};
+use rayon::prelude::*;
+
+/// A scene ready to be recorded.
+pub struct Laboratory {
+    scene: Scene,
+    seed: u64,
+    sensor: Sensor,
+    structure: Structure,
+    planned: Vec<Planned>,
+    /// Where each planned board really stands, in the room frame.
+    boards: Vec<Option<Pose>>,
+    /// What step 1 believes the biases to be.
+    believed: RangeBias,
+}
+
+/// What a beam met during a stretch, free of chance; `None` without an echo.
+pub type Returns = Vec<Option<Return>>;
+
+impl Laboratory {
+    /// Builds the structure, sets up the procedure.
+    ///
+    /// # Errors
+    /// A facet without a shape, an unknown color, a board that fits nowhere.
+    pub fn new(scene: &Scene, seed: u64) -> Result<Self, SimError> {
+        let sensor = Sensor::new(scene)?;
+        let planned = placement::plan(scene, &sensor)?;
+        let boards = planned
+            .iter()
+            .enumerate()
+            .map(|(i, p)| Some(misplaced(scene, seed, i, &p.board?.1)))
+            .collect();
+        let laboratory = Self {
+            seed,
+            structure: Structure::as_built(scene, seed)?,
+            believed: knowledge::believed_bias(scene, seed, sensor.bias()),
+            scene: scene.clone(),
+            sensor,
+            planned,
+            boards,
+        };
+        laboratory.check_markers()?;
+        Ok(laboratory)
+    }
+
+    fn check_markers(&self) -> Result<(), SimError> {
+        let spans = |template: &[Point3<f64>]| {
+            let all: Vec<_> = template.iter().copied().map(Some).collect();
+            mocap::solve_pose(template, &all).is_some()
+        };
+        if !spans(&room::points(&self.scene.superstructure.marker)) {
+            return Err(SimError::Markers {
+                body: RIG_SUBJECT.to_owned(),
+            });
+        }
+        match self
+            .scene
+            .board
+            .iter()
+            .find(|b| !spans(&room::points(&board_markers(b))))
+        {
+            Some(board) => Err(SimError::Markers {
+                body: board.name.clone(),
+            }),
+            None => Ok(()),
+        }
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Number of stretches.
+    pub fn stretches(&self) -> usize {
+        self.planned.len()
+    }
+
+    /// Scans of all stretches together.
+    pub fn scans(&self) -> usize {
+        self.planned.iter().map(|p| p.scans).sum()
+    }
+
+    /// Sub-rays of a beam.
+    pub fn sub_rays(&self) -> usize {
+        self.sensor.sub_rays()
+    }
+
+    fn room_from_sensor(&self) -> Pose {
+        placement::room_from_rig(&self.scene.room) * self.structure.rig_from_sensor
+    }
+
+    /// Drift of a stretch, in metres.
+    fn drift(&self, number: usize) -> f64 {
+        if self.scene.errors.model == ErrorModel::None {
+            return 0.0;
+        }
+        let mut draws = Draws::new(self.seed, Purpose::Drift, number as u64);
+        draws.normal() * self.scene.errors.drift_sd_mm * 1e-3
+    }
+
+    /// Walls and the stretch's board, in the sensor frame.
+    fn targets(&self, number: usize) -> Result<Vec<Target>, SimError> {
+        let sensor_from_room = self.room_from_sensor().inverse();
+        let wall_paint = color::paint(&self.scene, &self.scene.room.color)?;
+        let polygon =
+            |corners: Vec<Point3<f64>>| Polygon::new(corners.iter().map(|c| sensor_from_room * c).collect());
+        let walls = room::walls(&self.scene).into_iter().filter_map(polygon);
+        let mut targets: Vec<Target> = walls
+            .map(|polygon| Target {
+                polygon,
+                role: Role::Wall,
+                paint: wall_paint.clone(),
+            })
+            .collect();
+        if let (Some((board, _)), Some(room_from_board)) = (&self.planned[number].board, &self.boards[number])
+        {
+            let board = &self.scene.board[*board];
+            let corners = room::outline(board)
+                .corners()
+                .iter()
+                .map(|c| room_from_board * c)
+                .collect();
+            if let Some(polygon) = polygon(corners) {
+                targets.push(Target {
+                    polygon,
+                    role: Role::Board,
+                    paint: color::paint(&self.scene, &board.color)?,
+                });
+            }
+        }
+        Ok(targets)
+    }
+
+    /// What every beam meets during a stretch: traced once, since nothing moves.
+    ///
+    /// # Errors
+    /// An unknown color.
+    pub fn returns(&self, number: usize) -> Result<Returns, SimError> {
+        let mirrors = if self.planned[number].kind == PoseKind::Bare {
+            Mirrors::Removed
+        } else {
+            Mirrors::Attached
+        };
+        let setting = Setting::new(&self.scene, &self.structure, mirrors, self.targets(number)?)?;
+        Ok((0..beam::COUNT)
+            .into_par_iter()
+            .map(|b| self.sensor.observe(&setting, b))
+            .collect())
+    }
+
+    /// Records a stretch.
+    ///
+    /// # Errors
+    /// An unknown color.
+    pub fn stretch(&self, number: usize) -> Result<Stretch, SimError> {
+        Ok(self.record(number, &self.returns(number)?))
+    }
+
+    /// Records a stretch from what [`Laboratory::returns`] found for it.
+    pub fn record(&self, number: usize, returns: &Returns) -> Stretch {
+        let planned = &self.planned[number];
+        let drift = self.drift(number);
+        let first_scan: usize = self.planned[..number].iter().map(|p| p.scans).sum();
+        let mut ranges = Vec::with_capacity(planned.scans * beam::COUNT);
+        for scan in first_scan..first_scan + planned.scans {
+            let mut draws = Draws::new(self.seed, Purpose::Reading, scan as u64);
+            ranges.extend(returns.iter().enumerate().map(|(beam, found)| {
+                draws.seek(beam as u64);
+                self.sensor
+                    .read(found.as_ref(), drift, draws.normal(), draws.uniform())
+            }));
+        }
+        let scan_period_s = 1.0 / scanner::SCAN_RATE_HZ;
+        let start_s = first_scan as f64 * scan_period_s + number as f64 * self.scene.experiment.pause_s;
+        Stretch {
+            label: self.label(number),
+            start_s,
+            scan_period_s,
+            beams: beam::COUNT,
+            ranges,
+            tracks: self.tracks(number, start_s, planned.scans as f64 * scan_period_s),
+        }
+    }
+
+    fn label(&self, number: usize) -> PoseLabel {
+        let planned = &self.planned[number];
+        let board = planned.board.as_ref().map(|(board, _)| &self.scene.board[*board]);
+        PoseLabel {
+            pose: number,
+            kind: planned.kind,
+            scans: planned.scans,
+            board: board.map(|b| b.name.clone()),
+            color: board.map(|b| b.color.clone()),
+            facet: planned
+                .facet
+                .map(|f| self.scene.superstructure.facet[f].name.clone()),
+            beams: planned.beams,
+        }
+    }
+
+    /// The rig, and the stretch's board.
+    fn tracks(&self, number: usize, start_s: f64, duration_s: f64) -> Vec<catoptric_model::Track> {
+        let mocap = &self.scene.mocap;
+        // Frame numbers and counts of a recording of hours stay far below 2³².
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let (first_frame, frames) = (
+            (start_s * mocap.frame_rate_hz).round() as u64,
+            ((duration_s * mocap.frame_rate_hz).floor() as u64).max(1),
+        );
+        let track = |body: &Body<'_>| mocap::track(mocap, self.seed, body, start_s, first_frame, frames);
+        // The rig stays where it is for the whole experiment: one placement.
+        let rig = room::points(&self.scene.superstructure.marker);
+        let mut tracks = vec![track(&Body {
+            subject: RIG_SUBJECT,
+            index: 0,
+            template: &rig,
+            room_from_body: placement::room_from_rig(&self.scene.room),
+            placement: 0,
+        })];
+        if let (Some((board, _)), Some(room_from_board)) = (&self.planned[number].board, &self.boards[number])
+        {
+            let template = room::points(&board_markers(&self.scene.board[*board]));
+            tracks.push(track(&Body {
+                subject: &self.scene.board[*board].name,
+                index: board + 1,
+                template: &template,
+                room_from_body: *room_from_board,
+                placement: number + 1,
+            }));
+        }
+        tracks
+    }
+
+    /// The whole experiment in memory.
+    ///
+    /// # Errors
+    /// As [`Laboratory::stretch`].
+    ///
+    /// # Panics
+    /// If motion capture never saw the rig during a stretch, which only a dropout of nearly 1 brings about.
+    pub fn dataset(&self) -> Result<Dataset, SimError> {
+        let poses = (0..self.stretches())
+            .into_par_iter()
+            .map(|number| {
+                self.stretch(number)?
+                    .into_record()
+                    .map_err(|_| SimError::Markers {
+                        body: RIG_SUBJECT.to_owned(),
+                    })
+            })
+            .collect::<Result<_, _>>()?;
+        Ok(Dataset {
+            session: self.session()?,
+            poses,
+        })
+    }
+}
+
+/// Where a board really stands when a person means to put it somewhere.
+fn misplaced(scene: &Scene, seed: u64, number: usize, meant: &Pose) -> Pose {
+    if !scene.experiment.pose.is_empty() {
+        return *meant;
+    }
+    let mut draws = Draws::new(seed, Purpose::Placement, number as u64);
+    let shift = draws.normal3() * (scene.experiment.placement_sd_mm * 1e-3);
+    let turn = draws.normal3() * scene.experiment.placement_sd_deg.to_radians();
+    meant * Pose::from_parts(Translation3::from(shift), UnitQuaternion::from_scaled_axis(turn))
+}

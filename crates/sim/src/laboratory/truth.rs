@@ -1,0 +1,78 @@
+//! The truth as the laboratory knows it.
+
+use super::Laboratory;
+use crate::error::SimError;
+use crate::optics::{End, Mirrors, Setting};
+use crate::placement;
+use crate::truth::{self, TrueBeam, TrueFacet, TruePose, Truth};
+use catoptric_model::{Deflection, PoseData, beam};
+use rayon::prelude::*;
+
+impl Laboratory {
+    /// The truth beside it all.
+    ///
+    /// # Errors
+    /// An unknown color.
+    pub fn truth(&self) -> Result<Truth, SimError> {
+        let setting = Setting::new(&self.scene, &self.structure, Mirrors::Attached, Vec::new())?;
+        let facets = &self.structure.facets;
+        let beams = (0..beam::COUNT)
+            .into_par_iter()
+            .map(|b| self.true_beam(&setting, b))
+            .collect();
+        Ok(Truth {
+            schema_version: truth::SCHEMA_VERSION,
+            name: self.scene.name.clone(),
+            seed: self.seed,
+            room_from_rig: PoseData::from(&placement::room_from_rig(&self.scene.room)),
+            rig_from_sensor: PoseData::from(&self.structure.rig_from_sensor),
+            bias: self.sensor.bias().clone(),
+            facets: facets
+                .iter()
+                .map(|f| TrueFacet {
+                    name: f.name.clone(),
+                    normal: f.face.normal.into_inner().into(),
+                    offset_m: f.face.normal.dot(&f.face.origin.coords),
+                    corners_m: f.face.corners.iter().map(|c| c.coords.into()).collect(),
+                })
+                .collect(),
+            beams,
+            poses: (0..self.planned.len())
+                .map(|number| TruePose {
+                    pose: number,
+                    kind: self.planned[number].kind,
+                    room_from_board: self.boards[number].as_ref().map(PoseData::from),
+                    drift_m: self.drift(number),
+                })
+                .collect(),
+        })
+    }
+
+    fn true_beam(&self, setting: &Setting<'_>, beam: usize) -> TrueBeam {
+        let (status, chief_energy) = self.sensor.classify(setting, beam);
+        let chief = self.sensor.chief_path(setting, beam);
+        let leaves = matches!(chief.end, End::Escaped) && !chief.facets().is_empty();
+        let distance = chief.points().first().map(|p| p.coords.norm());
+        let deflection = leaves.then(|| {
+            Deflection::from_exit(
+                beam::azimuth(beam),
+                &chief.last.direction,
+                distance.unwrap_or(0.0),
+            )
+        });
+        TrueBeam {
+            beam,
+            status,
+            facets: chief
+                .facets()
+                .iter()
+                .map(|&f| self.structure.facets[f].name.clone())
+                .collect(),
+            points_m: chief.points().iter().map(|p| p.coords.into()).collect(),
+            azimuth_rad: deflection.map(|d| d.azimuth),
+            elevation_rad: deflection.map(|d| d.elevation),
+            distance_m: distance,
+            chief_energy,
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! Where the boards are put: Cooper, steps 7 to 10, carried out on the drawing as a person would.
+//!
+//! Every facet's beams are divided into groups that one board can serve. Before each group a board is set up in
+//! several poses: its tilt direction goes round evenly, its tilt and its distance vary, and it must stand in the room
+//! and catch the whole group with some margin. The mirrors as built are not known here.
+
+mod groups;
+mod poses;
+
+pub use groups::served_beams;
+
+use crate::error::SimError;
+use crate::optics::{Mirrors, Path, Setting};
+use crate::reading::Sensor;
+use crate::scene::{BoardPose, Room, Scene};
+use crate::structure::{self, Structure};
+use catoptric_model::frame::{tangent_basis, yaw_pitch_roll};
+use catoptric_model::{Pose, PoseKind, beam};
+use groups::{Group, direct_groups, facet_groups};
+use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use poses::{attitude, place};
+
+/// A stretch as it is meant to be recorded.
+#[derive(Debug, Clone)]
+pub struct Planned {
+    /// What it is for.
+    pub kind: PoseKind,
+    /// Scans.
+    pub scans: usize,
+    /// Facet in whose fan the board stands, by its index.
+    pub facet: Option<usize>,
+    /// First and last beam it is set up for.
+    pub beams: Option<[usize; 2]>,
+    /// The board, by its index, and where it is meant to stand.
+    pub board: Option<(usize, Pose)>,
+}
+
+/// Where rig and nominal sensor stand in the room.
+pub fn room_from_rig(room: &Room) -> Pose {
+    Pose::from_parts(
+        Translation3::from(Vector3::from(room.rig_position_m)),
+        yaw_pitch_roll(room.rig_yaw_deg.to_radians(), 0.0, 0.0),
+    )
+}
+
+/// The whole procedure: bare structure, empty room, boards before undeflected beams, boards before every facet.
+///
+/// # Errors
+/// [`SimError::Placement`] where a board fits nowhere, [`SimError::UnknownName`] for a pose that refers to nothing.
+pub fn plan(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
+    let structure = Structure::nominal(scene)?;
+    let setting = Setting::new(scene, &structure, Mirrors::Attached, Vec::new())?;
+    let room_from_sensor = room_from_rig(&scene.room) * structure::nominal_mount(scene);
+    let paths: Vec<Path> = (0..beam::COUNT).map(|b| sensor.chief_path(&setting, b)).collect();
+    let experiment = &scene.experiment;
+    let scans = experiment.scans_per_pose as usize;
+    let without_board = |kind, scans: u32| Planned {
+        kind,
+        scans: scans as usize,
+        facet: None,
+        beams: None,
+        board: None,
+    };
+    let mut planned = vec![
+        without_board(PoseKind::Bare, experiment.bare_scans),
+        without_board(PoseKind::Room, experiment.room_scans),
+    ];
+    if !experiment.pose.is_empty() {
+        for (index, pose) in experiment.pose.iter().enumerate() {
+            planned.push(given(scene, &paths, pose, index)?);
+        }
+        return Ok(planned);
+    }
+    if scene.board.is_empty() {
+        return Ok(planned);
+    }
+    let direct = direct_groups(
+        &paths,
+        experiment.direct_poses as usize,
+        experiment.group_span_deg,
+    );
+    for (index, [first, last]) in direct.into_iter().enumerate() {
+        let group = Group::new(None, first, last, &paths, &room_from_sensor);
+        let board = index % scene.board.len();
+        let pose = place(&scene.board[board], &group, experiment, &scene.room, index, 0)
+            .map_err(|reason| no_place(scene, board, &group, reason))?;
+        planned.push(Planned {
+            kind: PoseKind::Direct,
+            scans,
+            facet: None,
+            beams: Some([first, last]),
+            board: Some((board, pose)),
+        });
+    }
+    for (number, (facet, first, last)) in facet_groups(
+        &paths,
+        scene.superstructure.facet.len(),
+        experiment.group_span_deg,
+    )
+    .into_iter()
+    .enumerate()
+    {
+        let group = Group::new(Some(facet), first, last, &paths, &room_from_sensor);
+        for index in 0..experiment.poses_per_group as usize {
+            let board = index % scene.board.len();
+            let pose = place(
+                &scene.board[board],
+                &group,
+                experiment,
+                &scene.room,
+                index,
+                number,
+            )
+            .map_err(|reason| no_place(scene, board, &group, reason))?;
+            planned.push(Planned {
+                kind: PoseKind::Facet,
+                scans,
+                facet: Some(facet),
+                beams: Some([first, last]),
+                board: Some((board, pose)),
+            });
+        }
+    }
+    Ok(planned)
+}
+
+fn no_place(scene: &Scene, board: usize, group: &Group, reason: String) -> SimError {
+    let target = match group.facet {
+        Some(facet) => format!("facet {:?}", scene.superstructure.facet[facet].name),
+        None => format!("beams {} to {}", group.first, group.last),
+    };
+    SimError::Placement {
+        board: scene.board[board].name.clone(),
+        target,
+        reason,
+    }
+}
+
+/// A pose that the scene gives itself.
+fn given(scene: &Scene, paths: &[Path], pose: &BoardPose, index: usize) -> Result<Planned, SimError> {
+    let unknown = |what: String| SimError::UnknownName { pose: index, what };
+    let board = scene.board.iter().position(|b| b.name == pose.board);
+    let board = board.ok_or_else(|| unknown(format!("board {:?}", pose.board)))?;
+    let facet = match &pose.facet {
+        None => None,
+        Some(name) => Some(
+            scene
+                .superstructure
+                .facet
+                .iter()
+                .position(|f| f.name == *name)
+                .ok_or_else(|| unknown(format!("facet {name:?}")))?,
+        ),
+    };
+    let normal = Unit::try_new(Vector3::from(pose.normal), f64::MIN_POSITIVE)
+        .ok_or_else(|| unknown("a direction without length".to_owned()))?;
+    let center = Point3::from(Vector3::from(pose.center_m));
+    let level = attitude(center, &normal, tangent_basis(&normal).0.into_inner());
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), pose.turn_deg.to_radians());
+    let beams = match facet {
+        Some(facet) => served_beams(paths, scene.superstructure.facet.len())[facet],
+        None => None,
+    };
+    Ok(Planned {
+        kind: if facet.is_some() {
+            PoseKind::Facet
+        } else {
+            PoseKind::Direct
+        },
+        scans: scene.experiment.scans_per_pose as usize,
+        facet,
+        beams,
+        board: Some((board, level * turn)),
+    })
+}

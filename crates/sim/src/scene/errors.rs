@@ -1,0 +1,153 @@
+//! Errors of the sensor, and how well they are known.
+
+use catoptric_model::bias::{AngleBias, ColorBias, DistanceBias, interpolate};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Which errors the sensor has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ErrorModel {
+    /// A perfect sensor: no bias, drift, noise, rounding or dropout.
+    None,
+    /// Eqs. 3–5 and the tables; the detector shows itself only where surfaces mix.
+    #[default]
+    Empirical,
+    /// What pulse and threshold do to the range; no Eqs. 3–5.
+    Physical,
+    /// Both, one on top of the other.
+    Both,
+}
+
+/// Errors of the sensor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Errors {
+    /// Which of them act.
+    pub model: ErrorModel,
+    /// E_r, default Table 2.
+    #[schemars(with = "DistanceBiasSchema")]
+    pub distance: DistanceBias,
+    /// E_a, default Table 3's slope with no error at normal incidence, since E_r already holds that.
+    #[schemars(with = "AngleBiasSchema")]
+    pub angle: AngleBias,
+    /// E_c per color, default none.
+    #[schemars(with = "BTreeMap<String, ColorBiasSchema>")]
+    pub color: BTreeMap<String, ColorBias>,
+    /// White noise of a reading, default Table 2.
+    pub noise: NoiseTable,
+    /// Constant error of all readings of a pose, 1σ, in millimetres (trial scatter in Table 2).
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub drift_sd_mm: f64,
+    /// Step of the reported ranges, in millimetres; 0 for none.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub quantization_mm: f64,
+    /// Chance that a reading is lost.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub dropout: f64,
+}
+
+impl Default for Errors {
+    fn default() -> Self {
+        Self {
+            model: ErrorModel::Empirical,
+            distance: DistanceBias {
+                range_m: vec![0.5, 2.0, 4.0],
+                error_mm: vec![-2.8, 6.1, -0.1],
+            },
+            angle: AngleBias {
+                gain_mm: -70.3,
+                offset_mm: 70.3,
+            },
+            color: BTreeMap::new(),
+            noise: NoiseTable {
+                range_m: vec![0.5, 2.0, 4.0],
+                sd_mm: vec![4.1, 3.9, 4.6],
+            },
+            drift_sd_mm: 0.88,
+            quantization_mm: 1.0,
+            dropout: 0.0,
+        }
+    }
+}
+
+/// Standard deviation of a reading over distance, interpolated linearly and constant outside.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NoiseTable {
+    /// Distances in metres, strictly increasing.
+    #[schemars(length(min = 1))]
+    pub range_m: Vec<f64>,
+    /// Standard deviations in millimetres at those distances.
+    #[schemars(inner(range(min = 0.0, max = 1000.0)))]
+    pub sd_mm: Vec<f64>,
+}
+
+/// How well step 1 knows the errors: what the experimenter believes differs from the truth by these, 1σ (assumed).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Characterization {
+    /// E_r at each node of its table, in millimetres (0.88 mm of drift, averaged over three trials).
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub distance_sd_mm: f64,
+    /// A_a, in millimetres, with the error at normal incidence held.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub angle_gain_sd_mm: f64,
+    /// E_c, in millimetres.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub color_sd_mm: f64,
+}
+
+impl Default for Characterization {
+    fn default() -> Self {
+        Self {
+            distance_sd_mm: 0.5,
+            angle_gain_sd_mm: 3.0,
+            color_sd_mm: 0.0,
+        }
+    }
+}
+
+/// Schema of [`DistanceBias`].
+#[derive(JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "DistanceBias")]
+#[allow(dead_code)] // Read by the schema generator alone.
+struct DistanceBiasSchema {
+    /// Distances in metres, strictly increasing.
+    range_m: Vec<f64>,
+    /// Errors in millimetres at those distances.
+    error_mm: Vec<f64>,
+}
+
+/// Schema of [`AngleBias`].
+#[derive(JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "AngleBias")]
+#[allow(dead_code)]
+struct AngleBiasSchema {
+    /// A_a, in millimetres.
+    gain_mm: f64,
+    /// B_a, in millimetres.
+    offset_mm: f64,
+}
+
+/// Schema of [`ColorBias`].
+#[derive(JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "ColorBias")]
+#[allow(dead_code)]
+struct ColorBiasSchema {
+    /// A_c, in millimetres per metre.
+    slope_mm_per_m: f64,
+    /// B_c, in millimetres.
+    offset_mm: f64,
+}
+
+impl NoiseTable {
+    /// Standard deviation at a range, in metres.
+    pub fn sd(&self, range: f64) -> f64 {
+        interpolate(&self.range_m, &self.sd_mm, range) * 1e-3
+    }
+}

@@ -1,0 +1,164 @@
+//! The scanner: preset, beam, mounting, light and detection.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Which scanner.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Preset {
+    /// Hokuyo UST-20LX with the spot of its manual: 160 × 25 mm at 10 m.
+    #[serde(rename = "ust-20lx")]
+    Ust20lx,
+    /// The same with the spot of Cooper's Table 1 read as three neighbouring beams.
+    #[serde(rename = "ust-20lx-cooper")]
+    Ust20lxCooper,
+}
+
+/// The scanner and how it sits in the rig.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scanner {
+    /// The preset.
+    pub preset: Preset,
+    /// Sub-rays per beam.
+    #[serde(default = "Scanner::default_sub_rays")]
+    #[schemars(range(min = 1, max = 4096))]
+    pub sub_rays: u32,
+    /// Shape of a beam, instead of the preset's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beam: Option<BeamShape>,
+    /// Whether the scanner's own housing stands in the way of deflected beams.
+    #[serde(default = "yes")]
+    pub housing: bool,
+    /// Where the sensor sits in the rig body.
+    #[serde(default)]
+    pub mount: Mount,
+}
+
+fn yes() -> bool {
+    true
+}
+
+impl Scanner {
+    fn default_sub_rays() -> u32 {
+        19
+    }
+}
+
+/// Shape of one beam: an ellipse whose long axis is horizontal at azimuth 0.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BeamShape {
+    /// Full angle of the 1/e² contour along the long axis, in milliradians.
+    #[schemars(range(min = 0.0, max = 200.0))]
+    pub wide_full_mrad: f64,
+    /// Full angle of the 1/e² contour along the short axis, in milliradians.
+    #[schemars(range(min = 0.0, max = 200.0))]
+    pub narrow_full_mrad: f64,
+    /// Full width of the beam along its long axis where it leaves, in millimetres.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 50.0))]
+    pub wide_aperture_mm: f64,
+    /// Full width of the beam along its short axis where it leaves, in millimetres.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 50.0))]
+    pub narrow_aperture_mm: f64,
+    /// Whether the ellipse turns with the azimuth, as behind a spinning 45° mirror.
+    #[serde(default = "yes")]
+    pub turns: bool,
+}
+
+/// Where the sensor sits in the rig body: the drawing, and how far the real one may be from it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Mount {
+    /// Origin of the sensor in the rig frame, in millimetres.
+    pub position_mm: [f64; 3],
+    /// Yaw of the sensor in the rig frame, in degrees.
+    #[schemars(range(min = -180.0, max = 180.0))]
+    pub yaw_deg: f64,
+    /// Largest error of the optical axis in yaw, in degrees (data sheet: 0.3).
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub yaw_tolerance_deg: f64,
+    /// Largest error of the optical axis in pitch and in roll, in degrees (data sheet: 1).
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub tilt_tolerance_deg: f64,
+    /// Largest offset of the optical center along each axis, in millimetres (assumed).
+    #[schemars(range(min = 0.0, max = 20.0))]
+    pub shift_tolerance_mm: f64,
+}
+
+impl Default for Mount {
+    fn default() -> Self {
+        Self {
+            position_mm: [0.0, 0.0, -40.0],
+            yaw_deg: 0.0,
+            yaw_tolerance_deg: 0.3,
+            tilt_tolerance_deg: 1.0,
+            shift_tolerance_mm: 1.0,
+        }
+    }
+}
+
+/// The terms of Eq. 1. Only their product over the threshold matters to a range.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Light {
+    /// Transmitted peak power P_t, in watts (assumed).
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub power_w: f64,
+    /// Transmission of the optics τ_o (assumed).
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub optics_transmission: f64,
+    /// Transmission of the air τ_a, one way.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub air_transmission: f64,
+    /// Diameter of the receiver D_R, in millimetres (assumed).
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub receiver_diameter_mm: f64,
+    /// Solid angle θ_R into which a target scatters, in steradians (π for a Lambertian surface).
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub target_dispersion_sr: f64,
+}
+
+impl Default for Light {
+    fn default() -> Self {
+        Self {
+            power_w: 10.0,
+            optics_transmission: 0.9,
+            air_transmission: 1.0,
+            receiver_diameter_mm: 20.0,
+            target_dispersion_sr: std::f64::consts::PI,
+        }
+    }
+}
+
+/// From received light to a range.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Detection {
+    /// Full width at half maximum of the pulse, in nanoseconds (assumed; 3 to 5 are plausible).
+    #[schemars(range(min = 0.1, max = 100.0))]
+    pub pulse_fwhm_ns: f64,
+    /// Reflectivity of a face-on target that is just detected at `threshold_range_m` (data sheet: 0.1).
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub threshold_reflectivity: f64,
+    /// Range at which that target is just detected, in metres (data sheet: 8).
+    #[schemars(range(min = 0.1, max = 1000.0))]
+    pub threshold_range_m: f64,
+    /// Range of the face-on white target at which the walk of the leading edge is calibrated out, in metres.
+    #[schemars(range(min = 0.1, max = 1000.0))]
+    pub reference_range_m: f64,
+}
+
+impl Default for Detection {
+    fn default() -> Self {
+        Self {
+            pulse_fwhm_ns: 4.0,
+            threshold_reflectivity: 0.1,
+            threshold_range_m: 8.0,
+            reference_range_m: 2.0,
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! What is built around the scanner: mirrors, posts, markers, and how far they are from the drawing.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Mirrors, posts and markers around the scanner, in the sensor frame of the drawing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Superstructure {
+    /// The mirrors.
+    #[serde(default)]
+    pub facet: Vec<Facet>,
+    /// Opaque boxes.
+    #[serde(default)]
+    pub post: Vec<Post>,
+    /// Markers of the rig body, in the rig frame.
+    pub marker: Vec<Marker>,
+    /// The mirror material.
+    #[serde(default)]
+    pub mirror: Mirror,
+    /// How far the structure as built departs from the drawing.
+    #[serde(default)]
+    pub as_built: AsBuilt,
+    /// Mirrors that a beam may meet in a row.
+    #[serde(default = "four")]
+    #[schemars(range(min = 1, max = 8))]
+    pub max_bounces: u32,
+}
+
+fn four() -> u32 {
+    4
+}
+
+/// A plane mirror.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Facet {
+    /// Name.
+    pub name: String,
+    /// Its outline.
+    pub shape: FacetShape,
+}
+
+/// Outline of a facet.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum FacetShape {
+    /// Cut by two azimuths and two heights, and turned so that its middle beam leaves in a wanted direction.
+    Wedge(Wedge),
+    /// A rectangle with a given center and normal.
+    Rectangle(RectangleShape),
+    /// Given corners.
+    Polygon(PolygonShape),
+}
+
+/// A facet between two azimuths.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Wedge {
+    /// First and last azimuth, in degrees, the smaller first.
+    #[schemars(inner(range(min = -180.0, max = 180.0)))]
+    pub azimuth_deg: [f64; 2],
+    /// Distance from the sensor origin along the middle azimuth, in millimetres.
+    #[schemars(range(min = 1.0, max = 10000.0))]
+    pub distance_mm: f64,
+    /// Azimuth in which the middle beam leaves, in degrees.
+    #[schemars(range(min = -360.0, max = 360.0))]
+    pub exit_azimuth_deg: f64,
+    /// Elevation in which the middle beam leaves, in degrees.
+    #[schemars(range(min = -90.0, max = 90.0))]
+    pub exit_elevation_deg: f64,
+    /// Height over which the facet reaches, centered on the scan plane, in millimetres.
+    #[schemars(range(min = 0.1, max = 10000.0))]
+    pub height_mm: f64,
+}
+
+/// A rectangular facet.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RectangleShape {
+    /// Center, in millimetres.
+    pub center_mm: [f64; 3],
+    /// Normal of the reflecting side; any length.
+    pub normal: [f64; 3],
+    /// Extent parallel to the scan plane, in millimetres.
+    #[schemars(range(min = 0.1, max = 10000.0))]
+    pub width_mm: f64,
+    /// Extent along the other side, in millimetres.
+    #[schemars(range(min = 0.1, max = 10000.0))]
+    pub height_mm: f64,
+}
+
+/// A facet with given corners.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PolygonShape {
+    /// Corners of a convex plane polygon, in millimetres, counter-clockwise seen from the reflecting side.
+    #[schemars(length(min = 3))]
+    pub corners_mm: Vec<[f64; 3]>,
+}
+
+/// An opaque box.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Post {
+    /// Name.
+    pub name: String,
+    /// Center, in millimetres.
+    pub center_mm: [f64; 3],
+    /// Extents along its own x, y and z, in millimetres.
+    #[schemars(inner(range(min = 0.01, max = 10000.0)))]
+    pub size_mm: [f64; 3],
+    /// Turn about z, in degrees.
+    #[serde(default)]
+    #[schemars(range(min = -360.0, max = 360.0))]
+    pub yaw_deg: f64,
+    /// Surface color.
+    #[serde(default = "structure")]
+    pub color: String,
+}
+
+fn structure() -> String {
+    "structure".to_owned()
+}
+
+/// A labelled marker.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Marker {
+    /// Label.
+    pub name: String,
+    /// Place in its body's frame, in millimetres.
+    pub position_mm: [f64; 3],
+}
+
+/// The mirror material.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Mirror {
+    /// Share of the light that is reflected, paid on the way out and on the way back.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub reflectivity: f64,
+    /// Thickness between the bare structure and the reflecting face, in millimetres.
+    #[schemars(range(min = 0.0, max = 20.0))]
+    pub thickness_mm: f64,
+}
+
+impl Default for Mirror {
+    fn default() -> Self {
+        Self {
+            reflectivity: 0.9,
+            thickness_mm: 1.0,
+        }
+    }
+}
+
+/// How far the structure as built departs from the drawing, 1σ.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct AsBuilt {
+    /// Turn of a facet about each axis, in degrees.
+    #[schemars(range(min = 0.0, max = 20.0))]
+    pub tilt_sd_deg: f64,
+    /// Shift of a facet along each axis, in millimetres.
+    #[schemars(range(min = 0.0, max = 20.0))]
+    pub shift_sd_mm: f64,
+    /// Root mean square of the slope of a facet's surface about its plane, in milliradians (assumed).
+    #[schemars(range(min = 0.0, max = 50.0))]
+    pub slope_rms_mrad: f64,
+}
+
+impl Default for AsBuilt {
+    fn default() -> Self {
+        Self {
+            tilt_sd_deg: 1.0,
+            shift_sd_mm: 0.5,
+            slope_rms_mrad: 0.2,
+        }
+    }
+}
