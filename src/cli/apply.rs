@@ -21,8 +21,8 @@ pub(crate) struct Arguments {
     /// The cloud to write; the name's end says how.
     #[arg(long, value_name = "cloud.ply|cloud.pcd")]
     out: PathBuf,
-    /// Frame of the points.
-    #[arg(long, value_enum, default_value_t = FrameName::Room)]
+    /// Frame of the points; Eqs. 9 and 10 are in the sensor's.
+    #[arg(long, value_enum, default_value_t = FrameName::Sensor)]
     frame: FrameName,
     /// The pose whose scans are taken; those of the empty room by default.
     #[arg(long, value_name = "N")]
@@ -64,7 +64,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         frame.word(),
         cloud.pose,
         counted(cloud.without_range, "reading"),
-        cloud.without_direction,
+        counted(cloud.without_direction, "reading"),
         counted(cloud.unsolved_elements, "element"),
         path.display(),
     ))

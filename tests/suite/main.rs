@@ -5,6 +5,7 @@ mod bad_input;
 mod cli;
 mod closure;
 mod common;
+mod consistency;
 mod determinism;
 mod paper;
 mod physics;

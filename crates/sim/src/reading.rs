@@ -8,7 +8,7 @@ use crate::error::SimError;
 use crate::footprint::{self, SubRay};
 use crate::optics::{End, MAX_BOUNCES, Path, Role, Setting};
 use crate::power::{self, Illumination};
-use crate::scanner::{RANGE_MAX_M, TOO_CLOSE_M};
+use crate::scanner::{RANGE_MAX_M, RANGE_MIN_M};
 use crate::scene::{BeamShape, ErrorModel, Errors, Light, Scene};
 use crate::truth::BeamClass;
 use catoptric_model::{BiasTerms, RangeBias, beam};
@@ -300,7 +300,7 @@ impl Sensor {
         use catoptric_model::range::{INVALID, NO_RETURN, TOO_CLOSE};
         let Some(found) = found else { return NO_RETURN };
         if self.errors.model == ErrorModel::None {
-            return if found.range() < TOO_CLOSE_M {
+            return if found.range() < RANGE_MIN_M {
                 TOO_CLOSE
             } else {
                 found.range()
@@ -316,7 +316,7 @@ impl Sensor {
         } else {
             range
         };
-        if range < TOO_CLOSE_M {
+        if range < RANGE_MIN_M {
             TOO_CLOSE
         } else if range > RANGE_MAX_M {
             NO_RETURN

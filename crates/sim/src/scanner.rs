@@ -6,12 +6,10 @@ use crate::scene::{BeamShape, Preset, Scanner};
 pub const SCAN_RATE_HZ: f64 = 40.0;
 /// Time between two beams: one turn of 25 ms in 1440 steps.
 pub const STEP_PERIOD_S: f64 = 1.0 / SCAN_RATE_HZ / 1440.0;
-/// Shortest specified range, in metres.
-pub const RANGE_MIN_M: f64 = 0.06;
+/// Shortest range that is reported, in metres; anything nearer is too close. The data sheet vouches for 60 mm on.
+pub const RANGE_MIN_M: f64 = 0.021;
 /// Longest specified range, in metres.
 pub const RANGE_MAX_M: f64 = 20.0;
-/// Ranges below this are reported as too close, in metres.
-pub const TOO_CLOSE_M: f64 = 0.021;
 
 /// Boxes of the scanner's housing in the sensor frame, center and size in millimetres: the body below the window and
 /// the cap above it. The UST-20LX is 50 × 50 × 70 mm; how it is divided around the scan plane is assumed.
