@@ -3,9 +3,9 @@
 //! The error tables come back by construction; these tests prove that nothing on the way distorts them, and that the
 //! constants taken from the tables are the tables' own. They do not prove that the sensor is like that.
 
-use crate::scenes::{BARE, PROTOTYPE, scene};
+use crate::scenes::{BARE, PROTOTYPE, scene, set_board_ahead};
 use catoptric::model::{PoseKind, beam};
-use catoptric::sim::scene::{Board, BoardPose, ErrorModel, Errors, Preset};
+use catoptric::sim::scene::{ErrorModel, Errors, Preset};
 use catoptric::sim::{Laboratory, structure::Structure};
 
 /// Table 2: mean errors of three trials and their standard deviations, in metres.
@@ -121,20 +121,7 @@ fn a_white_board_reads_table_2() {
             ..Errors::default()
         };
         assert_eq!(scene.errors.model, ErrorModel::Empirical);
-        scene.board.push(Board {
-            name: "board".to_owned(),
-            width_mm: 1000.0,
-            height_mm: 1000.0,
-            color: "white".to_owned(),
-            marker: Vec::new(),
-        });
-        scene.experiment.pose.push(BoardPose {
-            board: "board".to_owned(),
-            facet: None,
-            center_m: [range, 0.0, 2.0],
-            normal: [-1.0, 0.0, 0.0],
-            turn_deg: 0.0,
-        });
+        set_board_ahead(&mut scene, range);
         scene.experiment.scans_per_pose = scans;
         let laboratory = Laboratory::new(&scene, 2).expect("the scene is good");
         let record = laboratory

@@ -3,14 +3,14 @@
 //! These prove the geometry of the simulator and what a detector makes of it. They say nothing about whether the
 //! error tables are those of a real sensor; `paper` compares with those.
 
-use crate::scenes::{BARE, scene};
+use crate::scenes::{BARE, scene, set_board_ahead};
 use catoptric::model::{MirrorPlane, beam};
 use catoptric::sim::cast::Polygon;
 use catoptric::sim::color;
 use catoptric::sim::footprint::Ray;
 use catoptric::sim::noise::{Draws, Purpose};
 use catoptric::sim::optics::{End, Mirrors, Path, Role, Setting, Target};
-use catoptric::sim::scene::{BoardPose, ErrorModel, Facet, FacetShape, PolygonShape};
+use catoptric::sim::scene::{ErrorModel, Facet, FacetShape, PolygonShape};
 use catoptric::sim::structure::Structure;
 use catoptric::sim::{Laboratory, Scene};
 use nalgebra::{Matrix4, Point3, Unit, Vector3};
@@ -221,20 +221,7 @@ fn unfolded_mirrors_agree_with_the_tracer() {
 /// A scene with one white board facing along −x at a distance in front of the scanner, recorded once.
 fn board_ahead(distance: f64, mut edit: impl FnMut(&mut Scene)) -> Laboratory {
     let mut scene = scene(BARE);
-    scene.board.push(catoptric::sim::scene::Board {
-        name: "board".to_owned(),
-        width_mm: 1000.0,
-        height_mm: 1000.0,
-        color: "white".to_owned(),
-        marker: Vec::new(),
-    });
-    scene.experiment.pose.push(BoardPose {
-        board: "board".to_owned(),
-        facet: None,
-        center_m: [distance, 0.0, 2.0],
-        normal: [-1.0, 0.0, 0.0],
-        turn_deg: 0.0,
-    });
+    set_board_ahead(&mut scene, distance);
     scene.experiment.scans_per_pose = 5;
     scene.experiment.room_scans = 1;
     scene.experiment.bare_scans = 1;

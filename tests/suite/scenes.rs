@@ -1,6 +1,7 @@
 //! Scenes for the tests: small ones written out, and random layouts for the property tests.
 
-use catoptric_sim::Scene;
+use catoptric::sim::Scene;
+use catoptric::sim::scene::{Board, BoardPose};
 use proptest::prelude::*;
 
 /// The default experiment of the repository.
@@ -43,12 +44,30 @@ dropout = 0
 model = "none"
 "#;
 
+/// Sets up one white board of 1 × 1 m, face-on at a distance before the scanner of [`BARE`].
+pub(crate) fn set_board_ahead(scene: &mut Scene, distance: f64) {
+    scene.board.push(Board {
+        name: "board".to_owned(),
+        width_mm: 1000.0,
+        height_mm: 1000.0,
+        color: "white".to_owned(),
+        marker: Vec::new(),
+    });
+    scene.experiment.pose.push(BoardPose {
+        board: "board".to_owned(),
+        facet: None,
+        center_m: [distance, 0.0, 2.0],
+        normal: [-1.0, 0.0, 0.0],
+        turn_deg: 0.0,
+    });
+}
+
 /// Turns every error off that the sensor, the room and the recording can have; the mirrors stay as built.
 pub(crate) fn without_errors(mut scene: Scene) -> Scene {
     scene.scanner.sub_rays = 1;
     scene.superstructure.as_built.slope_rms_mrad = 0.0;
-    scene.errors.model = catoptric_sim::scene::ErrorModel::None;
-    scene.mocap.profile = catoptric_sim::scene::MocapProfile::Ideal;
+    scene.errors.model = catoptric::sim::scene::ErrorModel::None;
+    scene.mocap.profile = catoptric::sim::scene::MocapProfile::Ideal;
     scene.mocap.dropout = 0.0;
     scene.experiment.scans_per_pose = 1;
     scene.experiment.room_scans = 1;
@@ -89,8 +108,8 @@ pub(crate) fn layouts() -> impl Strategy<Value = Scene> {
 }
 
 /// Slots of 17° from 62° on; a facet takes 8° to 14° of its slot.
-fn random_facet(name: &str, slot: usize, sign: f64, draw: &FacetDraw) -> catoptric_sim::scene::Facet {
-    use catoptric_sim::scene::{Facet, FacetShape, Wedge};
+fn random_facet(name: &str, slot: usize, sign: f64, draw: &FacetDraw) -> catoptric::sim::scene::Facet {
+    use catoptric::sim::scene::{Facet, FacetShape, Wedge};
     let &(width, distance, turn, elevation, up) = draw;
     let first = 63.0 + 17.0 * slot as f64;
     let last = first + 8.0 + 6.0 * width;
