@@ -109,7 +109,9 @@ impl Default for Characterization {
     }
 }
 
-/// Schema of [`DistanceBias`].
+// The model crate knows no schemas; these say what its types look like in a scene.
+
+/// E_r as a table over distance, interpolated linearly and constant outside (Table 2).
 #[derive(JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "DistanceBias")]
@@ -121,7 +123,7 @@ struct DistanceBiasSchema {
     error_mm: Vec<f64>,
 }
 
-/// Schema of [`AngleBias`].
+/// E_a = A_a·cos θ_N + B_a (Eq. 4).
 #[derive(JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "AngleBias")]
@@ -133,7 +135,7 @@ struct AngleBiasSchema {
     offset_mm: f64,
 }
 
-/// Schema of [`ColorBias`].
+/// E_c = A_c·R + B_c (Eq. 5).
 #[derive(JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "ColorBias")]
