@@ -6,6 +6,7 @@ mod cli;
 mod closure;
 mod common;
 mod determinism;
+mod docs;
 mod physics;
 mod pipeline;
 mod scenes;
