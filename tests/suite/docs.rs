@@ -5,7 +5,8 @@
 
 use crate::common::{run, stdout};
 use catoptric::io::scene::{self, Layout};
-use catoptric::model::{BeamEstimate, Calibration, Status};
+use catoptric::model::calibration::{FacetEstimate, MountEstimate};
+use catoptric::model::{BeamEstimate, Calibration, RangeBias, Status};
 use catoptric::{calib, score, sim};
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -378,20 +379,25 @@ fn every_key() -> Calibration {
         rms_residual_m: Some(1e-3),
         ..BeamEstimate::without_angles(700, Status::Solved, Some("for the sake of its key".to_owned()))
     };
-    let facet = serde_json::json!({
-        "facet": "left", "normal": [0.0, -1.0, 0.0], "offset_m": 0.05, "covariance": [[0.0; 3]; 3],
-    });
-    let mount = serde_json::json!({
-        "translation_m": [0.0; 3], "rotation_xyzw": [0.0, 0.0, 0.0, 1.0], "covariance": [[0.0; 6]; 6],
-    });
+    let facet = FacetEstimate {
+        facet: "left".to_owned(),
+        normal: [0.0, -1.0, 0.0],
+        offset_m: 0.05,
+        covariance: [[0.0; 3]; 3],
+    };
+    let mount = MountEstimate {
+        translation_m: [0.0; 3],
+        rotation_xyzw: [0.0, 0.0, 0.0, 1.0],
+        covariance: Some([[0.0; 6]; 6]),
+    };
     Calibration {
         schema_version: 1,
         method: "mine".to_owned(),
         frame: "sensor".to_owned(),
         beams: vec![estimate],
-        facets: vec![serde_json::from_value(facet).unwrap()],
-        rig_from_sensor: Some(serde_json::from_value(mount).unwrap()),
-        bias: Some(Default::default()),
+        facets: vec![facet],
+        rig_from_sensor: Some(mount),
+        bias: Some(RangeBias::default()),
     }
 }
 
