@@ -22,6 +22,7 @@
 //! holds every file format. The guide's chapters are in the repository under `docs/`.
 
 pub mod apply;
+pub mod guide;
 pub mod io;
 pub mod report;
 pub mod score;

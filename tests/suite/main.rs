@@ -7,6 +7,7 @@ mod closure;
 mod common;
 mod consistency;
 mod determinism;
+mod docs;
 mod paper;
 mod physics;
 mod pipeline;

@@ -1,0 +1,24 @@
+//! The guide, chapter by chapter: what to run, what it means, and the equations behind it.
+//!
+//! 1. [`getting_started`]: install, the demo, what the files are, how to read the report
+//! 2. [`sensor_and_mirrors`]: frames, signs, symbols, one mirror in three numbers, Eqs. 6 and 9
+//! 3. [`simulating`]: the scene file, what is modelled and how it is checked, truth, determinism
+//! 4. [`calibrating_and_scoring`]: the paper's steps, statuses, covariances, scores, verdicts, your own calibrator
+//! 5. [`files`]: every file and every key
+//!
+//! The chapters are Markdown files in `docs/guide/`; their Rust examples are run by the tests.
+
+#[doc = include_str!("../docs/guide/1-getting-started.md")]
+pub mod getting_started {}
+
+#[doc = include_str!("../docs/guide/2-sensor-and-mirrors.md")]
+pub mod sensor_and_mirrors {}
+
+#[doc = include_str!("../docs/guide/3-simulating.md")]
+pub mod simulating {}
+
+#[doc = include_str!("../docs/guide/4-calibrating-and-scoring.md")]
+pub mod calibrating_and_scoring {}
+
+#[doc = include_str!("../docs/guide/5-files.md")]
+pub mod files {}

@@ -1,0 +1,511 @@
+//! The documents say what is so: crates, files, commands, keys and printed figures are compared with the real ones.
+//!
+//! These prove that what the documents name exists, and that what they have to name is there. They do not prove that
+//! the sentences around it are true; the examples of the guide are run as doc tests.
+
+use crate::common::{run, stdout};
+use catoptric::io::scene::{self, Layout};
+use catoptric::model::calibration::{FacetEstimate, MountEstimate};
+use catoptric::model::{BeamEstimate, Calibration, RangeBias, Status};
+use catoptric::{calib, score, sim};
+use serde_json::Value;
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn read(path: &str) -> String {
+    fs::read_to_string(root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
+}
+
+/// Every file below a folder, with its path from the repository's root.
+fn files_below(folder: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(root().join(folder)).unwrap() {
+        let name = entry.unwrap().file_name().into_string().unwrap();
+        let path = format!("{folder}/{name}");
+        if root().join(&path).is_dir() {
+            found.extend(files_below(&path));
+        } else {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}
+
+/// The documents, as (path, text).
+fn documents() -> Vec<(String, String)> {
+    let mut paths = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md"]
+        .map(str::to_owned)
+        .to_vec();
+    paths.extend(files_below("docs").into_iter().filter(|p| p.ends_with(".md")));
+    paths.into_iter().map(|p| (p.clone(), read(&p))).collect()
+}
+
+/// What stands between single backquotes, outside of code blocks.
+fn code_words(text: &str) -> Vec<String> {
+    let prose: Vec<&str> = text.split("```").step_by(2).collect();
+    let prose = prose.concat();
+    prose.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+/// The code blocks of one language.
+fn code_blocks(text: &str, language: &str) -> Vec<String> {
+    text.split("```")
+        .skip(1)
+        .step_by(2)
+        .filter_map(|block| {
+            block
+                .strip_prefix(language)?
+                .strip_prefix('\n')
+                .map(str::to_owned)
+        })
+        .collect()
+}
+
+/// The words of the first column of the table below a heading.
+fn first_column(text: &str, heading: &str) -> BTreeSet<String> {
+    let mut lines = text.lines().skip_while(|line| !line.starts_with(heading)).skip(1);
+    let section: Vec<&str> = lines.by_ref().take_while(|line| !line.starts_with('#')).collect();
+    let rows = section
+        .iter()
+        .filter_map(|line| line.strip_prefix('|')?.split('|').next());
+    let words: BTreeSet<String> = rows.flat_map(code_words).collect();
+    assert!(!words.is_empty(), "no table below {heading:?}");
+    words
+}
+
+/// Packages that a package is built from, tests included.
+fn dependencies(package: &str) -> BTreeSet<String> {
+    let output = Command::new(env!("CARGO"))
+        .args([
+            "tree",
+            "--locked",
+            "--offline",
+            "--prefix",
+            "none",
+            "--format",
+            "{p}",
+        ])
+        .args(["-e", "normal,build,dev", "-p", package])
+        .current_dir(root())
+        .output()
+        .unwrap();
+    let text = stdout(&output);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let names: BTreeSet<String> = text
+        .lines()
+        .filter_map(|line| line.split(' ').next())
+        .map(str::to_owned)
+        .collect();
+    assert!(
+        names.contains(package),
+        "cargo tree says nothing of {package}:\n{text}"
+    );
+    names
+}
+
+#[test]
+fn the_estimator_cannot_see_the_truth() {
+    let has = |names: &BTreeSet<String>, word: &str| {
+        names
+            .iter()
+            .any(|n| n == word || n.starts_with(&format!("{word}_")) || n.starts_with(&format!("{word}3d")))
+    };
+    let calib = dependencies("catoptric-calib");
+    for foreign in ["catoptric-sim", "parry", "rand", "catoptric"] {
+        assert!(
+            !has(&calib, foreign),
+            "catoptric-calib depends on {foreign}: {calib:?}"
+        );
+    }
+    let model = dependencies("catoptric-model");
+    for foreign in ["catoptric-sim", "catoptric-calib", "parry", "rand", "catoptric"] {
+        assert!(
+            !has(&model, foreign),
+            "catoptric-model depends on {foreign}: {model:?}"
+        );
+    }
+    let sim = dependencies("catoptric-sim");
+    assert!(
+        !sim.contains("catoptric-calib") && !sim.contains("catoptric"),
+        "{sim:?}"
+    );
+    // The names looked for are those that cargo prints.
+    assert!(
+        has(&sim, "parry") && has(&sim, "rand") && sim.contains("catoptric-model"),
+        "{sim:?}"
+    );
+}
+
+#[test]
+fn every_scene_is_valid() {
+    let scenes = files_below("scenes");
+    assert!(scenes.len() >= 2, "{scenes:?}");
+    for path in scenes {
+        if let Err(problems) = scene::load(&root().join(&path), &[]) {
+            panic!("{path}:\n{problems}");
+        }
+    }
+}
+
+#[test]
+fn links_lead_somewhere() {
+    let mut links = 0;
+    for (path, text) in documents() {
+        let folder = root().join(&path).parent().unwrap().to_owned();
+        for target in text
+            .split("](")
+            .skip(1)
+            .map(|rest| rest.split(')').next().unwrap())
+        {
+            links += 1;
+            if !target.starts_with("https://") {
+                assert!(
+                    folder.join(target).exists(),
+                    "{path} links to {target}, which is not there"
+                );
+            }
+        }
+    }
+    assert!(links > 5, "only {links} links found");
+}
+
+#[test]
+fn files_that_documents_name_exist() {
+    let folders = [
+        "crates/", "src/", "tests/", "benches/", "scenes/", "docs/", ".ci/",
+    ];
+    let mut named = 0;
+    for (path, text) in documents() {
+        for word in code_words(&text) {
+            let is_path = folders.iter().any(|f| word.starts_with(f)) && !word.contains([' ', '*', '…']);
+            if is_path && !word.contains("NNNN") {
+                named += 1;
+                assert!(
+                    root().join(&word).exists(),
+                    "{path} names {word}, which is not there"
+                );
+            }
+        }
+    }
+    assert!(named > 20, "only {named} files found");
+}
+
+#[test]
+fn the_code_map_is_the_tree() {
+    let text = read("ARCHITECTURE.md");
+    let sources = |folder: &str| {
+        files_below(folder)
+            .into_iter()
+            .filter(|p| p.ends_with(".rs"))
+            .map(PathBuf::from)
+    };
+    let mut folders: BTreeSet<PathBuf> = BTreeSet::new();
+    for crate_sources in ["src", "crates/model/src", "crates/sim/src", "crates/calib/src"] {
+        folders.extend(sources(crate_sources).map(|p| p.parent().unwrap().to_owned()));
+    }
+    for folder in folders {
+        let folder = folder.to_str().unwrap();
+        let named = first_column(&text, &format!("### `{folder}` "));
+        let is_own = |path: &PathBuf| path.parent() == Some(Path::new(folder));
+        let mut there: BTreeSet<String> = BTreeSet::new();
+        for path in sources(folder) {
+            let stem = path.file_stem().unwrap().to_str().unwrap().to_owned();
+            // Modules in folders of their own are known by the folder; lib.rs is the crate itself.
+            let module = if is_own(&path) {
+                stem
+            } else {
+                let inner = path.strip_prefix(folder).unwrap();
+                inner.iter().next().unwrap().to_str().unwrap().to_owned()
+            };
+            there.insert(module);
+        }
+        there.remove("mod");
+        if folder != "src" {
+            there.remove("lib");
+        }
+        assert_eq!(named, there, "ARCHITECTURE.md (left) and {folder} (right)");
+    }
+}
+
+/// The verbs of the program, from its help.
+fn verbs() -> BTreeSet<String> {
+    let help = stdout(&run(root(), &["--help"]));
+    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1);
+    let verbs: BTreeSet<String> = commands
+        .take_while(|line| !line.is_empty())
+        .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|verb| *verb != "help")
+        .map(str::to_owned)
+        .collect();
+    assert!(verbs.contains("demo") && verbs.len() > 5, "{verbs:?} in\n{help}");
+    verbs
+}
+
+/// Every `catoptric …` command that a document shows, as words.
+fn commands_of_the_program() -> Vec<(String, Vec<String>)> {
+    let mut commands = Vec::new();
+    for (path, text) in documents() {
+        let shown = code_blocks(&text, "sh").concat();
+        let lines = shown.lines().map(str::to_owned).chain(code_words(&text));
+        for line in lines.flat_map(|l| l.split("&&").map(|c| c.trim().to_owned()).collect::<Vec<_>>()) {
+            if let Some(rest) = line.strip_prefix("catoptric ") {
+                commands.push((path.clone(), rest.split_whitespace().map(str::to_owned).collect()));
+            }
+        }
+    }
+    commands
+}
+
+#[test]
+fn every_verb_is_documented_and_every_documented_verb_and_option_exists() {
+    let verbs = verbs();
+    let commands = commands_of_the_program();
+    let shown: BTreeSet<String> = commands
+        .iter()
+        .filter(|(path, _)| path == "README.md" || path.starts_with("docs/guide/"))
+        .map(|(_, words)| words[0].clone())
+        .filter(|word| !word.starts_with('-'))
+        .collect();
+    assert_eq!(shown, verbs, "documented (left) and in the help (right)");
+    for (path, words) in commands {
+        let of_verb = if words[0].starts_with('-') {
+            vec!["--help"]
+        } else {
+            vec![words[0].as_str(), "--help"]
+        };
+        let help = stdout(&run(root(), &of_verb));
+        for option in words.iter().filter(|w| w.starts_with('-')) {
+            assert!(
+                help.contains(option.as_str()),
+                "{path}: {words:?} has no {option}:\n{help}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_readme_s_commands_are_run_by_ci() {
+    let ci = read(".ci/run").replace(" --locked", "");
+    let blocks = code_blocks(&read("README.md"), "sh");
+    let commands: Vec<&str> = blocks.iter().flat_map(|b| b.lines()).collect();
+    assert_eq!(
+        commands,
+        ["cargo run --release -- demo", "cargo test --workspace"]
+    );
+    for command in commands {
+        let is_run = ci
+            .lines()
+            .any(|line| line == command || line.starts_with(&format!("{command} ")));
+        assert!(is_run, ".ci/run does not run {command:?}");
+    }
+}
+
+#[test]
+fn the_demo_prints_what_the_readme_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), &["demo"]);
+    assert!(output.status.success());
+    let without_time = |text: &str| -> Vec<String> {
+        text.lines()
+            .filter(|l| !l.starts_with("took "))
+            .map(str::to_owned)
+            .collect()
+    };
+    let printed = stdout(&output);
+    for path in ["README.md", "docs/guide/1-getting-started.md"] {
+        let shown = &code_blocks(&read(path), "text")[0];
+        assert_eq!(
+            without_time(shown),
+            without_time(&printed),
+            "{path} is out of date; demo prints:\n{printed}"
+        );
+    }
+}
+
+/// Paths of all keys of a value; lists are `name[]`, maps with free keys end where they are named.
+fn keys(value: &Value, free: &[&str]) -> BTreeSet<String> {
+    fn walk(value: &Value, path: &str, free: &[&str], found: &mut BTreeSet<String>) {
+        match value {
+            Value::Object(map) if !free.contains(&path) => {
+                for (key, value) in map {
+                    let path = if path.is_empty() {
+                        key.clone()
+                    } else {
+                        format!("{path}.{key}")
+                    };
+                    walk(value, &path, free, found);
+                }
+            }
+            Value::Array(items) if items.iter().any(Value::is_object) => {
+                for item in items {
+                    walk(item, &format!("{path}[]"), free, found);
+                }
+            }
+            _ => {
+                found.insert(path.to_owned());
+            }
+        }
+    }
+    let mut found = BTreeSet::new();
+    walk(value, "", free, &mut found);
+    found
+}
+
+/// A calibration in which every key has a value.
+fn every_key() -> Calibration {
+    let estimate = BeamEstimate {
+        facet: Some("left".to_owned()),
+        azimuth_rad: Some(0.1),
+        elevation_rad: Some(0.7),
+        distance_m: Some(0.07),
+        covariance_rad2: Some([[1e-6, 0.0], [0.0, 1e-6]]),
+        noise_covariance_rad2: Some([[1e-8, 0.0], [0.0, 1e-8]]),
+        null_direction: Some([0.0, 1.0]),
+        poses: Some(6),
+        readings: Some(600),
+        iterations: Some(4),
+        rms_residual_m: Some(1e-3),
+        ..BeamEstimate::without_angles(700, Status::Solved, Some("for the sake of its key".to_owned()))
+    };
+    let facet = FacetEstimate {
+        facet: "left".to_owned(),
+        normal: [0.0, -1.0, 0.0],
+        offset_m: 0.05,
+        covariance: [[0.0; 3]; 3],
+    };
+    let mount = MountEstimate {
+        translation_m: [0.0; 3],
+        rotation_xyzw: [0.0, 0.0, 0.0, 1.0],
+        covariance: Some([[0.0; 6]; 6]),
+    };
+    Calibration {
+        schema_version: 1,
+        method: "mine".to_owned(),
+        frame: "sensor".to_owned(),
+        beams: vec![estimate],
+        facets: vec![facet],
+        rig_from_sensor: Some(mount),
+        bias: Some(RangeBias::default()),
+    }
+}
+
+#[test]
+fn documented_keys_are_the_keys_of_the_files() {
+    let text = read("docs/guide/5-files.md");
+    let same = |heading: &str, value: &Value, free: &[&str]| {
+        let documented = first_column(&text, &format!("## {heading}"));
+        assert_eq!(
+            documented,
+            keys(value, free),
+            "{heading}: documented (left) and written (right)"
+        );
+    };
+    let json = |value: Result<Value, serde_json::Error>| value.unwrap();
+
+    same(
+        "calibration.json",
+        &json(serde_json::to_value(every_key())),
+        &["bias.color"],
+    );
+
+    let sets = ["experiment.scans_per_pose=1", "scanner.sub_rays=1"].map(str::to_owned);
+    let small = scene::parse(scene::scene_template(Layout::TwoMirror), "two-mirror.toml", &sets).unwrap();
+    let laboratory = sim::Laboratory::new(&small, small.seed).unwrap();
+    let (dataset, truth) = (laboratory.dataset().unwrap(), laboratory.truth().unwrap());
+    same(
+        "session.toml",
+        &json(serde_json::to_value(&dataset.session)),
+        &["believed.bias.color"],
+    );
+    same("truth.json", &json(serde_json::to_value(&truth)), &["bias.color"]);
+
+    let calibration = calib::calibrate(&dataset, calib::Method::Beam, &calib::Options::default()).unwrap();
+    let score = score(&dataset, &calibration, Some(&truth));
+    same(
+        "score.json",
+        &json(serde_json::to_value(&score)),
+        &["statuses", "nulls"],
+    );
+
+    let labels: BTreeSet<String> = dataset
+        .poses
+        .iter()
+        .flat_map(|p| keys(&json(serde_json::to_value(&p.label)), &[]))
+        .collect();
+    let topics_and_labels = first_column(&text, "## observations.mcap");
+    let documented: BTreeSet<String> = topics_and_labels
+        .into_iter()
+        .filter(|w| !w.starts_with('/'))
+        .collect();
+    assert_eq!(
+        documented, labels,
+        "/session/pose: documented (left) and written (right)"
+    );
+
+    let folder = tempfile::tempdir().unwrap();
+    let scene = root().join("scenes/two-mirror.toml");
+    let arguments = [
+        "simulate",
+        scene.to_str().unwrap(),
+        "--out",
+        "dataset",
+        "--json",
+        "--returns",
+    ];
+    let output = run(
+        folder.path(),
+        &[&arguments[..], &["--set", &sets[0], "--set", &sets[1]]].concat(),
+    );
+    assert!(output.status.success());
+    let manifest = fs::read_to_string(folder.path().join("dataset/manifest.json")).unwrap();
+    same(
+        "manifest.json",
+        &json(serde_json::from_str(&manifest)),
+        &["files"],
+    );
+    for file in files_of_dataset(&text) {
+        assert!(
+            folder.path().join("dataset").join(&file).is_file(),
+            "a dataset has no {file}"
+        );
+    }
+    let figures = keys(&json(serde_json::from_str(&stdout(&output))), &[]);
+    let section = text.split("## simulate --json").nth(1).unwrap();
+    let documented: BTreeSet<String> = code_words(section).into_iter().collect();
+    assert_eq!(
+        documented, figures,
+        "simulate --json: documented (left) and printed (right)"
+    );
+}
+
+/// The files that the picture of a dataset's folder lists.
+fn files_of_dataset(text: &str) -> Vec<String> {
+    let picture = &code_blocks(text, "text")[0];
+    let files: Vec<String> = picture
+        .lines()
+        .filter_map(|line| line.split_whitespace().next())
+        .map(str::to_owned)
+        .collect();
+    assert!(files.len() > 4, "{picture}");
+    files
+}
+
+#[test]
+fn every_status_is_explained() {
+    let text = read("docs/guide/4-calibrating-and-scoring.md");
+    let explained = first_column(&text, "## Every element has a status");
+    let all: BTreeSet<String> = Status::ALL.iter().map(|s| s.word().to_owned()).collect();
+    assert_eq!(explained, all);
+}
