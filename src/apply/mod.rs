@@ -1,0 +1,168 @@
+//! From the readings of a stretch to points in space: Cooper, Eqs. (9) and (10), with a calibration.
+
+use crate::score::residual;
+use catoptric_model::{Calibration, Dataset, Deflection, Pose, PoseKind, PoseRecord, Status, beam, cloud};
+use nalgebra::Point3;
+
+/// Frame of a cloud.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum CloudFrame {
+    /// The laser base frame.
+    Sensor,
+    /// The marker body on the superstructure.
+    Rig,
+    /// The frame of motion capture.
+    #[default]
+    Room,
+}
+
+impl CloudFrame {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Sensor, Self::Rig, Self::Room];
+
+    /// The word that files and commands use.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Sensor => "sensor",
+            Self::Rig => "rig",
+            Self::Room => "room",
+        }
+    }
+}
+
+/// A point and the reading it comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CloudPoint {
+    /// Where it is, in metres.
+    pub position: Point3<f64>,
+    /// Beam.
+    pub beam: usize,
+    /// Scan of the stretch, from 0.
+    pub scan: usize,
+}
+
+/// A cloud and what is not in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointCloud {
+    /// Its frame.
+    pub frame: CloudFrame,
+    /// Stretch it was made from.
+    pub pose: usize,
+    /// Whether the mounting was taken from the drawing because the calibration has none.
+    pub mount_is_nominal: bool,
+    /// The points, scan after scan.
+    pub points: Vec<CloudPoint>,
+    /// Readings that are no ranges: no return, too close, invalid.
+    pub without_range: usize,
+    /// Ranges of elements that the calibration gives no direction.
+    pub without_direction: usize,
+    /// Elements that the calibration gives no direction.
+    pub unsolved_elements: usize,
+}
+
+/// Why no cloud can be made.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ApplyError {
+    /// No stretch has the number asked for.
+    #[error("the dataset has no pose {asked}; its poses are numbered {first} to {last}")]
+    NoSuchPose {
+        /// The number asked for.
+        asked: usize,
+        /// The smallest there is.
+        first: usize,
+        /// The largest there is.
+        last: usize,
+    },
+    /// No stretch was asked for, and there is none of the room.
+    #[error("the dataset has no stretch of the empty room; say which pose to apply the calibration to")]
+    NoRoom,
+}
+
+/// Lifts every range of a stretch into space: of pose number `pose`, or else of the first stretch of the empty room.
+///
+/// Solved elements follow Eq. 9, direct ones stay in the scan plane, the others are left out and counted. Ranges are
+/// corrected by E_r and by E_c of the room's color (of the board's, in a stretch with a board), as calibrated or
+/// believed. Unlike the paper's Eq. 3, E_a is not taken off: the incidence on an unknown scene is unknown.
+///
+/// # Errors
+/// [`ApplyError`] if there is no such stretch.
+pub fn apply(
+    dataset: &Dataset,
+    calibration: &Calibration,
+    pose: Option<usize>,
+    frame: CloudFrame,
+) -> Result<PointCloud, ApplyError> {
+    let record = find(dataset, pose)?;
+    let rig_from_sensor = residual::mount(dataset, calibration);
+    let frame_from_sensor = match frame {
+        CloudFrame::Sensor => Pose::identity(),
+        CloudFrame::Rig => rig_from_sensor,
+        CloudFrame::Room => record.room_from_rig * rig_from_sensor,
+    };
+    let bias = residual::bias(dataset, calibration);
+    let color = record
+        .label
+        .color
+        .as_deref()
+        .unwrap_or(&dataset.session.room.color);
+    let deflections: Vec<Option<Deflection>> =
+        (0..record.beams).map(|b| deflection(calibration, b)).collect();
+
+    let mut result = PointCloud {
+        frame,
+        pose: record.label.pose,
+        mount_is_nominal: frame != CloudFrame::Sensor && calibration.rig_from_sensor.is_none(),
+        points: Vec::new(),
+        without_range: 0,
+        without_direction: 0,
+        unsolved_elements: deflections.iter().filter(|d| d.is_none()).count(),
+    };
+    for (scan, ranges) in record.ranges.chunks(record.beams.max(1)).enumerate() {
+        for (beam, (&range, deflection)) in ranges.iter().zip(&deflections).enumerate() {
+            if !range.is_finite() {
+                result.without_range += 1;
+                continue;
+            }
+            let Some(deflection) = deflection else {
+                result.without_direction += 1;
+                continue;
+            };
+            // E_a of whatever incidence is not added, so any will do here.
+            let terms = bias.terms(range, 1.0, color);
+            let corrected = range - terms.distance - terms.color;
+            let in_sensor = cloud::lift(deflection, beam::azimuth(beam), corrected);
+            result.points.push(CloudPoint {
+                position: frame_from_sensor * in_sensor,
+                beam,
+                scan,
+            });
+        }
+    }
+    Ok(result)
+}
+
+fn find(dataset: &Dataset, pose: Option<usize>) -> Result<&PoseRecord, ApplyError> {
+    let Some(asked) = pose else {
+        return dataset.first(PoseKind::Room).ok_or(ApplyError::NoRoom);
+    };
+    let numbers = || dataset.poses.iter().map(|p| p.label.pose);
+    let found = dataset.poses.iter().find(|p| p.label.pose == asked);
+    found.ok_or_else(|| ApplyError::NoSuchPose {
+        asked,
+        first: numbers().min().unwrap_or(0),
+        last: numbers().max().unwrap_or(0),
+    })
+}
+
+/// What the calibration says becomes of a beam; `None` where it does not know.
+fn deflection(calibration: &Calibration, beam: usize) -> Option<Deflection> {
+    let estimate = calibration.beam(beam)?;
+    match estimate.status {
+        Status::Solved => estimate.deflection(),
+        Status::Direct => Some(Deflection::NONE),
+        Status::TooFewPoses | Status::Unobservable | Status::NotConverged | Status::Rejected => None,
+    }
+}
+
+#[cfg(test)]
+mod tests;
