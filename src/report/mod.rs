@@ -32,9 +32,7 @@ pub fn report(
         escape(name)
     );
     html += &format!("<p>{}</p>\n", escape(&words::experiment(dataset, truth)));
-    for (calibration, score) in results {
-        html += &words::verdict(calibration, score);
-    }
+    html += &words::verdicts(results);
     if results.is_empty() {
         html += "<p>No calibration was given to this report.</p>\n";
     }

@@ -25,29 +25,24 @@ pub(in crate::report) fn fans(dataset: &Dataset, calibration: &Calibration) -> S
     let solved = solved(dataset, calibration);
     let mut svgs = "<div class=\"views\">\n".to_owned();
     for (title, reach, [i, j], [x, y]) in [
-        (
-            "From above",
-            REACH_M,
-            [0, 1],
-            ["x, forward (m)", "y, to port (m)"],
-        ),
+        ("From above", REACH_M, [0, 1], ["x, forward (m)", "y, left (m)"]),
         (
             "From above, the mirrors close up",
             CLOSE_M,
             [0, 1],
-            ["x, forward (m)", "y, to port (m)"],
+            ["x, forward (m)", "y, left (m)"],
         ),
         ("From the side", REACH_M, [0, 2], ["x, forward (m)", "z, up (m)"]),
-        ("From behind", REACH_M, [1, 2], ["y, to port (m)", "z, up (m)"]),
+        ("From behind", REACH_M, [1, 2], ["y, left (m)", "z, up (m)"]),
     ] {
-        // Seen from behind, port is on the left.
+        // Seen from behind, left is on the left.
         let mirrored = if i == 1 { -1.0 } else { 1.0 };
         let view = |p: &Point3<f64>| (mirrored * p[i], p[j]);
         let axes = Axes {
             x: -reach * 1.05..reach * 1.05,
             y: -reach * 1.05..reach * 1.05,
             x_label: if i == 1 {
-                "−y, to starboard (m)".to_owned()
+                "−y, right (m)".to_owned()
             } else {
                 x.to_owned()
             },
