@@ -7,6 +7,7 @@ mod figure;
 mod page;
 mod plots;
 mod scores;
+mod verdict;
 mod words;
 
 use crate::apply::PointCloud;
@@ -32,7 +33,7 @@ pub fn report(
         escape(name)
     );
     html += &format!("<p>{}</p>\n", escape(&words::experiment(dataset, truth)));
-    html += &words::verdicts(results);
+    html += &verdict::verdicts(results);
     if results.is_empty() {
         html += "<p>No calibration was given to this report.</p>\n";
     }
