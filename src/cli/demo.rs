@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         let result = score(&dataset, &calibration, truth.as_ref());
         io::write_json(folder.join(format!("score-{name}.json")), &result)?;
         lines.push(format!(
-            "{name}: {}; per-axis error {} rms, at best {}",
+            "{name}: {}; per-axis error {} rms, bound {}",
             summary(&calibration),
             figure(result.per_axis_rms_deg, 4, "°"),
             figure(result.crlb_per_axis_deg, 4, "°")

@@ -2,6 +2,7 @@
 
 use crate::score::percentile;
 use plotters::coord::Shift;
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use std::ops::Range;
 
@@ -27,7 +28,8 @@ const AXIS_ROOM: u32 = 52;
 const MARGIN: u32 = 10;
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Outcome = Result<(), Box<dyn std::error::Error>>;
+type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+type Failure = Box<dyn std::error::Error>;
 
 /// The color of the facet of a given number.
 pub(super) fn color(facet: usize) -> RGBColor {
@@ -82,10 +84,7 @@ pub(super) struct Bar {
 pub(super) fn plan(size: (u32, u32), axes: &Axes, title: &str, strokes: &[Stroke], words: &[Word]) -> String {
     draw(size, title, |area| {
         let mut chart = frame(area, axes, true)?;
-        for s in strokes {
-            let style = s.color.mix(s.opacity).stroke_width(s.width);
-            chart.draw_series(LineSeries::new(s.points.iter().copied(), style))?;
-        }
+        draw_strokes(&mut chart, strokes)?;
         for w in words {
             let style = (FONT, LABEL_SIZE).into_font().color(&w.color);
             let anchor = plotters::style::text_anchor::Pos::new(
@@ -108,10 +107,7 @@ pub(super) fn scatter(
 ) -> String {
     draw(size, title, |area| {
         let mut chart = frame(area, axes, true)?;
-        for s in strokes {
-            let style = s.color.mix(s.opacity).stroke_width(s.width);
-            chart.draw_series(LineSeries::new(s.points.iter().copied(), style))?;
-        }
+        draw_strokes(&mut chart, strokes)?;
         let dots = points.iter().map(|&(x, y, c)| Circle::new((x, y), 1, c.filled()));
         chart.draw_series(dots)?;
         Ok(())
@@ -160,20 +156,16 @@ pub(super) fn strip(size: (u32, u32), axes: &Axes, title: &str, bars: &[Bar], ro
     })
 }
 
+fn draw_strokes(chart: &mut Chart, strokes: &[Stroke]) -> Result<(), Failure> {
+    for s in strokes {
+        let style = s.color.mix(s.opacity).stroke_width(s.width);
+        chart.draw_series(LineSeries::new(s.points.iter().copied(), style))?;
+    }
+    Ok(())
+}
+
 /// Coordinate frame with grid and axis labels.
-#[allow(clippy::type_complexity)]
-fn frame<'a>(
-    area: &Area<'a>,
-    axes: &Axes,
-    y_labels: bool,
-) -> Result<
-    ChartContext<
-        'a,
-        SVGBackend<'a>,
-        Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>,
-    >,
-    Box<dyn std::error::Error>,
-> {
+fn frame<'a>(area: &Area<'a>, axes: &Axes, y_labels: bool) -> Result<Chart<'a>, Failure> {
     let mut chart = ChartBuilder::on(area)
         .margin(MARGIN)
         .x_label_area_size(AXIS_ROOM)
@@ -210,7 +202,7 @@ fn tick(value: f64) -> String {
 }
 
 /// An SVG for inlining: without a name space, which HTML supplies, with a title, and as wide as the page lets it.
-fn draw(size: (u32, u32), title: &str, content: impl FnOnce(&Area) -> Outcome) -> String {
+fn draw(size: (u32, u32), title: &str, content: impl FnOnce(&Area) -> Result<(), Failure>) -> String {
     let mut svg = String::new();
     let outcome = {
         let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();

@@ -26,6 +26,11 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
     }
 }
 
+/// A count; a dash where there is none.
+pub(super) fn count(value: Option<usize>) -> String {
+    value.map_or_else(|| "–".to_owned(), |c| c.to_string())
+}
+
 /// A table; columns of words are set to the left, columns of numbers to the right.
 pub(super) fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
     let is_word = |cell: &String| cell.starts_with(char::is_alphabetic);

@@ -1,7 +1,7 @@
 //! What a person would say about an experiment and a score.
 
 use super::page::{escape, number};
-use crate::score::{Score, Verdict, words as score_words};
+use crate::score::{Score, words as score_words};
 use catoptric_model::{Calibration, Dataset, PoseKind};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
@@ -39,7 +39,7 @@ pub(super) fn experiment(dataset: &Dataset, truth: Option<&Truth>) -> String {
         let class = |class| truth.beams.iter().filter(|b| b.status == class).count();
         text += &format!(
             " This is a simulation, so the truth is known: {} deflected by one mirror, {} are split at an edge, {} pass by, {} end on the structure",
-            plural_are(class(BeamClass::Deflected)),
+            elements_are(class(BeamClass::Deflected)),
             class(BeamClass::Split),
             class(BeamClass::Direct),
             class(BeamClass::Blocked) + class(BeamClass::Lost),
@@ -56,17 +56,9 @@ pub(super) fn experiment(dataset: &Dataset, truth: Option<&Truth>) -> String {
     text
 }
 
-/// The verdict on one calibration: a badge, what came back, what dominates, what is at fault.
-pub(super) fn verdict(calibration: &Calibration, score: &Score) -> String {
-    let (class, badge) = match score.verdict {
-        Verdict::Pass => ("pass", "PASS"),
-        Verdict::Fail => ("fail", "FAIL"),
-        Verdict::Blind => ("blind", "BLIND"),
-    };
-    let mut html = format!(
-        "<section class=\"verdict {class}\">\n<h3><span class=\"badge\">{badge}</span> – method “{}”</h3>\n",
-        escape(&calibration.method)
-    );
+/// What came back, what dominates, what is at fault.
+pub(super) fn findings(calibration: &Calibration, score: &Score) -> String {
+    let mut html = String::new();
     for sentence in [
         accuracy(score),
         dominance(score),
@@ -89,7 +81,7 @@ pub(super) fn verdict(calibration: &Calibration, score: &Score) -> String {
         }
         html += "</ul>\n";
     }
-    html + "</section>\n"
+    html
 }
 
 fn accuracy(score: &Score) -> String {
@@ -97,7 +89,7 @@ fn accuracy(score: &Score) -> String {
     let Some(deflected) = beams.deflected else {
         return format!(
             "{} solved. Without a truth the points they make are held against what was surveyed: they lie {} mm (rms) off the boards and {} mm off the walls of the empty room.",
-            plural_are(beams.solved),
+            elements_are(beams.solved),
             number(score.boards_mm.rms, 1),
             number(score.walls_mm.rms, 1)
         );
@@ -204,19 +196,21 @@ fn honesty(score: &Score) -> String {
 
 fn abstentions(calibration: &Calibration, score: &Score) -> String {
     let reasons = score_words::abstentions(calibration);
-    let Some(((status, reason), count)) = reasons.first() else {
+    let Some(first) = reasons.first() else {
         return String::new();
     };
-    let total: usize = reasons.iter().map(|(_, count)| count).sum();
+    let total: usize = reasons.iter().map(|a| a.count).sum();
     let solvable = match (score.beams.deflected, score.beams.abstained) {
         (None, _) => String::new(),
         (Some(_), 0) => ", none of which leaves by one mirror unsplit".to_owned(),
         (Some(_), n) => format!(", of which {n} do leave by one mirror unsplit"),
     };
     format!(
-        "{} left without a direction{solvable}. The most frequent reason, {count} times: {} ({reason}).",
-        plural_are(total),
-        status.replace('_', " ")
+        "{} left without a direction{solvable}. The most frequent reason, {} times: {} ({}).",
+        elements_are(total),
+        first.count,
+        first.status,
+        first.reason
     )
 }
 
@@ -228,12 +222,8 @@ fn plural(count: usize, noun: &str) -> String {
     }
 }
 
-fn plural_are(count: usize) -> String {
-    if count == 1 {
-        "1 element is".to_owned()
-    } else {
-        format!("{count} elements are")
-    }
+fn elements_are(count: usize) -> String {
+    score_words::elements(count, "is", "are")
 }
 
 #[cfg(test)]

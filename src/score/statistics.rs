@@ -15,6 +15,11 @@ pub(super) fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     sum / count
 }
 
+/// Largest of some numbers; NaN of nothing.
+pub(super) fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(f64::NAN, f64::max)
+}
+
 /// The value below which a share of the values lies, interpolated linearly between order statistics.
 ///
 /// Of n values in order, the share p stands at place p·(n − 1), counted from 0: p = 0 is the smallest, p = 1 the

@@ -1,6 +1,10 @@
+//! The truth has no error, known errors come back as their figures, and every element is counted once.
+
+use super::element::wrap;
 use super::*;
 use crate::sample::{noisy, perfect, sample, turned};
-use catoptric_model::BeamEstimate;
+use catoptric_model::{BeamEstimate, Status};
+use nalgebra::Vector3;
 
 fn estimate(calibration: &mut Calibration, beam: usize) -> &mut BeamEstimate {
     &mut calibration.beams[beam]

@@ -1,5 +1,6 @@
 //! What a score comes to, and why, in words.
 
+use super::nulls::nulls;
 use super::{DISHONEST_NEES, Score, Verdict};
 use catoptric_model::{Calibration, Status};
 use std::collections::BTreeMap;
@@ -130,8 +131,8 @@ fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<St
     if score.beams.abstained as f64 > MANY * candidates as f64 {
         let reasons: Vec<String> = abstentions(calibration)
             .into_iter()
-            .map(|((status, reason), count)| format!("{count} {} ({reason})", status.replace('_', " ")))
             .take(3)
+            .map(|a| format!("{} {} ({})", a.count, a.status, a.reason))
             .collect();
         warnings.push(format!(
             "{} of {candidates} {UNSOLVED}; over all elements the usual reasons are: {}",
@@ -148,24 +149,41 @@ fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<St
     warnings
 }
 
+/// Elements without a direction that share a reason.
+pub(crate) struct Abstention {
+    /// Their status, as a reader would write it.
+    pub(crate) status: String,
+    /// The reason of the first of them.
+    pub(crate) reason: String,
+    /// How many they are.
+    pub(crate) count: usize,
+}
+
 /// Reasons of the elements that are neither solved nor direct, the most frequent first.
 ///
 /// Reasons that differ in their numbers only count as one, and the first of them stands for all.
-pub(crate) fn abstentions(calibration: &Calibration) -> Vec<((&'static str, String), usize)> {
-    let mut groups: BTreeMap<(&'static str, String), (String, usize)> = BTreeMap::new();
+pub(crate) fn abstentions(calibration: &Calibration) -> Vec<Abstention> {
+    let mut groups: BTreeMap<(&'static str, String), Abstention> = BTreeMap::new();
     for b in &calibration.beams {
         if !matches!(b.status, Status::Solved | Status::Direct) {
             let reason = b.reason.as_deref().unwrap_or("no reason given");
             let group = groups.entry((b.status.word(), without_numbers(reason)));
-            group.or_insert_with(|| (reason.to_owned(), 0)).1 += 1;
+            let first = || Abstention {
+                status: spelled(b.status),
+                reason: reason.to_owned(),
+                count: 0,
+            };
+            group.or_insert_with(first).count += 1;
         }
     }
-    let mut sorted: Vec<_> = groups
-        .into_iter()
-        .map(|((status, _), (example, count))| ((status, example), count))
-        .collect();
-    sorted.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    let mut sorted: Vec<_> = groups.into_values().collect();
+    sorted.sort_by_key(|a| std::cmp::Reverse(a.count));
     sorted
+}
+
+/// A status as a reader would write it.
+pub(crate) fn spelled(status: Status) -> String {
+    status.word().replace('_', " ")
 }
 
 fn without_numbers(text: &str) -> String {
@@ -180,96 +198,8 @@ fn without_numbers(text: &str) -> String {
     words.collect::<Vec<_>>().join(" ")
 }
 
-fn nulls(score: &Score, calibration: &Calibration, has_truth: bool) -> BTreeMap<&'static str, &'static str> {
-    let no_mount = "the calibration has no rig_from_sensor";
-    let too_few = "no rotation is determined by these directions";
-    let none_scored = "no solved element is deflected and unsplit in truth";
-    let scored = score.scored().next().is_some();
-    let because = |reason: &'static str| match (has_truth, scored) {
-        (false, _) => "there is no truth",
-        (true, false) => none_scored,
-        (true, true) => reason,
-    };
-    let room = if calibration.rig_from_sensor.is_none() {
-        no_mount
-    } else {
-        "the rig was never tracked"
-    };
-    let covariance = if score.scored().all(|e| e.mahalanobis_squared.is_none()) {
-        "no scored element has a covariance"
-    } else {
-        "infinite: a covariance that is not positive definite rules out the error that was made"
-    };
-    let efficiency = if score.crlb_per_axis_deg.is_finite() {
-        "infinite: the error is exactly zero"
-    } else {
-        "there is no bound"
-    };
-    let no_bound = "no bound exists: the believed errors are zero, or the boards do not determine the angles";
-    let figures = [
-        ("direction_deg", score.direction_deg.rms, because(none_scored)),
-        ("per_axis_rms_deg", score.per_axis_rms_deg, because(none_scored)),
-        ("common_mode_deg", score.common_mode_deg, because(too_few)),
-        (
-            "differential_per_axis_rms_deg",
-            score.differential_per_axis_rms_deg,
-            because(too_few),
-        ),
-        ("direction_room_deg", score.direction_room_deg.rms, because(room)),
-        (
-            "per_axis_rms_room_deg",
-            score.per_axis_rms_room_deg,
-            because(room),
-        ),
-        (
-            "common_mode_room_deg",
-            score.common_mode_room_deg,
-            because(if score.per_axis_rms_room_deg.is_nan() {
-                room
-            } else {
-                too_few
-            }),
-        ),
-        (
-            "distance_mm",
-            score.distance_mm.rms,
-            because("no scored element has a distance_m"),
-        ),
-        ("point_mm", score.point_mm.at_1m, because(none_scored)),
-        ("point_room_mm", score.point_room_mm.at_1m, because(room)),
-        ("nees_mean", score.nees_mean, because(covariance)),
-        ("coverage_95", score.coverage_95, because(covariance)),
-        ("crlb_per_axis_deg", score.crlb_per_axis_deg, because(no_bound)),
-        ("efficiency", score.efficiency, because(efficiency)),
-        (
-            "split.per_axis_rms_deg",
-            score.split.per_axis_rms_deg,
-            "no split element is scored",
-        ),
-        (
-            "multi_bounce.per_axis_rms_deg",
-            score.multi_bounce.per_axis_rms_deg,
-            "one deflection does not describe them",
-        ),
-        (
-            "boards_mm",
-            score.boards_mm.rms,
-            "no solved element reads a board",
-        ),
-        (
-            "walls_mm",
-            score.walls_mm.rms,
-            "no solved element reads a wall of the empty room",
-        ),
-    ];
-    figures
-        .into_iter()
-        .filter(|(_, value, _)| !value.is_finite())
-        .map(|(key, _, reason)| (key, reason))
-        .collect()
-}
-
-fn elements(count: usize, one: &str, many: &str) -> String {
+/// "1 element is", "2 elements are".
+pub(crate) fn elements(count: usize, one: &str, many: &str) -> String {
     if count == 1 {
         format!("1 element {one}")
     } else {

@@ -1,0 +1,88 @@
+//! Numbers that no good beam shows: no return, too close, of the structure, or spread too far in the known room.
+
+use super::Screen;
+use crate::observations::azimuth;
+use crate::spread;
+use catoptric_model::{PoseKind, PoseRecord, Summary, beam};
+use nalgebra::Point3;
+
+/// A reading this near is of the structure around the sensor, in metres, wherever the mirrors are.
+const STRUCTURE_RANGE: f64 = 0.12;
+
+/// How far behind the farthest mirror point a reading is still of the structure, in metres.
+const STRUCTURE_DEPTH: f64 = 0.03;
+
+impl<'a> Screen<'a> {
+    /// Numbers that no good beam shows, in words.
+    pub(super) fn abnormal(&self, beam: usize, facets: &[usize]) -> Option<String> {
+        let session = &self.dataset.session;
+        let noise = session.believed.range_noise_sd_mm * 1e-3;
+        let mut seen: Vec<&Summary> = Vec::new();
+        let (mut count, mut missing, mut close, mut structure) = (0, 0, 0, 0);
+        let nearest = self.structure_limit(beam, facets);
+        for (record, summary) in self.screened() {
+            let summary = &summary[beam];
+            count += summary.count;
+            missing += summary.missing;
+            if summary.missing > 0 {
+                close += record.readings(beam).filter(|r| *r == f64::NEG_INFINITY).count();
+            }
+            if summary.count > summary.missing {
+                seen.push(summary);
+                structure += usize::from(summary.mean < nearest);
+            }
+        }
+        let total = count + missing;
+        if 2 * close > total {
+            return Some(format!("too close in {close} of {total} readings"));
+        }
+        if seen.is_empty() {
+            return Some(format!("no return in {missing} of {total} readings"));
+        }
+        if 2 * structure > seen.len() {
+            return Some(format!(
+                "reads the structure: below {nearest:.3} m in {structure} of {} stretches",
+                seen.len()
+            ));
+        }
+        let room = self
+            .screened()
+            .filter(|(record, _)| record.label.kind == PoseKind::Room);
+        for (_, summary) in room {
+            let summary = &summary[beam];
+            if spread::is_abnormal(summary, noise) {
+                return Some(format!(
+                    "abnormal spread in the known room: standard deviation {:.1} mm of {} readings, at most {:.1} mm \
+                     expected",
+                    1e3 * summary.sd,
+                    summary.count,
+                    1e3 * spread::largest_spread(noise, summary.count)
+                ));
+            }
+        }
+        None
+    }
+
+    /// Range below which a reading is of the structure, in metres.
+    fn structure_limit(&self, beam: usize, facets: &[usize]) -> f64 {
+        let session = &self.dataset.session;
+        let u = beam::direction(azimuth(session, beam));
+        let origin = Point3::origin();
+        facets
+            .iter()
+            .filter_map(|f| session.facets[*f].plane()?.distance_along(&origin, &u))
+            .map(|d| d + STRUCTURE_DEPTH)
+            // Beyond its own polygon a facet's plane runs off to anywhere; mirrors stand within a hand of the sensor.
+            .filter(|d| *d < 3.0 * STRUCTURE_RANGE)
+            .fold(STRUCTURE_RANGE, f64::max)
+    }
+
+    /// All stretches with the mirrors on, with their statistics.
+    fn screened(&self) -> impl Iterator<Item = (&'a PoseRecord, &'a Vec<Summary>)> {
+        self.dataset
+            .poses
+            .iter()
+            .zip(self.summaries)
+            .filter(|(record, _)| record.label.kind != PoseKind::Bare)
+    }
+}

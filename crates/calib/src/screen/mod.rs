@@ -1,0 +1,85 @@
+//! Which elements a mirror deflects (step 4): what each beam read in the known room and elsewhere, against what a beam
+//! that no mirror touches would have read.
+
+mod abnormal;
+mod near;
+mod tally;
+
+use crate::common::CommonErrors;
+use crate::covariance::MountUncertainty;
+use crate::observations::BoardInSensor;
+use crate::pose::Mount;
+use catoptric_model::{Dataset, Pose, Summary};
+
+pub use near::{EDGE_BEAMS, facets_near};
+
+/// What screening makes of an element.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Candidate {
+    /// It reads what a beam without a mirror reads; the text says how often.
+    Direct(String),
+    /// A mirror may deflect it: indices of facets, the likeliest first.
+    Deflected(Vec<usize>),
+    /// Its readings are of no use, and why.
+    Rejected(String),
+}
+
+/// The stretches of a dataset prepared for screening.
+pub struct Screen<'a> {
+    dataset: &'a Dataset,
+    summaries: &'a [Vec<Summary>],
+    mount: &'a MountUncertainty,
+    common: CommonErrors<'a>,
+    boards: &'a [Option<BoardInSensor>],
+    rooms_from_sensor: Vec<Pose>,
+}
+
+impl<'a> Screen<'a> {
+    /// Prepares the stretches; `boards` holds each pose's board in the sensor frame.
+    pub fn new(
+        dataset: &'a Dataset,
+        summaries: &'a [Vec<Summary>],
+        mount: &'a Mount,
+        boards: &'a [Option<BoardInSensor>],
+    ) -> Self {
+        Self {
+            dataset,
+            summaries,
+            mount: &mount.uncertainty,
+            common: CommonErrors::of(&dataset.session),
+            boards,
+            rooms_from_sensor: dataset
+                .poses
+                .iter()
+                .map(|p| p.room_from_rig * mount.rig_from_sensor)
+                .collect(),
+        }
+    }
+
+    /// The class of one element, from statistics alone.
+    pub fn classify(&self, beam: usize) -> Candidate {
+        let session = &self.dataset.session;
+        let facets = facets_near(&session.facets, beam);
+        let tally = self.tally(beam, &facets);
+        if let Some(reason) = self.abnormal(beam, &facets) {
+            return Candidate::Rejected(reason);
+        }
+        if tally.is_direct() {
+            return Candidate::Direct(format!(
+                "reads what is straight ahead in {} of {} stretches",
+                tally.agreeing, tally.usable
+            ));
+        }
+        if !facets.is_empty() {
+            return Candidate::Deflected(facets);
+        }
+        Candidate::Rejected(match tally.worst {
+            Some((expected, found, stretch)) => format!(
+                "no mirror is drawn for it, yet it reads what is straight ahead in only {} of {} stretches: \
+                 expected {expected:.3} m in stretch {stretch}, found {found:.3} m",
+                tally.agreeing, tally.usable
+            ),
+            None => "no mirror is drawn for it and no stretch shows what it reads".to_owned(),
+        })
+    }
+}
