@@ -19,7 +19,7 @@
 //! ```
 //!
 //! The words are the same everywhere: [`model`] is the vocabulary, [`sim`] the world, [`calib`] the estimator; [`io`]
-//! holds every file format. The guide's chapters are in the repository under `docs/`.
+//! holds every file format. The [`guide`] tells it chapter by chapter.
 
 pub mod apply;
 pub mod guide;

@@ -32,6 +32,15 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let begin = Instant::now();
     let folder = &arguments.out;
+    if folder.join(io::dataset::SESSION).exists() {
+        return Err(CliError::Invalid {
+            message: format!(
+                "{} is itself a dataset; the demo writes one into a folder of its own",
+                folder.display()
+            ),
+            help: Some("give another --out".to_owned()),
+        });
+    }
     let mut scene = scene::parse(scene::scene_template(Layout::Prototype), "prototype.toml", &[])?;
     scene.seed = arguments.seed.unwrap_or(scene.seed);
     let dataset_folder = folder.join("dataset");
@@ -96,7 +105,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
          took        {:.1} s\n\
          dataset     {}\n\
          report      {}\n\
-         cloud       {}: {}\n\
+         cloud       {}: {} in the room frame\n\
          next: catoptric new mine.toml && catoptric check mine.toml\n",
         scene.name,
         scene.seed,

@@ -192,6 +192,14 @@ pub fn read_dataset(dataset: &Path) -> Result<Dataset, IoError> {
 
 /// The hashes of the manifest, if there is one.
 fn read_hashes(dataset: &Path) -> Result<Option<BTreeMap<String, String>>, IoError> {
+    // Said before any of its files is missed: the folder itself is what was meant wrongly.
+    if !dataset.join(SESSION).is_file() && dataset.exists() {
+        let reason = format!("it is no dataset: there is no {SESSION} in it");
+        return Err(IoError::read(
+            dataset,
+            io::Error::new(io::ErrorKind::NotFound, reason),
+        ));
+    }
     let path = dataset.join(MANIFEST);
     match fs::read(&path) {
         Ok(bytes) => {

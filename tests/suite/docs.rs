@@ -216,6 +216,12 @@ fn the_code_map_is_the_tree() {
     }
     for folder in folders {
         let folder = folder.to_str().unwrap();
+        // A module split into a folder says itself what its parts are; the crates and the folders that hold many ideas
+        // have a table.
+        let is_crate = folder == "src" || folder.starts_with("crates/") && folder.ends_with("/src");
+        if !is_crate && !text.contains(&format!("### `{folder}` ")) {
+            continue;
+        }
         let named = first_column(&text, &format!("### `{folder}` "));
         let is_own = |path: &PathBuf| path.parent() == Some(Path::new(folder));
         let mut there: BTreeSet<String> = BTreeSet::new();

@@ -15,17 +15,26 @@ pub struct Paint {
 }
 
 /// Names of the built-in colors.
-pub const BUILT_IN: [&str; 5] = ["white", "antique_white", "pencil_grey", "jet_black", "structure"];
+pub const BUILT_IN: [&str; 6] = [
+    "white",
+    "pure_white",
+    "antique_white",
+    "pencil_grey",
+    "jet_black",
+    "structure",
+];
 
 /// Distances of Table 4, in metres.
 const TABLE_4_RANGE_M: [f64; 4] = [0.493, 1.011, 1.600, 2.007];
 
 /// Reflectivity (assumed) and Table 4's noise of a built-in color, in the order of [`BUILT_IN`].
 ///
-/// White has no table of its own: Table 2, which is the default noise, was measured on it.
+/// `white` and `structure` have no table of their own and take `errors.noise`, by default Table 2; the other four are
+/// the columns of Table 4.
 fn built_in(name: &str) -> Option<Color> {
     let (reflectivity, sd_mm) = match name {
         "white" => (0.9, None),
+        "pure_white" => (0.9, Some([4.39, 4.64, 3.52, 3.71])),
         "antique_white" => (0.8, Some([3.96, 4.69, 3.43, 3.55])),
         "pencil_grey" => (0.4, Some([3.85, 4.71, 3.96, 4.18])),
         "jet_black" => (0.05, Some([5.37, 6.06, 5.29, 5.00])),

@@ -166,7 +166,9 @@ impl Laboratory {
     /// Variance that the experimenter ascribes to a bare distance, in square metres.
     fn bare_variance(&self, readings: usize, cos: f64) -> f64 {
         let believed = self.beliefs();
-        let tilt = self.scene.superstructure.as_built.tilt_sd_deg.to_radians();
+        // The drawing gives the incidence; facet and scanner both stand a little off it.
+        let mount = self.scene.scanner.mount.tilt_tolerance_deg / 3.0_f64.sqrt();
+        let tilt = libm::hypot(self.scene.superstructure.as_built.tilt_sd_deg, mount).to_radians();
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
         let terms = [
             believed.range_noise_sd_mm / (readings as f64).sqrt(),
