@@ -40,7 +40,7 @@ pub struct Spread {
     pub rms: f64,
     /// Median.
     pub median: f64,
-    /// 95th percentile; see [`percentile`].
+    /// 95th percentile; see [`percentile`](super::percentile).
     pub p95: f64,
     /// Largest.
     pub max: f64,
