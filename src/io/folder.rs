@@ -56,7 +56,7 @@ impl StagedFolder {
         Ok(staged)
     }
 
-    /// Where files are, for now.
+    /// Where files are until the folder is put in place.
     fn root(&self) -> PathBuf {
         self.staging.path().join("new")
     }
@@ -92,7 +92,7 @@ impl StagedFolder {
         file.finish()
     }
 
-    /// Every file so far, in order of name: its name with forward slashes, and where it is for now.
+    /// Every file so far, in order of name: its name with forward slashes, and where it stands until then.
     ///
     /// # Errors
     /// [`IoError`] if the system refuses.
