@@ -4,12 +4,15 @@
 
 use crate::color::{self, Paint};
 use crate::detect::{self, Pulse};
+use crate::echo::{Echo, Receiver};
 use crate::error::SimError;
 use crate::footprint::{self, SubRay};
 use crate::optics::{End, MAX_BOUNCES, Path, Role, Setting};
+use crate::phase;
 use crate::power::{self, Illumination};
-use crate::scanner::{RANGE_MAX_M, RANGE_MIN_M};
-use crate::scene::{BeamShape, ErrorModel, Errors, Light, Scene};
+use crate::scene::{
+    BeamShape, Detection, Detector, EchoChoice, ErrorModel, Errors, Light, Limits, Principle, Scene,
+};
 use crate::truth::BeamClass;
 use catoptric_model::{BiasTerms, RangeBias, beam};
 
@@ -19,6 +22,9 @@ pub struct Sensor {
     sub_rays: Vec<SubRay>,
     light: Light,
     mirror_reflectivity: f64,
+    limits: Limits,
+    detection: Detection,
+    receiver: Receiver,
     pulse_sd: f64,
     threshold: f64,
     reference_walk: f64,
@@ -26,10 +32,16 @@ pub struct Sensor {
     errors: Errors,
 }
 
+/// Most echoes of a beam that have their own chance of being detected.
+pub const MAX_ECHOES: usize = 8;
+
+/// Echoes this many σ of the receiver's noise below the threshold are never detected: the chance is below 3e-7.
+const FAINTEST: f64 = 5.0;
+
 /// What a beam brings home, each contribution by itself. The reading is their sum, then drift, noise and rounding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Return {
-    /// Surface that dominates the first echo.
+    /// Surface that dominates the echo.
     pub role: Role,
     /// Facets on the way there.
     pub facets: Vec<usize>,
@@ -43,12 +55,37 @@ pub struct Return {
     pub share: f64,
     /// Shift of the range because other surfaces are in the same echo, in metres.
     pub mixed: f64,
-    /// Shift by pulse and threshold for this surface alone, in metres; 0 unless the error model is physical.
+    /// Shift by pulse and threshold for this surface alone, in metres; 0 unless the error model is physical. Ranging by
+    /// phase has the ambiguities that are missing here, whatever the error model.
     pub detection: f64,
     /// The biases of Eqs. 3–5, in metres.
     pub bias: BiasTerms,
     /// Standard deviation of its noise, in metres.
     pub noise_sd: f64,
+    /// Chance that the echo is detected: 1 but near a threshold with noise.
+    pub probability: f64,
+    /// Other echoes of the beam, each without any of its own: what is reported when this one is missed, in the order
+    /// of `detection.echo`, and beside it when that is "all".
+    pub others: Vec<Return>,
+}
+
+/// Everything by chance in one reading, each contribution by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Chance {
+    /// Constant of the pose, in metres.
+    pub drift: f64,
+    /// What the scanner is off while it gets warm, in metres.
+    pub warm_up: f64,
+    /// Noise shared with the readings before, in metres.
+    pub correlated: f64,
+    /// Step by interference, in metres.
+    pub interference: f64,
+    /// White noise, a standard normal deviate: times [`Return::noise_sd`].
+    pub noise: f64,
+    /// Whether the reading is lost, a uniform deviate: below `errors.dropout` it is.
+    pub dropout: f64,
+    /// Whether each echo is detected, uniform deviates: below [`Return::probability`] it is.
+    pub detection: [f64; MAX_ECHOES],
 }
 
 impl Return {
@@ -56,6 +93,32 @@ impl Return {
     pub fn range(&self) -> f64 {
         self.geometric + self.mixed + self.detection + self.bias.total()
     }
+
+    /// This echo and the others, in the order in which they are reported.
+    pub fn echoes(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(&self.others)
+    }
+}
+
+/// A part of a beam's light, as fractions of all of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Share {
+    /// The surface it ends on; none for light that escapes or is lost between mirrors.
+    pub role: Option<Role>,
+    /// Facets on the way there.
+    pub facets: Vec<usize>,
+    /// Share of the beam's energy.
+    pub energy: f64,
+    /// Power received from it, in watts.
+    pub power: f64,
+}
+
+/// An echo as it is read: the part that dominates it, and what the detector makes of it.
+struct Seen<'a> {
+    part: &'a Part,
+    mixed: f64,
+    detection: f64,
+    probability: f64,
 }
 
 /// The sub-rays that went one way to one surface.
@@ -95,19 +158,33 @@ impl Sensor {
         );
         let white = color::paint(scene, "white")?.reflectivity;
         let reference = face_on(white, scene.detection.reference_range_m);
+        let receiver = Receiver {
+            detector: scene.detection.detector,
+            fraction: scene.detection.fraction,
+            sd: pulse_sd,
+            threshold,
+            saturation: if scene.detection.saturation_over_threshold > 0.0 {
+                scene.detection.saturation_over_threshold * threshold
+            } else {
+                f64::INFINITY
+            },
+        };
         let biased = matches!(scene.errors.model, ErrorModel::Empirical | ErrorModel::Both);
         Ok(Self {
             shape: scene.scanner.beam_shape(),
             sub_rays: footprint::sub_rays(scene.scanner.sub_rays as usize),
             light: scene.light.clone(),
             mirror_reflectivity: scene.superstructure.mirror.reflectivity,
+            limits: scene.scanner.limits(),
+            detection: scene.detection.clone(),
+            receiver,
             pulse_sd,
             threshold,
-            reference_walk: pulse_sd * detect::walk(reference, threshold),
+            reference_walk: receiver.lead(reference),
             bias: if biased {
                 RangeBias {
                     distance: scene.errors.distance.clone(),
-                    angle: scene.errors.angle,
+                    angle: scene.errors.angle.clone(),
                     color: scene.errors.color.clone(),
                 }
             } else {
@@ -181,6 +258,19 @@ impl Sensor {
     pub fn observe(&self, setting: &Setting<'_>, beam: usize) -> Option<Return> {
         let parts = self.illuminate(setting, beam);
         let physical = matches!(self.errors.model, ErrorModel::Physical | ErrorModel::Both);
+        if !self.takes_one_edge() {
+            let seen = match self.detection.principle {
+                Principle::Pulsed => self.receive_pulses(&parts, physical),
+                Principle::Phase => self.receive_phase(&parts, physical),
+            };
+            let mut found = seen.iter().filter_map(|seen| self.returned(setting, seen));
+            let mut first = found.next()?;
+            // Echoes that are surely detected and alone reported never need a substitute.
+            if self.detection.echo == EchoChoice::All || self.detection.noise_over_threshold > 0.0 {
+                first.others = found.take(MAX_ECHOES - 1).collect();
+            }
+            return Some(first);
+        }
         let (part, mixed, detection) = match parts.as_slice() {
             [] => return None,
             [only] if !physical => {
@@ -189,7 +279,30 @@ impl Sensor {
             }
             _ => self.detect(&parts, physical)?,
         };
-        let (geometric, cos_incidence) = part.chief.unwrap_or((part.mean_range, part.mean_cos));
+        self.returned(
+            setting,
+            &Seen {
+                part,
+                mixed,
+                detection,
+                probability: 1.0,
+            },
+        )
+    }
+
+    /// Whether the first leading edge is all that counts: it is found faster than all echoes are.
+    fn takes_one_edge(&self) -> bool {
+        let d = &self.detection;
+        d.principle == Principle::Pulsed
+            && d.detector == Detector::LeadingEdge
+            && d.echo == EchoChoice::First
+            && d.noise_over_threshold == 0.0
+    }
+
+    /// An echo with everything that it says of its surface; `None` beyond the longest range.
+    fn returned(&self, setting: &Setting<'_>, seen: &Seen<'_>) -> Option<Return> {
+        let part = seen.part;
+        let (geometric, cos_incidence) = part.place();
         let paint = setting.paint(part.surface);
         let found = Return {
             role: setting.role(part.surface),
@@ -198,12 +311,125 @@ impl Sensor {
             cos_incidence,
             power: part.power,
             share: part.share,
-            mixed,
-            detection,
+            mixed: seen.mixed,
+            detection: seen.detection,
             bias: self.bias.terms(geometric, cos_incidence, &paint.name),
             noise_sd: paint.noise.sd(geometric),
+            probability: seen.probability,
+            others: Vec::new(),
         };
-        (found.range() <= RANGE_MAX_M).then_some(found)
+        (found.range() <= self.limits.range_max_m).then_some(found)
+    }
+
+    /// Where a beam's energy goes: what each way and surface gets, and what reaches none.
+    pub fn shares(&self, setting: &Setting<'_>, beam: usize) -> Vec<Share> {
+        let mut shares: Vec<Share> = self
+            .illuminate(setting, beam)
+            .iter()
+            .map(|part| Share {
+                role: Some(setting.role(part.surface)),
+                facets: part.facets[..part.count].to_vec(),
+                energy: part.share,
+                power: part.power,
+            })
+            .collect();
+        for (sub_ray, path) in self.paths(setting, beam) {
+            if matches!(path.end, End::Hit(_)) {
+                continue;
+            }
+            let same = |s: &&mut Share| s.role.is_none() && s.facets == path.facets();
+            match shares.iter_mut().find(same) {
+                Some(share) => share.energy += sub_ray.weight,
+                None => shares.push(Share {
+                    role: None,
+                    facets: path.facets().to_vec(),
+                    energy: sub_ray.weight,
+                    power: 0.0,
+                }),
+            }
+        }
+        shares
+    }
+
+    /// Least height at which an echo has a chance of being detected, in watts.
+    fn faintest(&self) -> f64 {
+        let share = 1.0 - FAINTEST * self.detection.noise_over_threshold;
+        (self.threshold * share).max(f64::MIN_POSITIVE)
+    }
+
+    /// Chance that an echo of a height is detected: Φ((A − V)/σ).
+    fn probability(&self, height: f64) -> f64 {
+        let noise = self.detection.noise_over_threshold * self.threshold;
+        if noise > 0.0 {
+            0.5 * libm::erfc((self.threshold - height) / (noise * std::f64::consts::SQRT_2))
+        } else {
+            1.0
+        }
+    }
+
+    /// The echoes of pulsed light in the order of `detection.echo`.
+    fn receive_pulses<'a>(&self, parts: &'a [Part], physical: bool) -> Vec<Seen<'a>> {
+        let all: Vec<Pulse> = parts.iter().flat_map(|p| p.pulses.iter().copied()).collect();
+        let mut echoes = self.receiver.echoes(&all, self.faintest());
+        match self.detection.echo {
+            EchoChoice::First | EchoChoice::All => {}
+            EchoChoice::Strongest => echoes.sort_by(|a, b| b.peak.total_cmp(&a.peak)),
+            EchoChoice::Last => echoes.reverse(),
+        }
+        let read = |echo: &Echo| {
+            if physical {
+                echo.place + self.reference_walk
+            } else {
+                echo.compensated
+            }
+        };
+        let seen = |echo: &Echo| {
+            let inside = |p: &&Part| p.power > 0.0 && (echo.start..=echo.end).contains(&p.mean_range);
+            let part = parts
+                .iter()
+                .filter(inside)
+                .max_by(|a, b| a.power.total_cmp(&b.power))
+                .or_else(|| nearest(parts, echo.compensated))?;
+            let (geometric, _) = part.place();
+            // A surface too dim to be seen without the others stands for its own range.
+            let alone = self.receiver.echoes(&part.pulses, self.faintest());
+            let alone = alone.iter().max_by(|a, b| a.peak.total_cmp(&b.peak));
+            let alone = alone.map_or(geometric, &read);
+            Some(Seen {
+                part,
+                mixed: read(echo) - alone,
+                detection: if physical { alone - geometric } else { 0.0 },
+                probability: self.probability(echo.peak),
+            })
+        };
+        echoes.iter().filter_map(seen).collect()
+    }
+
+    /// The one range of modulated light.
+    fn receive_phase<'a>(&self, parts: &'a [Part], physical: bool) -> Vec<Seen<'a>> {
+        let ambiguity = phase::ambiguity(self.detection.modulation_hz);
+        let all: Vec<Pulse> = parts.iter().flat_map(|p| p.pulses.iter().copied()).collect();
+        let strongest = parts.iter().max_by(|a, b| a.power.total_cmp(&b.power));
+        let Some((part, whole)) = strongest.zip(phase::sum(&all, ambiguity)) else {
+            return Vec::new();
+        };
+        if whole.amplitude < self.faintest() {
+            return Vec::new();
+        }
+        let (geometric, _) = part.place();
+        let alone = phase::sum(&part.pulses, ambiguity).map_or(geometric, |p| p.range);
+        let base = if physical {
+            alone
+        } else {
+            phase::fold(geometric, ambiguity)
+        };
+        let range = phase::fold(base + phase::wrap(whole.range - alone, ambiguity), ambiguity);
+        vec![Seen {
+            part,
+            mixed: range - base,
+            detection: base - geometric,
+            probability: self.probability(whole.amplitude),
+        }]
     }
 
     /// The surfaces that a beam's light reaches, each with its pulses.
@@ -271,13 +497,13 @@ impl Sensor {
         let all: Vec<Pulse> = parts.iter().flat_map(|p| p.pulses.iter().copied()).collect();
         let edge = detect::leading_edge(&all, self.pulse_sd, self.threshold)?;
         let first = edge.compensated(self.pulse_sd, self.threshold);
-        let pulse_length = self.pulse_sd * (8.0 * std::f64::consts::LN_2).sqrt();
+        let pulse_length = detect::pulse_length(self.pulse_sd);
         let in_echo = |p: &&Part| p.power > 0.0 && p.mean_range <= first + pulse_length;
         let part = parts
             .iter()
             .filter(in_echo)
             .max_by(|a, b| a.power.total_cmp(&b.power))?;
-        let geometric = part.chief.map_or(part.mean_range, |(range, _)| range);
+        let (geometric, _) = part.place();
         let read = |edge: &detect::Edge| {
             if physical {
                 edge.crossing + self.reference_walk
@@ -292,33 +518,66 @@ impl Sensor {
         Some((part, read(&edge) - alone, detection))
     }
 
-    /// A reading of one scan, in metres: the beam's range with drift and noise, rounded, or a code.
+    /// A reading of one scan, in metres: the beam's range with everything by chance, rounded, or a code.
     ///
-    /// `normal` is a standard normal deviate and `chance` a uniform one. What is no range stays none: noise never
-    /// touches a code.
-    pub fn read(&self, found: Option<&Return>, drift: f64, normal: f64, chance: f64) -> f64 {
-        use catoptric_model::range::{INVALID, NO_RETURN, TOO_CLOSE};
-        let Some(found) = found else { return NO_RETURN };
+    /// What is no range stays none: noise never touches a code.
+    pub fn read(&self, found: Option<&Return>, chance: &Chance) -> f64 {
+        use catoptric_model::range::{INVALID, NO_RETURN};
+        let detected = self.detected(found, chance).next();
+        let Some(found) = detected else { return NO_RETURN };
+        if self.errors.model != ErrorModel::None && chance.dropout < self.errors.dropout {
+            return INVALID;
+        }
+        self.report(found, chance)
+    }
+
+    /// All echoes of a reading that are reported, in metres, nearest first; a lost reading has none.
+    ///
+    /// What is by chance in a reading is common to its echoes.
+    pub fn read_all(&self, found: Option<&Return>, chance: &Chance) -> Vec<f64> {
+        if self.errors.model != ErrorModel::None && chance.dropout < self.errors.dropout {
+            return Vec::new();
+        }
+        self.detected(found, chance)
+            .take(self.limits.echoes as usize)
+            .map(|echo| self.report(echo, chance))
+            .collect()
+    }
+
+    /// The echoes of a reading that are detected, in the order in which they are reported.
+    fn detected<'a>(
+        &self,
+        found: Option<&'a Return>,
+        chance: &'a Chance,
+    ) -> impl Iterator<Item = &'a Return> + use<'a> {
+        let echoes = found.into_iter().flat_map(Return::echoes);
+        echoes
+            .zip(chance.detection)
+            .filter(|(echo, chance)| *chance < echo.probability)
+            .map(|(echo, _)| echo)
+    }
+
+    /// An echo's range as it is reported, in metres, or the code of one that cannot be.
+    fn report(&self, found: &Return, chance: &Chance) -> f64 {
+        use catoptric_model::range::{NO_RETURN, TOO_CLOSE};
         if self.errors.model == ErrorModel::None {
-            return if found.range() < RANGE_MIN_M {
+            return if found.range() < self.limits.range_min_m {
                 TOO_CLOSE
             } else {
                 found.range()
             };
         }
-        if chance < self.errors.dropout {
-            return INVALID;
-        }
-        let range = found.range() + drift + found.noise_sd * normal;
+        let white = found.range() + chance.drift + found.noise_sd * chance.noise;
+        let range = white + (chance.warm_up + chance.correlated + chance.interference);
         let step = self.errors.quantization_mm * 1e-3;
         let range = if step > 0.0 {
             (range / step).round() * step
         } else {
             range
         };
-        if range < RANGE_MIN_M {
+        if range < self.limits.range_min_m {
             TOO_CLOSE
-        } else if range > RANGE_MAX_M {
+        } else if range > self.limits.range_max_m {
             NO_RETURN
         } else {
             range
@@ -326,7 +585,21 @@ impl Sensor {
     }
 }
 
+/// The part whose light is nearest to a range.
+fn nearest(parts: &[Part], range: f64) -> Option<&Part> {
+    let away = |p: &&Part| (p.mean_range - range).abs();
+    parts
+        .iter()
+        .filter(|p| p.power > 0.0)
+        .min_by(|a, b| away(a).total_cmp(&away(b)))
+}
+
 impl Part {
+    /// Range and cosine of incidence of the chief ray, or the means over the light where it goes elsewhere.
+    fn place(&self) -> (f64, f64) {
+        self.chief.unwrap_or((self.mean_range, self.mean_cos))
+    }
+
     fn new(surface: usize, facets: &[usize]) -> Self {
         let mut own = [0; MAX_BOUNCES];
         own[..facets.len()].copy_from_slice(facets);
