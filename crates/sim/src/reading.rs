@@ -1,20 +1,23 @@
 //! One beam against one setting: its sub-rays' ways, the echo they make, and the range read off it.
 //!
-//! Everything here is free of chance; it is the same for every scan of a stretch.
+//! Everything but `report` is free of chance; it is the same for every scan of a stretch.
+
+mod receive;
+mod report;
+
+pub use report::{Chance, MAX_ECHOES};
 
 use crate::color::{self, Paint};
 use crate::detect::{self, Pulse};
-use crate::echo::{Echo, Receiver};
+use crate::echo::Receiver;
 use crate::error::SimError;
 use crate::footprint::{self, SubRay};
 use crate::optics::{End, MAX_BOUNCES, Path, Role, Setting};
-use crate::phase;
 use crate::power::{self, Illumination};
-use crate::scene::{
-    BeamShape, Detection, Detector, EchoChoice, ErrorModel, Errors, Light, Limits, Principle, Scene,
-};
+use crate::scene::{BeamShape, Detection, EchoChoice, ErrorModel, Errors, Light, Limits, Principle, Scene};
 use crate::truth::BeamClass;
 use catoptric_model::{BiasTerms, RangeBias, beam};
+use receive::Seen;
 
 /// The scanner with everything resolved that does not depend on where it looks.
 pub struct Sensor {
@@ -31,12 +34,6 @@ pub struct Sensor {
     bias: RangeBias,
     errors: Errors,
 }
-
-/// Most echoes of a beam that have their own chance of being detected.
-pub const MAX_ECHOES: usize = 8;
-
-/// Echoes this many σ of the receiver's noise below the threshold are never detected: the chance is below 3e-7.
-const FAINTEST: f64 = 5.0;
 
 /// What a beam brings home, each contribution by itself. The reading is their sum, then drift, noise and rounding.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,25 +66,6 @@ pub struct Return {
     pub others: Vec<Return>,
 }
 
-/// Everything by chance in one reading, each contribution by itself.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Chance {
-    /// Constant of the pose, in metres.
-    pub drift: f64,
-    /// What the scanner is off while it gets warm, in metres.
-    pub warm_up: f64,
-    /// Noise shared with the readings before, in metres.
-    pub correlated: f64,
-    /// Step by interference, in metres.
-    pub interference: f64,
-    /// White noise, a standard normal deviate: times [`Return::noise_sd`].
-    pub noise: f64,
-    /// Whether the reading is lost, a uniform deviate: below `errors.dropout` it is.
-    pub dropout: f64,
-    /// Whether each echo is detected, uniform deviates: below [`Return::probability`] it is.
-    pub detection: [f64; MAX_ECHOES],
-}
-
 impl Return {
     /// The reading without drift, noise and rounding, in metres.
     pub fn range(&self) -> f64 {
@@ -111,14 +89,6 @@ pub struct Share {
     pub energy: f64,
     /// Power received from it, in watts.
     pub power: f64,
-}
-
-/// An echo as it is read: the part that dominates it, and what the detector makes of it.
-struct Seen<'a> {
-    part: &'a Part,
-    mixed: f64,
-    detection: f64,
-    probability: f64,
 }
 
 /// The sub-rays that went one way to one surface.
@@ -290,15 +260,6 @@ impl Sensor {
         )
     }
 
-    /// Whether the first leading edge is all that counts: it is found faster than all echoes are.
-    fn takes_one_edge(&self) -> bool {
-        let d = &self.detection;
-        d.principle == Principle::Pulsed
-            && d.detector == Detector::LeadingEdge
-            && d.echo == EchoChoice::First
-            && d.noise_over_threshold == 0.0
-    }
-
     /// An echo with everything that it says of its surface; `None` beyond the longest range.
     fn returned(&self, setting: &Setting<'_>, seen: &Seen<'_>) -> Option<Return> {
         let part = seen.part;
@@ -349,87 +310,6 @@ impl Sensor {
             }
         }
         shares
-    }
-
-    /// Least height at which an echo has a chance of being detected, in watts.
-    fn faintest(&self) -> f64 {
-        let share = 1.0 - FAINTEST * self.detection.noise_over_threshold;
-        (self.threshold * share).max(f64::MIN_POSITIVE)
-    }
-
-    /// Chance that an echo of a height is detected: Φ((A − V)/σ).
-    fn probability(&self, height: f64) -> f64 {
-        let noise = self.detection.noise_over_threshold * self.threshold;
-        if noise > 0.0 {
-            0.5 * libm::erfc((self.threshold - height) / (noise * std::f64::consts::SQRT_2))
-        } else {
-            1.0
-        }
-    }
-
-    /// The echoes of pulsed light in the order of `detection.echo`.
-    fn receive_pulses<'a>(&self, parts: &'a [Part], physical: bool) -> Vec<Seen<'a>> {
-        let all: Vec<Pulse> = parts.iter().flat_map(|p| p.pulses.iter().copied()).collect();
-        let mut echoes = self.receiver.echoes(&all, self.faintest());
-        match self.detection.echo {
-            EchoChoice::First | EchoChoice::All => {}
-            EchoChoice::Strongest => echoes.sort_by(|a, b| b.peak.total_cmp(&a.peak)),
-            EchoChoice::Last => echoes.reverse(),
-        }
-        let read = |echo: &Echo| {
-            if physical {
-                echo.place + self.reference_walk
-            } else {
-                echo.compensated
-            }
-        };
-        let seen = |echo: &Echo| {
-            let inside = |p: &&Part| p.power > 0.0 && (echo.start..=echo.end).contains(&p.mean_range);
-            let part = parts
-                .iter()
-                .filter(inside)
-                .max_by(|a, b| a.power.total_cmp(&b.power))
-                .or_else(|| nearest(parts, echo.compensated))?;
-            let (geometric, _) = part.place();
-            // A surface too dim to be seen without the others stands for its own range.
-            let alone = self.receiver.echoes(&part.pulses, self.faintest());
-            let alone = alone.iter().max_by(|a, b| a.peak.total_cmp(&b.peak));
-            let alone = alone.map_or(geometric, &read);
-            Some(Seen {
-                part,
-                mixed: read(echo) - alone,
-                detection: if physical { alone - geometric } else { 0.0 },
-                probability: self.probability(echo.peak),
-            })
-        };
-        echoes.iter().filter_map(seen).collect()
-    }
-
-    /// The one range of modulated light.
-    fn receive_phase<'a>(&self, parts: &'a [Part], physical: bool) -> Vec<Seen<'a>> {
-        let ambiguity = phase::ambiguity(self.detection.modulation_hz);
-        let all: Vec<Pulse> = parts.iter().flat_map(|p| p.pulses.iter().copied()).collect();
-        let strongest = parts.iter().max_by(|a, b| a.power.total_cmp(&b.power));
-        let Some((part, whole)) = strongest.zip(phase::sum(&all, ambiguity)) else {
-            return Vec::new();
-        };
-        if whole.amplitude < self.faintest() {
-            return Vec::new();
-        }
-        let (geometric, _) = part.place();
-        let alone = phase::sum(&part.pulses, ambiguity).map_or(geometric, |p| p.range);
-        let base = if physical {
-            alone
-        } else {
-            phase::fold(geometric, ambiguity)
-        };
-        let range = phase::fold(base + phase::wrap(whole.range - alone, ambiguity), ambiguity);
-        vec![Seen {
-            part,
-            mixed: range - base,
-            detection: base - geometric,
-            probability: self.probability(whole.amplitude),
-        }]
     }
 
     /// The surfaces that a beam's light reaches, each with its pulses.
@@ -517,81 +397,6 @@ impl Sensor {
         let detection = if physical { alone - geometric } else { 0.0 };
         Some((part, read(&edge) - alone, detection))
     }
-
-    /// A reading of one scan, in metres: the beam's range with everything by chance, rounded, or a code.
-    ///
-    /// What is no range stays none: noise never touches a code.
-    pub fn read(&self, found: Option<&Return>, chance: &Chance) -> f64 {
-        use catoptric_model::range::{INVALID, NO_RETURN};
-        let detected = self.detected(found, chance).next();
-        let Some(found) = detected else { return NO_RETURN };
-        if self.errors.model != ErrorModel::None && chance.dropout < self.errors.dropout {
-            return INVALID;
-        }
-        self.report(found, chance)
-    }
-
-    /// All echoes of a reading that are reported, in metres, nearest first; a lost reading has none.
-    ///
-    /// What is by chance in a reading is common to its echoes.
-    pub fn read_all(&self, found: Option<&Return>, chance: &Chance) -> Vec<f64> {
-        if self.errors.model != ErrorModel::None && chance.dropout < self.errors.dropout {
-            return Vec::new();
-        }
-        self.detected(found, chance)
-            .take(self.limits.echoes as usize)
-            .map(|echo| self.report(echo, chance))
-            .collect()
-    }
-
-    /// The echoes of a reading that are detected, in the order in which they are reported.
-    fn detected<'a>(
-        &self,
-        found: Option<&'a Return>,
-        chance: &'a Chance,
-    ) -> impl Iterator<Item = &'a Return> + use<'a> {
-        let echoes = found.into_iter().flat_map(Return::echoes);
-        echoes
-            .zip(chance.detection)
-            .filter(|(echo, chance)| *chance < echo.probability)
-            .map(|(echo, _)| echo)
-    }
-
-    /// An echo's range as it is reported, in metres, or the code of one that cannot be.
-    fn report(&self, found: &Return, chance: &Chance) -> f64 {
-        use catoptric_model::range::{NO_RETURN, TOO_CLOSE};
-        if self.errors.model == ErrorModel::None {
-            return if found.range() < self.limits.range_min_m {
-                TOO_CLOSE
-            } else {
-                found.range()
-            };
-        }
-        let white = found.range() + chance.drift + found.noise_sd * chance.noise;
-        let range = white + (chance.warm_up + chance.correlated + chance.interference);
-        let step = self.errors.quantization_mm * 1e-3;
-        let range = if step > 0.0 {
-            (range / step).round() * step
-        } else {
-            range
-        };
-        if range < self.limits.range_min_m {
-            TOO_CLOSE
-        } else if range > self.limits.range_max_m {
-            NO_RETURN
-        } else {
-            range
-        }
-    }
-}
-
-/// The part whose light is nearest to a range.
-fn nearest(parts: &[Part], range: f64) -> Option<&Part> {
-    let away = |p: &&Part| (p.mean_range - range).abs();
-    parts
-        .iter()
-        .filter(|p| p.power > 0.0)
-        .min_by(|a, b| away(a).total_cmp(&away(b)))
 }
 
 impl Part {
