@@ -26,6 +26,7 @@ EPOCH_NS = 1_518_000_000 * 10**9
 LABEL_TOPIC = "/session/pose"
 TYPES = {
     "/scan": "sensor_msgs/msg/LaserScan",
+    "/echoes": "sensor_msgs/msg/MultiEchoLaserScan",
     "/points": "sensor_msgs/msg/PointCloud2",
     "/mocap/markers": "mocap4r2_msgs/msg/Markers",
     "/tf": "tf2_msgs/msg/TFMessage",

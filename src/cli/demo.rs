@@ -52,6 +52,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
             // Only a dataset is ever replaced; a second demo makes the same one again.
             replace: true,
             returns: false,
+            readings: false,
         },
         context,
     )?;

@@ -9,6 +9,8 @@ use catoptric::io::{self, DatasetWriter, IoError, Provenance, dataset, scene};
 use catoptric::model::{Stretch, beam};
 use catoptric::sim::laboratory::Returns;
 use catoptric::sim::optics::Role;
+use catoptric::sim::reading::Return;
+use catoptric::sim::scene::ErrorModel;
 use catoptric::sim::{Laboratory, Scene, SimError, noise};
 use clap::Args;
 use rayon::prelude::*;
@@ -43,6 +45,9 @@ pub(crate) struct Arguments {
     /// Write also what every beam met, truth/returns.csv.
     #[arg(long)]
     returns: bool,
+    /// Write also every error of every reading, truth/readings.csv; large.
+    #[arg(long)]
+    readings: bool,
 }
 
 /// Figures of a run: what `simulate --json` prints.
@@ -74,6 +79,8 @@ pub(crate) struct Recording<'a> {
     pub(crate) replace: bool,
     /// Whether the truth about every return is written as well.
     pub(crate) returns: bool,
+    /// Whether the truth about every reading is written as well.
+    pub(crate) readings: bool,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
@@ -86,6 +93,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
             out: &arguments.out,
             replace: arguments.replace,
             returns: arguments.returns,
+            readings: arguments.readings,
         },
         context,
     )?;
@@ -112,6 +120,9 @@ fn command_line(arguments: &Arguments, seed: u64) -> String {
     }
     if arguments.returns {
         line.push_str(" --returns");
+    }
+    if arguments.readings {
+        line.push_str(" --readings");
     }
     line
 }
@@ -141,14 +152,28 @@ pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Fig
         .map_err(|e| IoError::content(recording.out.join(dataset::SCENE), e.to_string()))?;
     writer.write_scene(&resolved)?;
     writer.write_truth(&truth)?;
-    let mut rows = match recording.returns {
-        true => Some(writer.open_file(dataset::RETURNS)?),
-        false => None,
-    };
-    let returns_path = recording.out.join(dataset::RETURNS);
-    if let Some(rows) = &mut rows {
-        rows.write_all(RETURNS_HEADER.as_bytes())
-            .map_err(|e| IoError::write(&returns_path, e))?;
+    let mut tables = Vec::new();
+    for (wanted, name, header, rows) in [
+        (
+            recording.returns,
+            dataset::RETURNS,
+            RETURNS_HEADER,
+            return_rows as Rows,
+        ),
+        (
+            recording.readings,
+            dataset::READINGS,
+            READINGS_HEADER,
+            reading_rows,
+        ),
+    ] {
+        if wanted {
+            let mut file = writer.open_file(name)?;
+            let path = recording.out.join(name);
+            file.write_all(header.as_bytes())
+                .map_err(|e| IoError::write(&path, e))?;
+            tables.push((file, path, rows));
+        }
     }
     let mut progress = Progress::new(context, "simulating", laboratory.stretches());
     let all: Vec<usize> = (0..laboratory.stretches()).collect();
@@ -164,10 +189,10 @@ pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Fig
             figures.segments += figures.sub_rays * segments(&recorded.returns);
             timed(&mut || {
                 writer.write_stretch(&recorded.stretch)?;
-                if let Some(rows) = &mut rows {
-                    let text = rows_of(*number, &recorded.returns, recording.scene);
-                    rows.write_all(text.as_bytes())
-                        .map_err(|e| IoError::write(&returns_path, e))?;
+                for (file, path, rows) in &mut tables {
+                    let text = rows(&laboratory, *number, recorded);
+                    file.write_all(text.as_bytes())
+                        .map_err(|e| IoError::write(path, e))?;
                 }
                 Ok(())
             })?;
@@ -177,8 +202,8 @@ pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Fig
     drop(progress);
     interrupt::check()?;
     let finish = Instant::now();
-    if let Some(rows) = rows {
-        rows.finish()?;
+    for (file, _, _) in tables {
+        file.finish()?;
     }
     let manifest = writer.finish(Provenance {
         seed: recording.scene.seed,
@@ -230,16 +255,23 @@ fn segments(returns: &Returns) -> usize {
     returns.iter().map(pieces).sum()
 }
 
-/// First line of truth/returns.csv. A reading is geometric + mixed + detection + the three biases + the drift of its
-/// pose + noise, rounded; a beam without an echo has no row.
-const RETURNS_HEADER: &str = "pose,beam,surface,facets,geometric_m,cos_incidence,power_w,share,mixed_m,detection_m,\
-                              distance_bias_m,angle_bias_m,color_bias_m,noise_sd_m\n";
+/// The rows of one stretch in a table of the truth.
+type Rows = fn(&Laboratory, usize, &Recorded) -> String;
 
-fn rows_of(pose: usize, returns: &Returns, scene: &Scene) -> String {
-    let name = |facet: &usize| scene.superstructure.facet[*facet].name.as_str();
+/// First line of truth/returns.csv. A reading is geometric + mixed + detection + the three biases, then what
+/// truth/readings.csv lists, rounded; a beam without an echo has no row, one with several has one for each.
+const RETURNS_HEADER: &str = "pose,beam,surface,facets,geometric_m,cos_incidence,power_w,share,mixed_m,detection_m,\
+                              distance_bias_m,angle_bias_m,color_bias_m,noise_sd_m,echo,detection_probability\n";
+
+fn return_rows(laboratory: &Laboratory, pose: usize, recorded: &Recorded) -> String {
+    let facets = &laboratory.scene().superstructure.facet;
+    let name = |facet: &usize| facets[*facet].name.as_str();
     let mut text = String::new();
-    for (beam, found) in returns.iter().enumerate() {
-        let Some(r) = found else { continue };
+    let echoes = recorded.returns.iter().enumerate().flat_map(|(beam, found)| {
+        let echoes = found.iter().flat_map(Return::echoes).enumerate();
+        echoes.map(move |(echo, r)| (beam, echo, r))
+    });
+    for (beam, echo, r) in echoes {
         let surface = match r.role {
             Role::Facet(_) => "facet",
             Role::Structure => "structure",
@@ -250,7 +282,7 @@ fn rows_of(pose: usize, returns: &Returns, scene: &Scene) -> String {
         // Names of facets are free text: a comma or a quote in one must not end the field.
         let facets = format!("\"{}\"", facets.join(">").replace('"', "\"\""));
         text.push_str(&format!(
-            "{pose},{beam},{surface},{facets},{},{},{},{},{},{},{},{},{},{}\n",
+            "{pose},{beam},{surface},{facets},{},{},{},{},{},{},{},{},{},{},{echo},{}\n",
             r.geometric,
             r.cos_incidence,
             r.power,
@@ -261,7 +293,39 @@ fn rows_of(pose: usize, returns: &Returns, scene: &Scene) -> String {
             r.bias.angle,
             r.bias.color,
             r.noise_sd,
+            r.probability,
         ));
+    }
+    text
+}
+
+/// First line of truth/readings.csv. `echo` is the one of truth/returns.csv that was reported, empty where none was
+/// detected; a reading is that echo's range plus the five errors, rounded, unless `lost` is 1.
+const READINGS_HEADER: &str =
+    "pose,scan,beam,echo,lost,drift_m,warm_up_m,noise_m,correlated_m,interference_m,reading_m\n";
+
+fn reading_rows(laboratory: &Laboratory, pose: usize, recorded: &Recorded) -> String {
+    let errors = &laboratory.scene().errors;
+    let dropout = match errors.model {
+        ErrorModel::None => 0.0,
+        _ => errors.dropout,
+    };
+    let mut text = String::new();
+    let scans = recorded.stretch.ranges.chunks(beam::COUNT);
+    for (scan, (readings, chances)) in scans.zip(laboratory.chances(pose)).enumerate() {
+        let beams = recorded.returns.iter().zip(&chances).zip(readings).enumerate();
+        for (beam, ((found, chance), reading)) in beams {
+            let mut echoes = found.iter().flat_map(Return::echoes).zip(chance.detection);
+            let detected = echoes.position(|(echo, chance)| chance < echo.probability);
+            let noise_sd = found.as_ref().zip(detected).and_then(|(r, k)| r.echoes().nth(k));
+            let noise = noise_sd.map_or(0.0, |echo| echo.noise_sd * chance.noise);
+            let echo = detected.map_or(String::new(), |k| k.to_string());
+            let lost = u8::from(detected.is_some() && chance.dropout < dropout);
+            text.push_str(&format!(
+                "{pose},{scan},{beam},{echo},{lost},{},{},{noise},{},{},{reading}\n",
+                chance.drift, chance.warm_up, chance.correlated, chance.interference,
+            ));
+        }
     }
     text
 }

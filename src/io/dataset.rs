@@ -4,7 +4,7 @@
 //! manifest.json         where it comes from, SHA-256 of every file
 //! session.toml          what the experimenter knows
 //! observations.mcap     what was recorded
-//! truth/                scene.toml, truth.json, returns.csv: delete it and the dataset is blind
+//! truth/                scene.toml, truth.json, returns.csv, readings.csv: delete it and the dataset is blind
 //! ```
 //!
 //! Reading never opens `truth/`.
@@ -32,8 +32,10 @@ pub const OBSERVATIONS: &str = "observations.mcap";
 pub const SCENE: &str = "truth/scene.toml";
 /// Name of the truth about every beam.
 pub const TRUTH: &str = "truth/truth.json";
-/// Name of the truth about every reading.
+/// Name of the truth about what every beam met.
 pub const RETURNS: &str = "truth/returns.csv";
+/// Name of the truth about every reading.
+pub const READINGS: &str = "truth/readings.csv";
 
 /// A dataset being written. It appears as a whole in [`finish`](Self::finish); dropped before, it never does.
 pub struct DatasetWriter {

@@ -44,6 +44,7 @@ const POINT_FIELD: Part = (
     "uint8 INT8=1\nuint8 UINT8=2\nuint8 INT16=3\nuint8 UINT16=4\nuint8 INT32=5\nuint8 UINT32=6\nuint8 FLOAT32=7\n\
      uint8 FLOAT64=8\nstring name\nuint32 offset\nuint8 datatype\nuint32 count\n",
 );
+const LASER_ECHO: Part = ("sensor_msgs/LaserEcho", "float32[] echoes\n");
 const MARKER: Part = (
     "mocap4r2_msgs/Marker",
     "int8 USE_NAME=0\nint8 USE_INDEX=1\nint8 USE_BOTH=2\nint8 id_type\nint32 marker_index\nstring marker_name\n\
@@ -57,6 +58,15 @@ pub const LASER_SCAN: Definition = Definition {
              float32 time_increment\nfloat32 scan_time\nfloat32 range_min\nfloat32 range_max\nfloat32[] ranges\n\
              float32[] intensities\n",
     parts: &[HEADER, TIME],
+};
+
+/// Every echo of one scan of the laser.
+pub const MULTI_ECHO_SCAN: Definition = Definition {
+    name: "sensor_msgs/msg/MultiEchoLaserScan",
+    fields: "std_msgs/Header header\nfloat32 angle_min\nfloat32 angle_max\nfloat32 angle_increment\n\
+             float32 time_increment\nfloat32 scan_time\nfloat32 range_min\nfloat32 range_max\n\
+             sensor_msgs/LaserEcho[] ranges\nsensor_msgs/LaserEcho[] intensities\n",
+    parts: &[HEADER, TIME, LASER_ECHO],
 };
 
 /// Points of one scan.
@@ -107,7 +117,14 @@ mod tests {
     /// Does not prove that the fields are those of ROS: `tests/mcap_peers.py` decodes with others' readers.
     #[test]
     fn every_type_referred_to_is_there() {
-        for definition in [LASER_SCAN, POINT_CLOUD, POSE_STAMPED, MARKERS, TF_MESSAGE] {
+        for definition in [
+            LASER_SCAN,
+            MULTI_ECHO_SCAN,
+            POINT_CLOUD,
+            POSE_STAMPED,
+            MARKERS,
+            TF_MESSAGE,
+        ] {
             let text = definition.text();
             for line in text.lines().filter(|l| !l.starts_with("MSG:")) {
                 let Some((referred, _)) = line.split_once(' ') else {

@@ -20,6 +20,7 @@ pub(super) struct Gathering {
     scan_time: f64,
     scans: usize,
     ranges: Vec<f64>,
+    echoes: Vec<Vec<f64>>,
     poses: BTreeMap<(u64, usize), Pose>,
     markers: BTreeMap<u64, Vec<LabelledMarker>>,
 }
@@ -35,6 +36,7 @@ impl Gathering {
             scan_time: 0.0,
             scans: 0,
             ranges: Vec::new(),
+            echoes: Vec::new(),
             poses: BTreeMap::new(),
             markers: BTreeMap::new(),
         }
@@ -64,6 +66,16 @@ impl Gathering {
         Ok(())
     }
 
+    /// Takes the echoes of a scan in; its beams must be those of the session.
+    pub(super) fn echoes(&mut self, echoes: Vec<Vec<f64>>, scanner: &ScannerSheet) -> Result<(), String> {
+        let beams = scanner.beams;
+        if echoes.len() != beams {
+            return Err(format!("{} beams, session.toml has {beams}", echoes.len()));
+        }
+        self.echoes.extend(echoes);
+        Ok(())
+    }
+
     /// Takes a solved pose of a body in.
     pub(super) fn pose(&mut self, time: u64, body: usize, pose: Pose) {
         self.poses.insert((time, body), pose);
@@ -90,6 +102,10 @@ impl Gathering {
             let (pose, expected, found) = (self.label.pose, self.label.scans, self.scans);
             return Err(format!("pose {pose}: {found} scans, its label says {expected}"));
         }
+        if !self.echoes.is_empty() && self.echoes.len() != self.ranges.len() {
+            let (pose, found) = (self.label.pose, self.echoes.len() / scanner.beams.max(1));
+            return Err(format!("pose {pose}: echoes of {found} scans of {}", self.scans));
+        }
         let start = self.first_scan.unwrap_or(self.label_time);
         Ok(Stretch {
             start_s: seconds_between(epoch, start),
@@ -97,6 +113,7 @@ impl Gathering {
             beams: scanner.beams,
             tracks: self.tracks(bodies, epoch),
             ranges: self.ranges,
+            echoes: (!self.echoes.is_empty()).then_some(self.echoes),
             label: self.label,
         })
     }

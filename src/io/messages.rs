@@ -112,10 +112,9 @@ fn write_numbers(cdr: &mut CdrWriter, values: &[f64]) {
     }
 }
 
-/// A `sensor_msgs/msg/LaserScan`.
-pub fn encode_scan(stamp: u64, scanner: &ScannerSheet, period_s: f64, ranges: &[f64]) -> Vec<u8> {
-    let mut cdr = CdrWriter::new();
-    write_header(&mut cdr, stamp, LASER_FRAME);
+/// What a scan begins with: header, angles, times and limits.
+fn write_scan_sheet(cdr: &mut CdrWriter, stamp: u64, scanner: &ScannerSheet, period_s: f64) {
+    write_header(cdr, stamp, LASER_FRAME);
     let last = scanner.beams.saturating_sub(1);
     for value in [
         azimuth(scanner, 0),
@@ -128,9 +127,31 @@ pub fn encode_scan(stamp: u64, scanner: &ScannerSheet, period_s: f64, ranges: &[
     ] {
         cdr.f32(single(value));
     }
-    cdr.length(ranges.len());
-    for r in ranges {
-        cdr.f32(single(*r));
+}
+
+fn write_singles(cdr: &mut CdrWriter, values: &[f64]) {
+    cdr.length(values.len());
+    for v in values {
+        cdr.f32(single(*v));
+    }
+}
+
+/// A `sensor_msgs/msg/LaserScan`.
+pub fn encode_scan(stamp: u64, scanner: &ScannerSheet, period_s: f64, ranges: &[f64]) -> Vec<u8> {
+    let mut cdr = CdrWriter::new();
+    write_scan_sheet(&mut cdr, stamp, scanner, period_s);
+    write_singles(&mut cdr, ranges);
+    cdr.length(0); // no intensities
+    cdr.into_bytes()
+}
+
+/// A `sensor_msgs/msg/MultiEchoLaserScan`: the echoes of every beam, none where there is no return.
+pub fn encode_echoes(stamp: u64, scanner: &ScannerSheet, period_s: f64, echoes: &[Vec<f64>]) -> Vec<u8> {
+    let mut cdr = CdrWriter::new();
+    write_scan_sheet(&mut cdr, stamp, scanner, period_s);
+    cdr.length(echoes.len());
+    for beam in echoes {
+        write_singles(&mut cdr, beam);
     }
     cdr.length(0); // no intensities
     cdr.into_bytes()
@@ -224,6 +245,28 @@ fn read_point(cdr: &mut CdrReader<'_>) -> Result<Point3<f64>, MessageError> {
     Ok(Point3::new(cdr.f64()?, cdr.f64()?, cdr.f64()?))
 }
 
+fn read_singles(cdr: &mut CdrReader<'_>) -> Result<Vec<f64>, CdrError> {
+    let length = cdr.length(size_of::<f32>())?;
+    (0..length).map(|_| cdr.f32().map(f64::from)).collect()
+}
+
+/// Reads the time and the echoes of every beam of a `MultiEchoLaserScan`.
+///
+/// # Errors
+/// [`MessageError`] if the bytes are not one.
+pub fn decode_echoes(message: &[u8]) -> Result<(u64, Vec<Vec<f64>>), MessageError> {
+    let (stamp, mut cdr) = open(message)?;
+    for _ in 0..7 {
+        cdr.f32()?; // angles, times and limits are those of the LaserScan beside it
+    }
+    // A beam takes at least the four bytes of its number of echoes.
+    let beams = cdr.length(size_of::<u32>())?;
+    let echoes = (0..beams)
+        .map(|_| read_singles(&mut cdr))
+        .collect::<Result<_, _>>()?;
+    Ok((stamp, echoes))
+}
+
 /// Reads a `LaserScan`.
 ///
 /// # Errors
@@ -235,10 +278,7 @@ pub fn decode_scan(message: &[u8]) -> Result<Scan, MessageError> {
         *n = f64::from(cdr.f32()?);
     }
     let [angle_min, _, angle_increment, _, scan_time, _, _] = numbers;
-    let length = cdr.length(size_of::<f32>())?;
-    let ranges = (0..length)
-        .map(|_| cdr.f32().map(f64::from))
-        .collect::<Result<_, _>>()?;
+    let ranges = read_singles(&mut cdr)?;
     Ok(Scan {
         stamp,
         angle_min,

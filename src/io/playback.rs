@@ -25,6 +25,7 @@ const LONGEST_RECORD: usize = 1 << 28;
 enum Topic {
     Label,
     Scan,
+    Echoes,
     Pose(usize),
     Markers,
     Other,
@@ -151,6 +152,7 @@ impl Playback<'_> {
         };
         match topic {
             "/scan" => expect(definitions::LASER_SCAN, Topic::Scan),
+            "/echoes" => expect(definitions::MULTI_ECHO_SCAN, Topic::Echoes),
             "/session/pose" if encoding == "json" => Ok(Topic::Label),
             "/session/pose" => Err(format!("{topic} is {encoding:?}, \"json\" is needed")),
             _ => match topic.strip_prefix("/mocap/") {
@@ -180,6 +182,14 @@ impl Playback<'_> {
                 current
                     .scan(&scan, self.scanner)
                     .map_err(|what| format!("/scan: pose {}: {what}", current.number()))?;
+            }
+            Topic::Echoes => {
+                let (_, echoes) = messages::decode_echoes(data).map_err(|e| format!("/echoes: {e}"))?;
+                let current = self.current.as_mut();
+                let current = current.ok_or("/echoes: a scan before the first /session/pose")?;
+                current
+                    .echoes(echoes, self.scanner)
+                    .map_err(|what| format!("/echoes: pose {}: {what}", current.number()))?;
             }
             Topic::Pose(body) => {
                 let subject = &self.bodies.all[*body].subject;

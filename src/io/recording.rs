@@ -7,6 +7,7 @@
 //! | `/tf` | `tf2_msgs/TFMessage`: the bodies as first seen | at the start of a stretch |
 //! | `/points` | `sensor_msgs/PointCloud2`: the plane as scanned | the first scan of a stretch, not every scan |
 //! | `/scan` | `sensor_msgs/LaserScan` | every scan |
+//! | `/echoes` | `sensor_msgs/MultiEchoLaserScan` | every scan of a scanner that reports more than one echo |
 //! | `/mocap/<subject>` | `geometry_msgs/PoseStamped` in `room` | every frame in which the body was solved |
 //! | `/mocap/markers` | `mocap4r2_msgs/Markers` in `room`: "subject/marker", those that were seen | every frame |
 //!
@@ -53,6 +54,8 @@ struct Channels {
     transforms: u16,
     points: u16,
     scan: u16,
+    /// Added with the first stretch that has echoes: other recordings need no such topic.
+    echoes: Option<u16>,
     poses: Vec<u16>,
     markers: u16,
 }
@@ -73,11 +76,7 @@ impl<W: Write> RecordingWriter<W> {
             .disable_seeking(true)
             .create(NoSeek::new(writer))
             .map_err(fail)?;
-        let mut add = |topic: &str, definition: Definition| {
-            let text = definition.text();
-            let schema = mcap.add_schema(definition.name, "ros2msg", text.as_bytes())?;
-            mcap.add_channel(schema, topic, "cdr", &BTreeMap::new())
-        };
+        let mut add = |topic: &str, definition: Definition| add_channel(&mut mcap, topic, definition);
         let static_transforms = add("/tf_static", definitions::TF_MESSAGE).map_err(fail)?;
         let transforms = add("/tf", definitions::TF_MESSAGE).map_err(fail)?;
         let points = add("/points", definitions::POINT_CLOUD).map_err(fail)?;
@@ -103,6 +102,7 @@ impl<W: Write> RecordingWriter<W> {
                 transforms,
                 points,
                 scan,
+                echoes: None,
                 poses,
                 markers,
             },
@@ -154,6 +154,15 @@ impl<W: Write> RecordingWriter<W> {
                         messages::encode_scan(time, &self.scanner, period, ranges),
                     )
                 }
+                Event::Echoes(k) => {
+                    let Some(echoes) = &stretch.echoes else { continue };
+                    let echoes = &echoes[k * stretch.beams..(k + 1) * stretch.beams];
+                    let period = stretch.scan_period_s;
+                    (
+                        self.echo_channel()?,
+                        messages::encode_echoes(time, &self.scanner, period, echoes),
+                    )
+                }
                 Event::Pose { track, frame } => {
                     let track = &stretch.tracks[track];
                     let body = self.bodies.position(&track.subject);
@@ -184,6 +193,18 @@ impl<W: Write> RecordingWriter<W> {
         let mut writer = mcap.into_inner().into_inner();
         writer.flush().map_err(|e| IoError::write(&self.path, e))?;
         Ok(writer)
+    }
+
+    /// The channel of the echoes, made when it is first needed.
+    fn echo_channel(&mut self) -> Result<u16, IoError> {
+        if let Some(channel) = self.channels.echoes {
+            return Ok(channel);
+        }
+        let mcap = self.mcap.as_mut().expect("taken only at the end");
+        let channel = add_channel(mcap, "/echoes", definitions::MULTI_ECHO_SCAN)
+            .map_err(|e| mcap_error(&self.path, e))?;
+        self.channels.echoes = Some(channel);
+        Ok(channel)
     }
 
     /// Writes one message.
@@ -233,6 +254,9 @@ impl<W: Write> RecordingWriter<W> {
         if stretch.ranges.len() != expected {
             return Err(format!("{} readings, {expected} expected", stretch.ranges.len()));
         }
+        if let Some(found) = stretch.echoes.as_ref().map(Vec::len).filter(|n| *n != expected) {
+            return Err(format!("echoes of {found} readings, {expected} expected"));
+        }
         let duration = stretch.label.scans as f64 * stretch.scan_period_s;
         if !time_fits(stretch.start_s) || !time_fits(duration) || !time_fits(stretch.start_s + duration) {
             return Err(format!("starts at {} s and lasts {duration} s", stretch.start_s));
@@ -265,6 +289,16 @@ impl<W: Write> Drop for RecordingWriter<W> {
             drop(mcap.into_inner());
         }
     }
+}
+
+fn add_channel<W: Write>(
+    mcap: &mut mcap::Writer<NoSeek<W>>,
+    topic: &str,
+    definition: Definition,
+) -> mcap::McapResult<u16> {
+    let text = definition.text();
+    let schema = mcap.add_schema(definition.name, "ros2msg", text.as_bytes())?;
+    mcap.add_channel(schema, topic, "cdr", &BTreeMap::new())
 }
 
 /// Where each body was when it was first solved.

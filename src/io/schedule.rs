@@ -14,6 +14,7 @@ pub(super) enum Event {
     Transforms,
     Points,
     Scan(usize),
+    Echoes(usize),
     Pose { track: usize, frame: usize },
     Markers,
 }
@@ -54,6 +55,9 @@ pub(super) fn schedule(
     for k in 0..stretch.label.scans {
         let time = start + nanoseconds(k as f64 * stretch.scan_period_s);
         events.push((time, Event::Scan(k)));
+        if stretch.echoes.is_some() {
+            events.push((time, Event::Echoes(k)));
+        }
     }
     for (time, members) in frames {
         let mut with_markers = false;

@@ -54,30 +54,37 @@ pub(super) fn check_mount(problems: &mut Problems, mount: &MountEstimate) {
 }
 
 pub(super) fn check_bias(problems: &mut Problems, bias: &RangeBias) {
-    let table = &bias.distance;
-    if table.range_m.len() != table.error_mm.len() {
-        problems.error(
-            "bias.distance",
-            format!(
-                "has {} ranges and {} errors",
-                table.range_m.len(),
-                table.error_mm.len()
-            ),
-        );
-    }
-    if !table
-        .range_m
-        .iter()
-        .zip(table.range_m.iter().skip(1))
-        .all(|(a, b)| a < b)
-    {
-        problems.error("bias.distance.range_m", "does not increase".to_owned());
+    let distance = &bias.distance;
+    check_table(
+        problems,
+        "bias.distance",
+        ("range_m", &distance.range_m),
+        &distance.error_mm,
+    );
+    if let Some(table) = &bias.angle.table {
+        let nodes = ("incidence_deg", table.incidence_deg.as_slice());
+        check_table(problems, "bias.angle.table", nodes, &table.error_mm);
     }
     let lines = bias.color.values().flat_map(|c| [c.slope_mm_per_m, c.offset_mm]);
     let numbers = lines
         .chain([bias.angle.gain_mm, bias.angle.offset_mm])
-        .chain(table.error_mm.iter().copied());
+        .chain(distance.error_mm.iter().copied())
+        .chain(bias.angle.table.iter().flat_map(|t| t.error_mm.iter().copied()));
     if !numbers.into_iter().all(f64::is_finite) {
         problems.error("bias", "holds something that is not a number".to_owned());
+    }
+}
+
+/// A table of errors over nodes that have a name.
+fn check_table(problems: &mut Problems, table: &str, (name, nodes): (&str, &[f64]), error_mm: &[f64]) {
+    if nodes.len() != error_mm.len() {
+        let what = name.split('_').next().unwrap_or(name);
+        problems.error(
+            table,
+            format!("has {} {what}s and {} errors", nodes.len(), error_mm.len()),
+        );
+    }
+    if !nodes.iter().zip(nodes.iter().skip(1)).all(|(a, b)| a < b) {
+        problems.error(&format!("{table}.{name}"), "does not increase".to_owned());
     }
 }

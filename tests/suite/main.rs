@@ -6,6 +6,7 @@ mod cli;
 mod closure;
 mod common;
 mod consistency;
+mod detection;
 mod determinism;
 mod docs;
 mod paper;

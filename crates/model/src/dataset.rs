@@ -82,6 +82,8 @@ pub struct Stretch {
     pub beams: usize,
     /// Readings in metres, scan after scan; −∞ too close, +∞ no return, NaN invalid (REP-117).
     pub ranges: Vec<f64>,
+    /// Every reading's echoes in metres, nearest first and in the order of `ranges`, where they were recorded too.
+    pub echoes: Option<Vec<Vec<f64>>>,
     /// The tracked bodies, the rig first.
     pub tracks: Vec<Track>,
 }

@@ -40,7 +40,7 @@ pub mod range;
 pub mod session;
 
 pub use beam::Deflection;
-pub use bias::{AngleBias, BiasTerms, ColorBias, DistanceBias, RangeBias};
+pub use bias::{AngleBias, AngleTable, BiasTerms, ColorBias, DistanceBias, RangeBias};
 pub use board::{BoardPlane, Rectangle};
 pub use calibration::{BeamEstimate, Calibration, Status};
 pub use dataset::{Dataset, PoseKind, PoseLabel, PoseRecord, Stretch, Summary, Track, TrackedFrame};

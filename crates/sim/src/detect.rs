@@ -2,7 +2,8 @@
 //!
 //! Every sub-ray sends back a Gaussian pulse. The echo is their sum; the detector takes the place where it first rises
 //! through a fixed threshold. A weaker pulse crosses later: that is the walk, √(2 ln(A/V))·σ for a Gaussian of height
-//! A. Surfaces closer than the pulse is long merge into one echo, others follow one another.
+//! A. Surfaces closer than the pulse is long merge into one echo, others follow one another. Other detectors and the
+//! echoes after the first are in [`echo`](crate::echo).
 
 /// The light of one sub-ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,10 +23,17 @@ pub struct Edge {
     pub peak: f64,
 }
 
+/// Speed of light, in metres per second.
+pub const SPEED_OF_LIGHT: f64 = 299_792_458.0;
+
 /// Standard deviation in range of a pulse of the given full width at half maximum in nanoseconds, in metres.
 pub fn pulse_sd(fwhm_ns: f64) -> f64 {
-    const SPEED_OF_LIGHT: f64 = 299_792_458.0;
     0.5 * SPEED_OF_LIGHT * fwhm_ns * 1e-9 / (8.0 * std::f64::consts::LN_2).sqrt()
+}
+
+/// Full width at half maximum of a pulse of the given standard deviation, both in metres of range.
+pub fn pulse_length(sd: f64) -> f64 {
+    sd * (8.0 * std::f64::consts::LN_2).sqrt()
 }
 
 /// How far before its peak a Gaussian pulse of height `peak` crosses the threshold, in units of its σ.
@@ -34,7 +42,7 @@ pub fn walk(peak: f64, threshold: f64) -> f64 {
 }
 
 /// The echo at a range, in watts.
-fn height(pulses: &[Pulse], sd: f64, at: f64) -> f64 {
+pub(crate) fn height(pulses: &[Pulse], sd: f64, at: f64) -> f64 {
     pulses
         .iter()
         .map(|p| {
@@ -45,7 +53,7 @@ fn height(pulses: &[Pulse], sd: f64, at: f64) -> f64 {
 }
 
 /// Slope of the echo, up to the positive factor 1/σ².
-fn slope(pulses: &[Pulse], sd: f64, at: f64) -> f64 {
+pub(crate) fn slope(pulses: &[Pulse], sd: f64, at: f64) -> f64 {
     pulses
         .iter()
         .map(|p| {
@@ -91,7 +99,7 @@ pub fn leading_edge(pulses: &[Pulse], sd: f64, threshold: f64) -> Option<Edge> {
 }
 
 /// The place between `no` and `yes` where a condition begins to hold.
-fn bisect(mut no: f64, mut yes: f64, holds: impl Fn(f64) -> bool) -> f64 {
+pub(crate) fn bisect(mut no: f64, mut yes: f64, holds: impl Fn(f64) -> bool) -> f64 {
     loop {
         let middle = 0.5 * (no + yes);
         if middle <= no || middle >= yes || yes - no < 1e-14 {

@@ -3,6 +3,11 @@
 //! The light of a Gaussian beam, exp(−2ρ²) with ρ = 1 on the 1/e² contour, is cut into rings of equal-energy rays. One
 //! cut lies on the contour itself, so that the energy inside it is 1 − e⁻² for any number of rays but one. Every ring
 //! has an even number of evenly spaced rays: the bundle's center of light is the chief ray, exactly.
+//!
+//! What is smooth over the spot (path, incidence, power on one plane) is integrated exactly up to second order. What is
+//! not, an edge that cuts the spot, converges with order 0.6 in the number of rays, as measured by the test below: the
+//! share beyond an edge anywhere in the spot is wrong by at most 5.6, 2.6, 0.7 and 0.4 % of the beam's energy with 61,
+//! 256, 1024 and 4096 rays.
 
 use crate::scene::BeamShape;
 use catoptric_model::beam;
@@ -233,5 +238,38 @@ mod tests {
         assert!((front.y / front.x - 0.008).abs() < 1e-6 && front.z.abs() < 1e-15);
         let side = ray(&shape, std::f64::consts::FRAC_PI_2, &edge).direction;
         assert!((side.z / side.y - 0.008).abs() < 1e-6 && side.x.abs() < 1e-15);
+    }
+
+    /// Worst error, over edges anywhere across the spot, of the share of energy on one side of an edge along an axis.
+    fn worst_edge(count: usize) -> f64 {
+        let rays = sub_rays(count);
+        let mut worst: f64 = 0.0;
+        for k in 0..400 {
+            let at = -1.0 + 2.0 * (f64::from(k) + 0.5) / 400.0;
+            let exact = 0.5 * libm::erfc(-at * std::f64::consts::SQRT_2);
+            for axis in [|r: &SubRay| r.wide, |r: &SubRay| r.narrow] {
+                let share: f64 = rays.iter().filter(|r| axis(r) < at).map(|r| r.weight).sum();
+                worst = worst.max((share - exact).abs());
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn an_edge_converges_with_the_order_that_is_stated() {
+        let errors = [61, 256, 1024, 4096].map(worst_edge);
+        let order = libm::log(errors[0] / errors[3]) / libm::log(4096.0 / 61.0);
+        assert!(order > 0.6, "{errors:?}: order {order}");
+        assert!(errors[0] < 0.056 && errors[3] < 0.004, "{errors:?}");
+    }
+
+    #[test]
+    fn the_contour_holds_its_energy_with_61_rays() {
+        let inside: f64 = sub_rays(61)
+            .iter()
+            .filter(|r| libm::hypot(r.wide, r.narrow) < 1.0)
+            .map(|r| r.weight)
+            .sum();
+        assert!((inside - (1.0 - libm::exp(-2.0))).abs() < 1e-13, "{inside}");
     }
 }

@@ -34,6 +34,12 @@ pub enum Purpose {
     Reading = 8,
     /// What step 1 got wrong.
     Characterization = 9,
+    /// Whether echoes near the threshold are detected; row = scan, column = beam, one draw per echo.
+    Detection = 10,
+    /// Innovation of the correlated noise; row = scan, column = beam.
+    Correlated = 11,
+    /// Steps by interference; row = scan, column = beam.
+    Interference = 12,
 }
 
 /// The draws of one row.

@@ -1,17 +1,23 @@
 //! One beam against one setting: its sub-rays' ways, the echo they make, and the range read off it.
 //!
-//! Everything here is free of chance; it is the same for every scan of a stretch.
+//! Everything but `report` is free of chance; it is the same for every scan of a stretch.
+
+mod receive;
+mod report;
+
+pub use report::{Chance, MAX_ECHOES};
 
 use crate::color::{self, Paint};
 use crate::detect::{self, Pulse};
+use crate::echo::Receiver;
 use crate::error::SimError;
 use crate::footprint::{self, SubRay};
 use crate::optics::{End, MAX_BOUNCES, Path, Role, Setting};
 use crate::power::{self, Illumination};
-use crate::scanner::{RANGE_MAX_M, RANGE_MIN_M};
-use crate::scene::{BeamShape, ErrorModel, Errors, Light, Scene};
+use crate::scene::{BeamShape, Detection, EchoChoice, ErrorModel, Errors, Light, Limits, Principle, Scene};
 use crate::truth::BeamClass;
 use catoptric_model::{BiasTerms, RangeBias, beam};
+use receive::Seen;
 
 /// The scanner with everything resolved that does not depend on where it looks.
 pub struct Sensor {
@@ -19,6 +25,9 @@ pub struct Sensor {
     sub_rays: Vec<SubRay>,
     light: Light,
     mirror_reflectivity: f64,
+    limits: Limits,
+    detection: Detection,
+    receiver: Receiver,
     pulse_sd: f64,
     threshold: f64,
     reference_walk: f64,
@@ -29,7 +38,7 @@ pub struct Sensor {
 /// What a beam brings home, each contribution by itself. The reading is their sum, then drift, noise and rounding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Return {
-    /// Surface that dominates the first echo.
+    /// Surface that dominates the echo.
     pub role: Role,
     /// Facets on the way there.
     pub facets: Vec<usize>,
@@ -43,12 +52,18 @@ pub struct Return {
     pub share: f64,
     /// Shift of the range because other surfaces are in the same echo, in metres.
     pub mixed: f64,
-    /// Shift by pulse and threshold for this surface alone, in metres; 0 unless the error model is physical.
+    /// Shift by pulse and threshold for this surface alone, in metres; 0 unless the error model is physical. Ranging by
+    /// phase has the ambiguities that are missing here, whatever the error model.
     pub detection: f64,
     /// The biases of Eqs. 3–5, in metres.
     pub bias: BiasTerms,
     /// Standard deviation of its noise, in metres.
     pub noise_sd: f64,
+    /// Chance that the echo is detected: 1 but near a threshold with noise.
+    pub probability: f64,
+    /// Other echoes of the beam, each without any of its own: what is reported when this one is missed, in the order
+    /// of `detection.echo`, and beside it when that is "all".
+    pub others: Vec<Return>,
 }
 
 impl Return {
@@ -56,6 +71,24 @@ impl Return {
     pub fn range(&self) -> f64 {
         self.geometric + self.mixed + self.detection + self.bias.total()
     }
+
+    /// This echo and the others, in the order in which they are reported.
+    pub fn echoes(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(&self.others)
+    }
+}
+
+/// A part of a beam's light, as fractions of all of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Share {
+    /// The surface it ends on; none for light that escapes or is lost between mirrors.
+    pub role: Option<Role>,
+    /// Facets on the way there.
+    pub facets: Vec<usize>,
+    /// Share of the beam's energy.
+    pub energy: f64,
+    /// Power received from it, in watts.
+    pub power: f64,
 }
 
 /// The sub-rays that went one way to one surface.
@@ -95,19 +128,33 @@ impl Sensor {
         );
         let white = color::paint(scene, "white")?.reflectivity;
         let reference = face_on(white, scene.detection.reference_range_m);
+        let receiver = Receiver {
+            detector: scene.detection.detector,
+            fraction: scene.detection.fraction,
+            sd: pulse_sd,
+            threshold,
+            saturation: if scene.detection.saturation_over_threshold > 0.0 {
+                scene.detection.saturation_over_threshold * threshold
+            } else {
+                f64::INFINITY
+            },
+        };
         let biased = matches!(scene.errors.model, ErrorModel::Empirical | ErrorModel::Both);
         Ok(Self {
             shape: scene.scanner.beam_shape(),
             sub_rays: footprint::sub_rays(scene.scanner.sub_rays as usize),
             light: scene.light.clone(),
             mirror_reflectivity: scene.superstructure.mirror.reflectivity,
+            limits: scene.scanner.limits(),
+            detection: scene.detection.clone(),
+            receiver,
             pulse_sd,
             threshold,
-            reference_walk: pulse_sd * detect::walk(reference, threshold),
+            reference_walk: receiver.lead(reference),
             bias: if biased {
                 RangeBias {
                     distance: scene.errors.distance.clone(),
-                    angle: scene.errors.angle,
+                    angle: scene.errors.angle.clone(),
                     color: scene.errors.color.clone(),
                 }
             } else {
@@ -181,6 +228,19 @@ impl Sensor {
     pub fn observe(&self, setting: &Setting<'_>, beam: usize) -> Option<Return> {
         let parts = self.illuminate(setting, beam);
         let physical = matches!(self.errors.model, ErrorModel::Physical | ErrorModel::Both);
+        if !self.takes_one_edge() {
+            let seen = match self.detection.principle {
+                Principle::Pulsed => self.receive_pulses(&parts, physical),
+                Principle::Phase => self.receive_phase(&parts, physical),
+            };
+            let mut found = seen.iter().filter_map(|seen| self.returned(setting, seen));
+            let mut first = found.next()?;
+            // Echoes that are surely detected and alone reported never need a substitute.
+            if self.detection.echo == EchoChoice::All || self.detection.noise_over_threshold > 0.0 {
+                first.others = found.take(MAX_ECHOES - 1).collect();
+            }
+            return Some(first);
+        }
         let (part, mixed, detection) = match parts.as_slice() {
             [] => return None,
             [only] if !physical => {
@@ -189,7 +249,21 @@ impl Sensor {
             }
             _ => self.detect(&parts, physical)?,
         };
-        let (geometric, cos_incidence) = part.chief.unwrap_or((part.mean_range, part.mean_cos));
+        self.returned(
+            setting,
+            &Seen {
+                part,
+                mixed,
+                detection,
+                probability: 1.0,
+            },
+        )
+    }
+
+    /// An echo with everything that it says of its surface; `None` beyond the longest range.
+    fn returned(&self, setting: &Setting<'_>, seen: &Seen<'_>) -> Option<Return> {
+        let part = seen.part;
+        let (geometric, cos_incidence) = part.place();
         let paint = setting.paint(part.surface);
         let found = Return {
             role: setting.role(part.surface),
@@ -198,12 +272,44 @@ impl Sensor {
             cos_incidence,
             power: part.power,
             share: part.share,
-            mixed,
-            detection,
+            mixed: seen.mixed,
+            detection: seen.detection,
             bias: self.bias.terms(geometric, cos_incidence, &paint.name),
             noise_sd: paint.noise.sd(geometric),
+            probability: seen.probability,
+            others: Vec::new(),
         };
-        (found.range() <= RANGE_MAX_M).then_some(found)
+        (found.range() <= self.limits.range_max_m).then_some(found)
+    }
+
+    /// Where a beam's energy goes: what each way and surface gets, and what reaches none.
+    pub fn shares(&self, setting: &Setting<'_>, beam: usize) -> Vec<Share> {
+        let mut shares: Vec<Share> = self
+            .illuminate(setting, beam)
+            .iter()
+            .map(|part| Share {
+                role: Some(setting.role(part.surface)),
+                facets: part.facets[..part.count].to_vec(),
+                energy: part.share,
+                power: part.power,
+            })
+            .collect();
+        for (sub_ray, path) in self.paths(setting, beam) {
+            if matches!(path.end, End::Hit(_)) {
+                continue;
+            }
+            let same = |s: &&mut Share| s.role.is_none() && s.facets == path.facets();
+            match shares.iter_mut().find(same) {
+                Some(share) => share.energy += sub_ray.weight,
+                None => shares.push(Share {
+                    role: None,
+                    facets: path.facets().to_vec(),
+                    energy: sub_ray.weight,
+                    power: 0.0,
+                }),
+            }
+        }
+        shares
     }
 
     /// The surfaces that a beam's light reaches, each with its pulses.
@@ -271,13 +377,13 @@ impl Sensor {
         let all: Vec<Pulse> = parts.iter().flat_map(|p| p.pulses.iter().copied()).collect();
         let edge = detect::leading_edge(&all, self.pulse_sd, self.threshold)?;
         let first = edge.compensated(self.pulse_sd, self.threshold);
-        let pulse_length = self.pulse_sd * (8.0 * std::f64::consts::LN_2).sqrt();
+        let pulse_length = detect::pulse_length(self.pulse_sd);
         let in_echo = |p: &&Part| p.power > 0.0 && p.mean_range <= first + pulse_length;
         let part = parts
             .iter()
             .filter(in_echo)
             .max_by(|a, b| a.power.total_cmp(&b.power))?;
-        let geometric = part.chief.map_or(part.mean_range, |(range, _)| range);
+        let (geometric, _) = part.place();
         let read = |edge: &detect::Edge| {
             if physical {
                 edge.crossing + self.reference_walk
@@ -291,42 +397,14 @@ impl Sensor {
         let detection = if physical { alone - geometric } else { 0.0 };
         Some((part, read(&edge) - alone, detection))
     }
-
-    /// A reading of one scan, in metres: the beam's range with drift and noise, rounded, or a code.
-    ///
-    /// `normal` is a standard normal deviate and `chance` a uniform one. What is no range stays none: noise never
-    /// touches a code.
-    pub fn read(&self, found: Option<&Return>, drift: f64, normal: f64, chance: f64) -> f64 {
-        use catoptric_model::range::{INVALID, NO_RETURN, TOO_CLOSE};
-        let Some(found) = found else { return NO_RETURN };
-        if self.errors.model == ErrorModel::None {
-            return if found.range() < RANGE_MIN_M {
-                TOO_CLOSE
-            } else {
-                found.range()
-            };
-        }
-        if chance < self.errors.dropout {
-            return INVALID;
-        }
-        let range = found.range() + drift + found.noise_sd * normal;
-        let step = self.errors.quantization_mm * 1e-3;
-        let range = if step > 0.0 {
-            (range / step).round() * step
-        } else {
-            range
-        };
-        if range < RANGE_MIN_M {
-            TOO_CLOSE
-        } else if range > RANGE_MAX_M {
-            NO_RETURN
-        } else {
-            range
-        }
-    }
 }
 
 impl Part {
+    /// Range and cosine of incidence of the chief ray, or the means over the light where it goes elsewhere.
+    fn place(&self) -> (f64, f64) {
+        self.chief.unwrap_or((self.mean_range, self.mean_cos))
+    }
+
     fn new(surface: usize, facets: &[usize]) -> Self {
         let mut own = [0; MAX_BOUNCES];
         own[..facets.len()].copy_from_slice(facets);

@@ -102,6 +102,9 @@ pub struct TruePose {
     pub room_from_board: Option<PoseData>,
     /// Drift of all its readings, in metres.
     pub drift_m: f64,
+    /// What the scanner was off at its first and its last scan because it was not warm, in metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub warm_up_m: Option<[f64; 2]>,
 }
 
 impl TrueBeam {

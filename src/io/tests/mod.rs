@@ -156,6 +156,7 @@ fn stretch(session: &Session, pose: usize, scans: usize, frames: usize, seed: u6
         scan_period_s: 0.025,
         beams: session.scanner.beams,
         ranges: ranges(&mut numbers, scans * session.scanner.beams),
+        echoes: None,
         tracks,
     }
 }

@@ -19,6 +19,27 @@ proptest! {
 }
 
 #[test]
+fn echoes_come_back_and_other_recordings_know_nothing_of_them() {
+    let session = session(5);
+    let plain = stretch(&session, 0, 2, 3, 5);
+    let mut several = stretch(&session, 1, 3, 3, 6);
+    let ranges = several.ranges.iter();
+    let beams = ranges.map(|r| match r.is_finite() {
+        true => vec![*r, r + 2.0, r + 4.5]
+            .into_iter()
+            .map(|r| f64::from(messages::single(r)))
+            .collect(),
+        false => Vec::new(),
+    });
+    several.echoes = Some(beams.collect());
+    let stretches = [plain, several];
+    let bytes = record(&session, &stretches);
+    assert!(same(&play(&session, &bytes).expect("read"), &stretches));
+    let topic = |bytes: &[u8]| bytes.windows(7).any(|w| w == b"/echoes");
+    assert!(topic(&bytes) && !topic(&record(&session, &stretches[..1])));
+}
+
+#[test]
 fn equal_stretches_are_equal_bytes() {
     let session = session(11);
     let stretches = [stretch(&session, 0, 4, 9, 1), stretch(&session, 1, 3, 7, 2)];

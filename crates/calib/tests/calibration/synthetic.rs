@@ -188,6 +188,7 @@ impl World {
             angle: AngleBias {
                 gain_mm: -70.3,
                 offset_mm: 70.3,
+                table: None,
             },
             color: BTreeMap::from([(
                 "white".to_owned(),

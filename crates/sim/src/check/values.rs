@@ -2,7 +2,7 @@
 
 use super::{Findings, Path, suggestion};
 use crate::color;
-use crate::scene::{NoiseTable, Scene};
+use crate::scene::{Detector, EchoChoice, NoiseTable, Preset, Principle, Scene};
 use catoptric_model::dataset::RIG_SUBJECT;
 
 pub(super) fn check(scene: &Scene, found: &mut Findings) {
@@ -10,6 +10,7 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
     colors(scene, found);
     tables(scene, found);
     shares(scene, found);
+    detection(scene, found);
     let experiment = Path::of("experiment");
     order(
         &scene.experiment.tilt_deg,
@@ -129,36 +130,128 @@ fn tables(scene: &Scene, found: &mut Findings) {
         "error_mm",
         found,
     );
+    if let Some(table) = &scene.errors.angle.table {
+        let path = errors.key("angle").key("table");
+        let nodes = ("incidence_deg", "°", table.incidence_deg.as_slice());
+        increasing(nodes, &table.error_mm, &path, "error_mm", found);
+    }
 }
 
-fn columns(range_m: &[f64], values: &[f64], path: &Path, column: &str, found: &mut Findings) {
-    if range_m.len() != values.len() {
-        found.add(
-            &path.key(column),
-            format_args!(
-                "has {} entries, `{path}.range_m` has {}",
-                values.len(),
-                range_m.len()
+/// What only pulsed light has, what only a scanner of one's own has, and limits in their order.
+fn detection(scene: &Scene, found: &mut Findings) {
+    let detection = &scene.detection;
+    let path = Path::of("detection");
+    if detection.principle == Principle::Phase {
+        let pulsed = [
+            ("detector", detection.detector != Detector::LeadingEdge),
+            ("echo", detection.echo != EchoChoice::First),
+            (
+                "saturation_over_threshold",
+                detection.saturation_over_threshold > 0.0,
             ),
-            "a table has one value for every distance".to_owned(),
-        );
-    }
-    let path = path.key("range_m");
-    for (i, pair) in range_m.windows(2).enumerate() {
-        if pair[1] <= pair[0] {
+        ];
+        for (key, _) in pulsed.iter().filter(|(_, set)| *set) {
             found.add(
-                &path.index(i + 1),
-                format_args!("is {} m, not more than the {} m before it", pair[1], pair[0]),
-                "distances must be strictly increasing".to_owned(),
+                &path.key(key),
+                "is set, and a phase has neither pulses nor echoes",
+                "leave it out, or set `detection.principle` to \"pulsed\"".to_owned(),
             );
         }
     }
+    let saturation = detection.saturation_over_threshold;
+    if saturation > 0.0 && saturation <= 1.0 {
+        found.add(
+            &path.key("saturation_over_threshold"),
+            format_args!("is {saturation}; a receiver that clips at its threshold detects nothing"),
+            "more than 1 is allowed, or 0 for a receiver that never clips".to_owned(),
+        );
+    }
+    let limits = scene.scanner.limits();
+    if detection.echo == EchoChoice::All && limits.echoes < 2 {
+        found.add(
+            &path.key("echo"),
+            format_args!(
+                "is \"all\", and the scanner {:?} reports one echo",
+                scene.scanner.preset.name()
+            ),
+            "use the preset \"utm-30lx-ew\", or \"custom\" with `scanner.custom.echoes`".to_owned(),
+        );
+    }
+    let custom = scene.scanner.preset == Preset::Custom;
+    let path = Path::of("scanner");
+    if custom && scene.scanner.beam.is_none() {
+        found.add(
+            &path.key("preset"),
+            "is \"custom\", whose beam only the scene can describe",
+            "add a table [scanner.beam] with wide_full_mrad and narrow_full_mrad".to_owned(),
+        );
+    }
+    if !custom && scene.scanner.custom.is_some() {
+        found.add(
+            &path.key("custom"),
+            format_args!(
+                "is given, and the preset {:?} has limits of its own",
+                scene.scanner.preset.name()
+            ),
+            "leave it out, or set `scanner.preset` to \"custom\"".to_owned(),
+        );
+    }
+    if limits.range_min_m >= limits.range_max_m {
+        found.add(
+            &path.key("custom").key("range_min_m"),
+            format_args!(
+                "is {} m, not less than `range_max_m`, {} m",
+                limits.range_min_m, limits.range_max_m
+            ),
+            None,
+        );
+    }
+}
+
+fn columns(range_m: &[f64], values: &[f64], path: &Path, column: &str, found: &mut Findings) {
+    increasing(("range_m", " m", range_m), values, path, column, found);
+    let path = path.key("range_m");
     if let Some(first) = range_m.first().filter(|r| **r < 0.0) {
         found.add(
             &path.index(0),
             format_args!("is {first} m; a distance is 0 or more"),
             None,
         );
+    }
+}
+
+/// A column of nodes (its name, its unit, its values) and one of values: as many, and strictly increasing.
+fn increasing(
+    (name, unit, nodes): (&str, &str, &[f64]),
+    values: &[f64],
+    path: &Path,
+    column: &str,
+    found: &mut Findings,
+) {
+    let what = if unit == "°" { "angle" } else { "distance" };
+    if nodes.len() != values.len() {
+        found.add(
+            &path.key(column),
+            format_args!(
+                "has {} entries, `{path}.{name}` has {}",
+                values.len(),
+                nodes.len()
+            ),
+            format!("a table has one value for every {what}"),
+        );
+    }
+    let path = path.key(name);
+    for (i, pair) in nodes.windows(2).enumerate() {
+        if pair[1] <= pair[0] {
+            found.add(
+                &path.index(i + 1),
+                format_args!(
+                    "is {}{unit}, not more than the {}{unit} before it",
+                    pair[1], pair[0]
+                ),
+                format!("{what}s must be strictly increasing"),
+            );
+        }
     }
 }
 

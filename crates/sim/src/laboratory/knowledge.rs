@@ -5,7 +5,6 @@ use crate::error::SimError;
 use crate::noise::{Draws, Purpose};
 use crate::optics::{Mirrors, Setting};
 use crate::placement;
-use crate::scanner;
 use crate::scene::{ErrorModel, Marker, Scene};
 use crate::structure::{self, Structure};
 use catoptric_model::session::{self, Session};
@@ -26,6 +25,7 @@ impl Laboratory {
     pub fn session(&self) -> Result<Session, SimError> {
         let scene = &self.scene;
         let mount = &scene.scanner.mount;
+        let limits = scene.scanner.limits();
         // The standard deviation of a uniform error is its limit over √3.
         let sd = |limit: f64| limit / 3.0_f64.sqrt();
         let tilt = sd(mount.tilt_tolerance_deg);
@@ -37,9 +37,9 @@ impl Laboratory {
                 preset: scene.scanner.preset.name().to_owned(),
                 beams: beam::COUNT,
                 step_deg: 0.25,
-                scan_rate_hz: scanner::SCAN_RATE_HZ,
-                range_min_m: scanner::RANGE_MIN_M,
-                range_max_m: scanner::RANGE_MAX_M,
+                scan_rate_hz: limits.scan_rate_hz,
+                range_min_m: limits.range_min_m,
+                range_max_m: limits.range_max_m,
                 divergence_full_mrad: scene.scanner.beam_shape().wide_full_mrad,
             },
             nominal_rig_from_sensor: PoseData::from(&structure::nominal_mount(scene)),

@@ -2,10 +2,12 @@
 //!
 //! Every stretch is a pure function of (scene, seed, number), so that they can be computed in any order.
 
+mod chance;
 mod knowledge;
 mod room;
 mod truth;
 
+pub use chance::Chances;
 pub use room::board_markers;
 
 use crate::cast::Polygon;
@@ -16,8 +18,7 @@ use crate::noise::{Draws, Purpose};
 use crate::optics::{Mirrors, Role, Setting, Target};
 use crate::placement::{self, Planned};
 use crate::reading::{Return, Sensor};
-use crate::scanner;
-use crate::scene::{ErrorModel, Scene};
+use crate::scene::{EchoChoice, ErrorModel, Scene};
 use crate::structure::Structure;
 use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::{Dataset, Pose, PoseKind, PoseLabel, RangeBias, Stretch, beam};
@@ -180,28 +181,43 @@ impl Laboratory {
         Ok(self.record(number, &self.returns(number)?))
     }
 
+    /// Number of a stretch's first scan, counted over the whole recording.
+    fn first_scan(&self, number: usize) -> usize {
+        self.planned[..number].iter().map(|p| p.scans).sum()
+    }
+
+    /// When a stretch begins, in seconds since the recording began.
+    fn start_s(&self, number: usize) -> f64 {
+        let scan_period_s = self.scene.scanner.limits().scan_period_s();
+        self.first_scan(number) as f64 * scan_period_s + number as f64 * self.scene.experiment.pause_s
+    }
+
     /// Records a stretch from what [`Laboratory::returns`] found for it.
     pub fn record(&self, number: usize, returns: &Returns) -> Stretch {
         let planned = &self.planned[number];
-        let drift = self.drift(number);
-        let first_scan: usize = self.planned[..number].iter().map(|p| p.scans).sum();
         let mut ranges = Vec::with_capacity(planned.scans * beam::COUNT);
-        for scan in first_scan..first_scan + planned.scans {
-            let mut draws = Draws::new(self.seed, Purpose::Reading, scan as u64);
-            ranges.extend(returns.iter().enumerate().map(|(beam, found)| {
-                draws.seek(beam as u64);
-                self.sensor
-                    .read(found.as_ref(), drift, draws.normal(), draws.uniform())
-            }));
+        let all_echoes = self.scene.detection.echo == EchoChoice::All;
+        let mut echoes = all_echoes.then(Vec::new);
+        for chances in self.chances(number).take(planned.scans) {
+            let readings = returns.iter().map(Option::as_ref).zip(&chances);
+            ranges.extend(
+                readings
+                    .clone()
+                    .map(|(found, chance)| self.sensor.read(found, chance)),
+            );
+            if let Some(echoes) = &mut echoes {
+                echoes.extend(readings.map(|(found, chance)| self.sensor.read_all(found, chance)));
+            }
         }
-        let scan_period_s = 1.0 / scanner::SCAN_RATE_HZ;
-        let start_s = first_scan as f64 * scan_period_s + number as f64 * self.scene.experiment.pause_s;
+        let scan_period_s = self.scene.scanner.limits().scan_period_s();
+        let start_s = self.start_s(number);
         Stretch {
             label: self.label(number),
             start_s,
             scan_period_s,
             beams: beam::COUNT,
             ranges,
+            echoes,
             tracks: self.tracks(number, start_s, planned.scans as f64 * scan_period_s),
         }
     }

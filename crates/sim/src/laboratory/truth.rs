@@ -43,6 +43,12 @@ impl Laboratory {
                     kind: self.planned[number].kind,
                     room_from_board: self.boards[number].as_ref().map(PoseData::from),
                     drift_m: self.drift(number),
+                    warm_up_m: self.scene.errors.warm_up.map(|_| {
+                        let last = self.planned[number].scans.saturating_sub(1) as f64;
+                        let begin = self.start_s(number);
+                        let end = begin + last * self.scene.scanner.limits().scan_period_s();
+                        [self.warm_up(begin), self.warm_up(end)]
+                    }),
                 })
                 .collect(),
         })

@@ -40,6 +40,15 @@ pub struct Errors {
     /// Constant error of all readings of a pose, 1σ, in millimetres (trial scatter in Table 2).
     #[schemars(range(min = 0.0, max = 100.0))]
     pub drift_sd_mm: f64,
+    /// A scanner that is still getting warm; none by default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub warm_up: Option<WarmUp>,
+    /// Noise that a beam's successive readings share; none by default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correlated: Option<Correlated>,
+    /// Rare steps of single readings; none by default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interference: Option<Interference>,
     /// Step of the reported ranges, in millimetres; 0 for none.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub quantization_mm: f64,
@@ -59,6 +68,7 @@ impl Default for Errors {
             angle: AngleBias {
                 gain_mm: -70.3,
                 offset_mm: 70.3,
+                table: None,
             },
             color: BTreeMap::new(),
             noise: NoiseTable {
@@ -66,10 +76,51 @@ impl Default for Errors {
                 sd_mm: vec![4.1, 3.9, 4.6],
             },
             drift_sd_mm: 0.88,
+            warm_up: None,
+            correlated: None,
+            interference: None,
             quantization_mm: 1.0,
             dropout: 0.0,
         }
     }
+}
+
+/// An error that dies away while the scanner gets warm: a·exp(−t/τ), t since the recording began.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WarmUp {
+    /// Error at the beginning a, in millimetres.
+    #[schemars(range(min = -1000.0, max = 1000.0))]
+    pub amplitude_mm: f64,
+    /// Time constant τ, in seconds.
+    #[schemars(range(min = 0.1, max = 1e6))]
+    pub time_constant_s: f64,
+}
+
+/// Noise that forgets slowly, an AR(1) process of every beam by itself: x₀ = ε₀, xₖ = φ·xₖ₋₁ + √(1 − φ²)·εₖ.
+///
+/// φ = exp(−T/τ) for scans T apart. It begins anew, in its stationary distribution, with every stretch.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Correlated {
+    /// Standard deviation, in millimetres.
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub sd_mm: f64,
+    /// Correlation time τ, in seconds.
+    #[schemars(range(min = 1e-3, max = 1e6))]
+    pub time_constant_s: f64,
+}
+
+/// Steps of single readings, as another scanner's pulses cause them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Interference {
+    /// Size of a step, in millimetres; forward and backward are equally likely.
+    #[schemars(range(min = 0.0, max = 100000.0))]
+    pub step_mm: f64,
+    /// Chance of a step in a reading.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub probability: f64,
 }
 
 /// Standard deviation of a reading over distance, interpolated linearly and constant outside.
@@ -133,6 +184,21 @@ struct AngleBiasSchema {
     gain_mm: f64,
     /// B_a, in millimetres.
     offset_mm: f64,
+    /// What is added to the law.
+    table: Option<AngleTableSchema>,
+}
+
+/// Schema of [`AngleTable`](catoptric_model::AngleTable).
+#[derive(JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "AngleTable")]
+#[allow(dead_code)]
+struct AngleTableSchema {
+    /// Incidences in degrees, strictly increasing.
+    #[schemars(length(min = 1), inner(range(min = 0.0, max = 90.0)))]
+    incidence_deg: Vec<f64>,
+    /// Errors in millimetres at those incidences.
+    error_mm: Vec<f64>,
 }
 
 /// E_c = A_c·R + B_c (Eq. 5).

@@ -3,14 +3,16 @@
 //! Every key carries its unit. Values that nobody published are defaults marked *assumed*. The checks that need more
 //! than one value are in [`crate::check`].
 
+mod detection;
 mod errors;
 mod room;
 mod scanner;
 mod superstructure;
 
-pub use errors::{Characterization, ErrorModel, Errors, NoiseTable};
+pub use detection::{Detection, Detector, EchoChoice, Principle};
+pub use errors::{Characterization, Correlated, ErrorModel, Errors, Interference, NoiseTable, WarmUp};
 pub use room::{Board, BoardPose, Color, Experiment, Mocap, MocapProfile, Room};
-pub use scanner::{BeamShape, Detection, Light, Mount, Preset, Scanner};
+pub use scanner::{BeamShape, Light, Limits, Mount, Preset, Scanner};
 pub use superstructure::{
     AsBuilt, Facet, FacetShape, Marker, Mirror, PolygonShape, Post, RectangleShape, Superstructure, Wedge,
 };

@@ -1,4 +1,4 @@
-//! The scanner: preset, beam, mounting, light and detection.
+//! The scanner: preset, beam, mounting and light.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -13,6 +13,11 @@ pub enum Preset {
     /// The same with the spot of Cooper's Table 1 read as three neighbouring beams.
     #[serde(rename = "ust-20lx-cooper")]
     Ust20lxCooper,
+    /// Hokuyo UTM-30LX-EW: up to three echoes of a beam, 30 m. Its spot is assumed to be the UST-20LX's.
+    #[serde(rename = "utm-30lx-ew")]
+    Utm30lxEw,
+    /// A scanner of one's own: `scanner.custom` and `scanner.beam`. Its beams are the 1081 of the others, 0.25° apart.
+    Custom,
 }
 
 /// The scanner and how it sits in the rig.
@@ -28,7 +33,10 @@ pub struct Scanner {
     /// Shape of a beam, instead of the preset's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beam: Option<BeamShape>,
-    /// Whether the scanner's own housing stands in the way of deflected beams.
+    /// Limits of a scanner of one's own, with the preset "custom".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub custom: Option<Limits>,
+    /// Whether the scanner's own housing, for every preset that of the UST-20LX, stands in the way of deflected beams.
     #[serde(default = "yes")]
     pub housing: bool,
     /// Where the sensor sits in the rig body.
@@ -44,6 +52,24 @@ impl Scanner {
     fn default_sub_rays() -> u32 {
         19
     }
+}
+
+/// What a scanner can report. The defaults are the UST-20LX's.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Limits {
+    /// Shortest range that is reported, in metres; anything nearer is too close.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub range_min_m: f64,
+    /// Longest range that is reported, in metres; anything farther is no return.
+    #[schemars(range(min = 0.1, max = 1000.0))]
+    pub range_max_m: f64,
+    /// Scans per second.
+    #[schemars(range(min = 0.1, max = 1000.0))]
+    pub scan_rate_hz: f64,
+    /// Most echoes of one beam that can be reported.
+    #[schemars(range(min = 1, max = 8))]
+    pub echoes: u32,
 }
 
 /// Shape of one beam: an ellipse whose long axis is horizontal at azimuth 0.
@@ -130,35 +156,6 @@ impl Default for Light {
             air_transmission: 1.0,
             receiver_diameter_mm: 20.0,
             target_dispersion_sr: std::f64::consts::PI,
-        }
-    }
-}
-
-/// From received light to a range.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Detection {
-    /// Full width at half maximum of the pulse, in nanoseconds (assumed; 3 to 5 are plausible).
-    #[schemars(range(min = 0.1, max = 100.0))]
-    pub pulse_fwhm_ns: f64,
-    /// Reflectivity of a face-on target that is just detected at `threshold_range_m` (data sheet: 0.1).
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub threshold_reflectivity: f64,
-    /// Range at which that target is just detected, in metres (data sheet: 8).
-    #[schemars(range(min = 0.1, max = 1000.0))]
-    pub threshold_range_m: f64,
-    /// Range of the face-on white target at which the walk of the leading edge is calibrated out, in metres.
-    #[schemars(range(min = 0.1, max = 1000.0))]
-    pub reference_range_m: f64,
-}
-
-impl Default for Detection {
-    fn default() -> Self {
-        Self {
-            pulse_fwhm_ns: 4.0,
-            threshold_reflectivity: 0.1,
-            threshold_range_m: 8.0,
-            reference_range_m: 2.0,
         }
     }
 }

@@ -1,0 +1,100 @@
+//! From received light to a range: which principle, which detector, which echo.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What the time of flight is measured on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Principle {
+    /// A short pulse.
+    #[default]
+    Pulsed,
+    /// The phase of light whose amplitude is modulated: one range per beam, ambiguous by c/2f.
+    Phase,
+}
+
+/// Which place of an echo is taken for the range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Detector {
+    /// Where it rises through a fixed threshold: a weaker pulse reads longer.
+    #[default]
+    LeadingEdge,
+    /// Where it rises through a fraction of its own height.
+    ConstantFraction,
+    /// Its highest point, or the middle of the top that saturation cuts flat.
+    Peak,
+    /// Its center of light.
+    Centroid,
+}
+
+/// Which of a beam's echoes is reported.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum EchoChoice {
+    /// The nearest.
+    #[default]
+    First,
+    /// The highest.
+    Strongest,
+    /// The farthest.
+    Last,
+    /// The nearest in `/scan`, and all that the scanner can report in `/echoes`.
+    All,
+}
+
+/// From received light to a range.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Detection {
+    /// What the time of flight is measured on.
+    pub principle: Principle,
+    /// Which place of an echo is taken for the range; pulsed light only.
+    pub detector: Detector,
+    /// The fraction of its own height at which `constant_fraction` takes an echo (assumed).
+    #[schemars(range(min = 0.01, max = 0.99))]
+    pub fraction: f64,
+    /// Which echo is reported; pulsed light only.
+    pub echo: EchoChoice,
+    /// Full width at half maximum of the pulse, in nanoseconds (assumed; 3 to 5 are plausible).
+    #[schemars(range(min = 0.1, max = 100.0))]
+    pub pulse_fwhm_ns: f64,
+    /// Frequency of the amplitude modulation, in hertz (assumed); ranges repeat every c/2f, 15 m at 10 MHz.
+    #[schemars(range(min = 1e5, max = 1e9))]
+    pub modulation_hz: f64,
+    /// Reflectivity of a face-on target that is just detected at `threshold_range_m` (data sheet: 0.1).
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub threshold_reflectivity: f64,
+    /// Range at which that target is just detected, in metres (data sheet: 8).
+    #[schemars(range(min = 0.1, max = 1000.0))]
+    pub threshold_range_m: f64,
+    /// Range of the face-on white target at which the walk of the detector is calibrated out, in metres.
+    #[schemars(range(min = 0.1, max = 1000.0))]
+    pub reference_range_m: f64,
+    /// Height above which the receiver clips an echo, in units of the threshold; 0 if it never does.
+    #[schemars(range(min = 0.0, max = 1e9))]
+    pub saturation_over_threshold: f64,
+    /// Noise-equivalent power, 1σ, in units of the threshold: an echo of height A is detected with the probability
+    /// Φ((A − V)/σ); 0 for a sharp threshold.
+    #[schemars(range(min = 0.0, max = 0.2))]
+    pub noise_over_threshold: f64,
+}
+
+impl Default for Detection {
+    fn default() -> Self {
+        Self {
+            principle: Principle::Pulsed,
+            detector: Detector::LeadingEdge,
+            fraction: 0.5,
+            echo: EchoChoice::First,
+            pulse_fwhm_ns: 4.0,
+            modulation_hz: 1e7,
+            threshold_reflectivity: 0.1,
+            threshold_range_m: 8.0,
+            reference_range_m: 2.0,
+            saturation_over_threshold: 0.0,
+            noise_over_threshold: 0.0,
+        }
+    }
+}
