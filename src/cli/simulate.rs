@@ -137,7 +137,11 @@ pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Fig
         result
     };
     let mut writer = DatasetWriter::create(recording.out, recording.replace, &session)?;
-    let resolved = scene::to_toml(recording.scene)
+    let (kept, meshes) = scene::kept(recording.scene);
+    for (name, bytes) in &meshes {
+        writer.write_beside_scene(name, bytes)?;
+    }
+    let resolved = scene::to_toml(&kept)
         .map_err(|e| IoError::content(recording.out.join(dataset::SCENE), e.to_string()))?;
     writer.write_scene(&resolved)?;
     writer.write_truth(&truth)?;
@@ -236,7 +240,11 @@ const RETURNS_HEADER: &str = "pose,beam,surface,facets,geometric_m,cos_incidence
                               distance_bias_m,angle_bias_m,color_bias_m,noise_sd_m\n";
 
 fn rows_of(pose: usize, returns: &Returns, scene: &Scene) -> String {
-    let name = |facet: &usize| scene.superstructure.facet[*facet].name.as_str();
+    let facets = scene.superstructure.facet.iter().map(|f| f.name.as_str());
+    let names: Vec<&str> = facets
+        .chain(scene.room.mirror.iter().map(|m| m.name.as_str()))
+        .collect();
+    let name = |facet: &usize| names[*facet];
     let mut text = String::new();
     for (beam, found) in returns.iter().enumerate() {
         let Some(r) = found else { continue };
@@ -245,6 +253,7 @@ fn rows_of(pose: usize, returns: &Returns, scene: &Scene) -> String {
             Role::Structure => "structure",
             Role::Board => "board",
             Role::Wall => "wall",
+            Role::Object => "object",
         };
         let facets: Vec<&str> = r.facets.iter().map(name).collect();
         // Names of facets are free text: a comma or a quote in one must not end the field.

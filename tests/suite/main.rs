@@ -11,3 +11,4 @@ mod paper;
 mod physics;
 mod pipeline;
 mod scenes;
+mod traps;
