@@ -5,8 +5,9 @@ use super::error::CliError;
 use super::output::{counted, print, quoted};
 use catoptric::io::scene;
 use catoptric::model::beam;
-use catoptric::sim::Laboratory;
 use catoptric::sim::check::{Outline, outline};
+use catoptric::sim::trace::Scenery;
+use catoptric::sim::{Laboratory, Scene};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -22,6 +23,9 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let scene = scene::load(&arguments.scene, &arguments.set)?;
+    if scene.has_no_laboratory() {
+        return open_stage(arguments, &scene);
+    }
     let outline = outline(&scene);
     // Setting the experiment up finds what no single value shows: a board that fits nowhere.
     let laboratory = Laboratory::new(&scene, scene.seed)?;
@@ -63,6 +67,18 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         quoted(dataset.as_ref()),
     ));
     print(&text)
+}
+
+/// A scene to trace rays in, and no more.
+fn open_stage(arguments: &Arguments, scene: &Scene) -> Result<(), CliError> {
+    Scenery::new(scene)?.tracer(1)?;
+    print(&format!(
+        "ok: {}: {}, {}, no laboratory\nnext: catoptric trace {} --rays RAYS.csv --out PATHS.csv\n",
+        scene.name,
+        counted(scene.room.mirror.len(), "mirror"),
+        counted(scene.room.surface.len(), "surface"),
+        quoted(&arguments.scene),
+    ))
 }
 
 /// How many beams the drawing sends to each facet.

@@ -62,6 +62,7 @@ impl CliError {
             Self::File(error) => error.exit_code(),
             Self::Interrupted => 130,
             Self::Invalid { .. } | Self::Setup(_) | Self::Scene(SceneErrors::Invalid(_)) => 2,
+            Self::Scene(SceneErrors::Mesh { source, .. }) => source.exit_code(),
             Self::Scene(SceneErrors::Read { .. }) | Self::Write { .. } | Self::Output(_) => 3,
         }
     }

@@ -16,6 +16,7 @@ mod report;
 mod schema;
 mod score;
 mod simulate;
+mod trace;
 mod validate;
 
 use clap::{ArgAction, Args, Parser, Subcommand};
@@ -61,6 +62,8 @@ enum Verb {
     Check(check::Arguments),
     /// Simulate an experiment and write what it would have recorded
     Simulate(simulate::Arguments),
+    /// Follow any rays through a scene's mirrors
+    Trace(trace::Arguments),
     /// Estimate where every mirrored beam goes
     Calibrate(calibrate::Arguments),
     /// Say whether a calibration is well formed and physically sane
@@ -130,6 +133,7 @@ fn run(cli: Cli) -> Result<(), CliError> {
     match cli.verb {
         Verb::Demo(arguments) => demo::run(&arguments, &context),
         Verb::Simulate(arguments) => simulate::run(&arguments, &context),
+        Verb::Trace(arguments) => trace::run(&arguments, &context),
         Verb::Calibrate(arguments) => calibrate::run(&arguments, &context),
         Verb::Validate(arguments) => validate::run(&arguments),
         Verb::Score(arguments) => score::run(&arguments, &context),

@@ -148,7 +148,11 @@ pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Fig
         result
     };
     let mut writer = DatasetWriter::create(recording.out, recording.replace, &session)?;
-    let resolved = scene::to_toml(recording.scene)
+    let (kept, meshes) = scene::kept(recording.scene);
+    for (name, bytes) in &meshes {
+        writer.write_beside_scene(name, bytes)?;
+    }
+    let resolved = scene::to_toml(&kept)
         .map_err(|e| IoError::content(recording.out.join(dataset::SCENE), e.to_string()))?;
     writer.write_scene(&resolved)?;
     writer.write_truth(&truth)?;
@@ -264,8 +268,12 @@ const RETURNS_HEADER: &str = "pose,beam,surface,facets,geometric_m,cos_incidence
                               distance_bias_m,angle_bias_m,color_bias_m,noise_sd_m,echo,detection_probability\n";
 
 fn return_rows(laboratory: &Laboratory, pose: usize, recorded: &Recorded) -> String {
-    let facets = &laboratory.scene().superstructure.facet;
-    let name = |facet: &usize| facets[*facet].name.as_str();
+    let scene = laboratory.scene();
+    let facets = scene.superstructure.facet.iter().map(|f| f.name.as_str());
+    let names: Vec<&str> = facets
+        .chain(scene.room.mirror.iter().map(|m| m.name.as_str()))
+        .collect();
+    let name = |facet: &usize| names[*facet];
     let mut text = String::new();
     let echoes = recorded.returns.iter().enumerate().flat_map(|(beam, found)| {
         let echoes = found.iter().flat_map(Return::echoes).enumerate();
@@ -277,6 +285,7 @@ fn return_rows(laboratory: &Laboratory, pose: usize, recorded: &Recorded) -> Str
             Role::Structure => "structure",
             Role::Board => "board",
             Role::Wall => "wall",
+            Role::Object => "object",
         };
         let facets: Vec<&str> = r.facets.iter().map(name).collect();
         // Names of facets are free text: a comma or a quote in one must not end the field.

@@ -79,6 +79,14 @@ impl DatasetWriter {
         self.folder.write(SCENE, toml.as_bytes())
     }
 
+    /// Writes a file that the resolved scene names, below its folder.
+    ///
+    /// # Errors
+    /// [`IoError`] if writing fails.
+    pub fn write_beside_scene(&mut self, relative: &str, bytes: &[u8]) -> Result<(), IoError> {
+        self.folder.write(&format!("truth/{relative}"), bytes)
+    }
+
     /// Writes the truth about every beam.
     ///
     /// # Errors

@@ -5,8 +5,9 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 use std::fs::{self, File};
-use std::io::{self, Write};
-use std::path::Path;
+use std::io::{self, BufWriter, Seek, Write};
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
 
 /// Writes a file so that it appears whole or not at all. What was there before is replaced.
 ///
@@ -36,7 +37,20 @@ pub fn write_file(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), IoError> {
 
 /// Writes a temporary file in the same folder and renames it.
 fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let folder = parent(path);
+    let mut file = temporary(parent(path))?;
+    file.write_all(bytes)?;
+    place(file, path)
+}
+
+/// Brings a temporary file to disk and renames it.
+fn place(file: NamedTempFile, path: &Path) -> io::Result<()> {
+    file.as_file().sync_all()?;
+    file.persist(path).map_err(|e| e.error)?;
+    sync_folder(parent(path));
+    Ok(())
+}
+
+fn temporary(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".partial-");
     #[cfg(unix)]
@@ -45,12 +59,90 @@ fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    let mut file = builder.tempfile_in(folder)?;
-    file.write_all(bytes)?;
-    file.as_file().sync_all()?;
-    file.persist(path).map_err(|e| e.error)?;
-    sync_folder(folder);
-    Ok(())
+    builder.tempfile_in(folder)
+}
+
+/// A file written piece by piece, whole or not at all. A pipe or a device gets the pieces directly.
+#[derive(Debug)]
+pub struct StagedOutput {
+    place: PathBuf,
+    shown: PathBuf,
+    target: Target,
+}
+
+#[derive(Debug)]
+enum Target {
+    Staged(BufWriter<NamedTempFile>),
+    Direct(BufWriter<File>),
+}
+
+impl StagedOutput {
+    /// Begins a file; what stands at its place stays until [`finish`](Self::finish).
+    ///
+    /// # Errors
+    /// [`IoError`] if the system refuses.
+    pub fn create(path: impl AsRef<Path>) -> Result<Self, IoError> {
+        let shown = path.as_ref().to_owned();
+        let fail = |e| IoError::write(&shown, e);
+        let (place, direct) = match fs::metadata(&shown) {
+            Ok(there) if there.is_file() => (fs::canonicalize(&shown).map_err(fail)?, false),
+            Ok(there) if there.is_dir() => return Err(fail(io::ErrorKind::IsADirectory.into())),
+            Ok(_) => (shown.clone(), true),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => (shown.clone(), false),
+            Err(e) => return Err(fail(e)),
+        };
+        let target = if direct {
+            let file = File::options().write(true).open(&place).map_err(fail)?;
+            Target::Direct(BufWriter::new(file))
+        } else {
+            Target::Staged(BufWriter::new(temporary(parent(&place)).map_err(fail)?))
+        };
+        Ok(Self { place, shown, target })
+    }
+
+    /// Whether the pieces go to a pipe or a device, where nothing can be changed once it is written.
+    pub fn is_direct(&self) -> bool {
+        matches!(self.target, Target::Direct(_))
+    }
+
+    /// Appends.
+    ///
+    /// # Errors
+    /// [`IoError`] if the system refuses.
+    pub fn write(&mut self, bytes: &[u8]) -> Result<(), IoError> {
+        match &mut self.target {
+            Target::Staged(file) => file.write_all(bytes),
+            Target::Direct(file) => file.write_all(bytes),
+        }
+        .map_err(|e| IoError::write(&self.shown, e))
+    }
+
+    /// Writes over the beginning of a file, which must be no pipe, and appends no more.
+    ///
+    /// # Errors
+    /// [`IoError`] if the system refuses.
+    pub fn rewrite_start(&mut self, bytes: &[u8]) -> Result<(), IoError> {
+        let rewritten = match &mut self.target {
+            Target::Staged(file) => file.rewind().and_then(|()| file.write_all(bytes)),
+            Target::Direct(_) => Err(io::ErrorKind::NotSeekable.into()),
+        };
+        rewritten.map_err(|e| IoError::write(&self.shown, e))
+    }
+
+    /// Ends the file and moves it to its place.
+    ///
+    /// # Errors
+    /// [`IoError`] if the system refuses; then nothing of it is left.
+    pub fn finish(self) -> Result<(), IoError> {
+        let ended = match self.target {
+            Target::Staged(file) => match file.into_inner() {
+                Ok(file) => place(file, &self.place),
+                Err(e) => Err(e.into_error()),
+            },
+            Target::Direct(mut file) => file.flush(),
+        };
+        ended.map_err(|e| IoError::write(&self.shown, e))
+    }
 }
 
 fn write_through(path: &Path, bytes: &[u8]) -> io::Result<()> {

@@ -25,10 +25,13 @@ mod tree;
 pub mod cloud;
 pub mod dataset;
 pub mod manifest;
+pub mod mesh;
+pub mod npy;
+pub mod rays;
 
 pub use dataset::{DatasetWriter, read_dataset, read_session};
 pub use error::IoError;
-pub use file::{read_json, write_file, write_json};
+pub use file::{StagedOutput, read_json, write_file, write_json};
 pub use manifest::{Manifest, Provenance};
 pub use playback::read_recording;
 pub use recording::RecordingWriter;

@@ -4,11 +4,15 @@
 //! against the schema, then the sense of it ([`catoptric_sim::check`]).
 
 use super::diagnostic::{Diagnostic, Diagnostics, Place, position};
+use super::error::IoError;
+use super::file::{parent, sha256};
 use super::format;
+use super::mesh;
 use super::tree::{self, Node, Source};
 use catoptric_sim::Scene;
 use catoptric_sim::check::{self, Problem};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Why there is no scene.
 #[derive(Debug, thiserror::Error)]
@@ -26,6 +30,14 @@ pub enum SceneErrors {
     /// The scene is not valid.
     #[error(transparent)]
     Invalid(Box<Diagnostics>),
+    /// A mesh that the scene names is not there, or damaged.
+    #[error("`{key}`: {source}")]
+    Mesh {
+        /// The key that names it.
+        key: String,
+        /// What is wrong with it.
+        source: Box<IoError>,
+    },
 }
 
 /// Published layouts that are built in.
@@ -45,10 +57,10 @@ pub fn scene_template(layout: Layout) -> &'static str {
     }
 }
 
-/// Reads a scene and changes it by `KEY=VALUE` arguments.
+/// Reads a scene and the meshes that it names, and changes it by `KEY=VALUE` arguments.
 ///
 /// # Errors
-/// [`SceneErrors`]: the file cannot be read, or everything that is wrong with it.
+/// [`SceneErrors`]: a file cannot be read, or everything that is wrong with it.
 pub fn load(path: &Path, sets: &[String]) -> Result<Scene, SceneErrors> {
     let bytes = std::fs::read(path).map_err(|source| SceneErrors::Read {
         help: similar_file(path, &source),
@@ -57,7 +69,27 @@ pub fn load(path: &Path, sets: &[String]) -> Result<Scene, SceneErrors> {
     })?;
     let name = path.display().to_string();
     match String::from_utf8(bytes) {
-        Ok(text) => parse(&text, &name, sets),
+        Ok(text) => {
+            let mut scene = parse(&text, &name, sets)?;
+            read_meshes(&mut scene, parent(path))?;
+            let problems = if scene.meshes.0.is_empty() {
+                Vec::new()
+            } else {
+                // A body that is a mesh is not looked at without it.
+                check::problems(&scene)
+            };
+            let keyed = problems.into_iter().map(|p| Diagnostic {
+                place: Place::Key(p.path.to_string()),
+                message: p.message,
+                help: p.help,
+            });
+            let keyed: Vec<Diagnostic> = keyed.collect();
+            if keyed.is_empty() {
+                Ok(scene)
+            } else {
+                Err(invalid(&name, &text, keyed))
+            }
+        }
         Err(error) => {
             let valid = error.utf8_error().valid_up_to();
             let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
@@ -75,7 +107,48 @@ pub fn load(path: &Path, sets: &[String]) -> Result<Scene, SceneErrors> {
     }
 }
 
-/// Reads a scene from its text; a file name that ends in .json means JSON.
+/// Reads the meshes that a scene names; relative names start at a folder.
+///
+/// # Errors
+/// [`SceneErrors::Mesh`] for the first that is not there or damaged.
+pub fn read_meshes(scene: &mut Scene, folder: &Path) -> Result<(), SceneErrors> {
+    let mut meshes = std::mem::take(&mut scene.meshes);
+    for (key, shape) in scene.mesh_shapes() {
+        if !meshes.0.contains_key(&shape.file) {
+            let read = mesh::read_mesh(folder.join(&shape.file)).map_err(|e| SceneErrors::Mesh {
+                key,
+                source: Box::new(e),
+            })?;
+            meshes.0.insert(shape.file.clone(), Arc::new(read));
+        }
+    }
+    scene.meshes = meshes;
+    Ok(())
+}
+
+/// The scene with its meshes under names made of their content, below a folder beside it, and those files: what a
+/// dataset keeps, so that it can be made again. A scene that is kept already keeps its names.
+pub fn kept(scene: &Scene) -> (Scene, Vec<(String, Vec<u8>)>) {
+    let mut scene = scene.clone();
+    let mut files: Vec<(String, Vec<u8>)> = Vec::new();
+    let mut kept = catoptric_sim::Meshes::default();
+    let meshes = std::mem::take(&mut scene.meshes);
+    for shape in scene.mesh_shapes_mut() {
+        let Ok(mesh) = meshes.get(&shape.file) else {
+            continue;
+        };
+        let bytes = mesh::to_ply(mesh);
+        // Half of a SHA-256 tells meshes apart.
+        shape.file = format!("meshes/{}.ply", &sha256(&bytes)[..32]);
+        if kept.0.insert(shape.file.clone(), Arc::clone(mesh)).is_none() {
+            files.push((shape.file.clone(), bytes));
+        }
+    }
+    scene.meshes = kept;
+    (scene, files)
+}
+
+/// Reads a scene from its text, without the meshes that it names; a file name that ends in .json means JSON.
 ///
 /// ```
 /// use catoptric::io::scene::{self, SceneErrors};

@@ -418,12 +418,12 @@ fn all_problems_are_told_at_once() {
         .replace("seed = 7", "sede = 7")
         .replace("preset = \"ust-20lx\"", "preset = \"ust-30lx\"")
         .replace("distance_mm = 70.0", "distance_mm = nan")
-        .replace("size_m = [6.0, 6.0, 3.0]\n", "");
+        .replace("model = \"empirical\"", "model = \"wrong\"");
     let (_folder, path) = folder_with(&text);
     let output = run(path.parent().unwrap(), &["check", "scene.toml"]);
     assert_eq!(output.status.code(), Some(2));
     let said = stderr(&output);
-    for part in ["sede", "\"ust-30lx\"", "nan", "[room]"] {
+    for part in ["sede", "\"ust-30lx\"", "nan", "\"wrong\""] {
         let (line, column) = place_of(&text, part);
         let place = format!("scene.toml:{line}:{column}");
         assert!(said.contains(&place), "{place} is not in:\n{said}");
@@ -435,6 +435,47 @@ fn all_problems_are_told_at_once() {
         said.contains("2 | name") || said.contains("3 | sede = 7\n  | ^^^^\n"),
         "{said}"
     );
+}
+
+#[test]
+fn a_laboratory_needs_walls_and_a_mirror_no_more_light_than_it_gets() {
+    let said = |text: &str| problems_with(text, &[]).to_string();
+    let text = VALID.replace("size_m = [6.0, 6.0, 3.0]\n", "");
+    assert!(
+        said(&text).contains("`room.size_m` is missing"),
+        "{}",
+        said(&text)
+    );
+    let text = format!("{VALID}\n[superstructure.mirror]\nreflectivity = 0.9\ndiffuse_reflectivity = 0.2\n");
+    assert!(
+        said(&text).contains("returns no more light than it gets"),
+        "{}",
+        said(&text)
+    );
+    let text = format!("{VALID}\n[superstructure.mirror]\nglass = {{ thickness_mm = 3.0 }}\n");
+    assert!(
+        said(&text).contains("more than the 1 mm of the whole mirror"),
+        "{}",
+        said(&text)
+    );
+    let text = spoiled("size_mm = [10.0, 20.0, 30.0]", "");
+    assert!(
+        said(&text).contains("neither `size_mm` nor `shape`"),
+        "{}",
+        said(&text)
+    );
+    let text = format!(
+        "{VALID}\n[[room.mirror]]\nname = \"m\"\nshape.rectangle = {{ normal = [0, 0, 0], width_m = 1, height_m = 1 }}\n"
+    );
+    assert!(
+        said(&text).contains("`room.mirror[0].shape.rectangle.normal` has length 0"),
+        "{}",
+        said(&text)
+    );
+    let text = format!(
+        "{VALID}\n[[room.surface]]\nname = \"s\"\ncolor = \"pink\"\nshape.box = {{ size_m = [1, 1, 1] }}\n"
+    );
+    assert!(said(&text).contains("`room.surface[0].color`"), "{}", said(&text));
 }
 
 #[test]

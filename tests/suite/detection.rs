@@ -10,7 +10,7 @@ use crate::common::{folder_with, run, stderr};
 use crate::scenes::{BARE, scene};
 use catoptric::io::scene as scene_file;
 use catoptric::model::{Stretch, beam};
-use catoptric::sim::cast::Polygon;
+use catoptric::sim::cast::{Polygon, Shape};
 use catoptric::sim::noise::{Draws, Purpose};
 use catoptric::sim::optics::{self, Mirrors, Role, Setting};
 use catoptric::sim::reading::{Return, Sensor};
@@ -73,8 +73,11 @@ fn forward(scene: &Scene, boards: &[Target]) -> Option<Return> {
             let (sin, cos) = libm::sincos(tilt_deg.to_radians());
             let at = |y: f64, z: f64| Point3::new(distance + y * sin, y * cos, z);
             optics::Target {
-                polygon: Polygon::new(vec![at(*to, -1.0), at(*from, -1.0), at(*from, 1.0), at(*to, 1.0)])
-                    .expect("it has an area"),
+                name: "board".to_owned(),
+                shape: Shape::Polygon(
+                    Polygon::new(vec![at(*to, -1.0), at(*from, -1.0), at(*from, 1.0), at(*to, 1.0)])
+                        .expect("it has an area"),
+                ),
                 role: Role::Board,
                 paint: color::paint(scene, color).expect("it is defined"),
             }
@@ -266,6 +269,7 @@ fn a_beams_energy_is_all_accounted_for() {
                 let normal: Vector3<f64> = -center.normalize() + draws.normal3() * 0.4;
                 Facet {
                     name: format!("facet-{k}"),
+                    two_sided: false,
                     shape: FacetShape::Rectangle(RectangleShape {
                         center_mm: [center.x, center.y, 0.1 * center.z],
                         normal: normal.into(),
@@ -279,8 +283,11 @@ fn a_beams_energy_is_all_accounted_for() {
         let wall = |x: f64| {
             let corners = [(-9.0, -9.0), (9.0, -9.0), (9.0, 9.0), (-9.0, 9.0)];
             optics::Target {
-                polygon: Polygon::new(corners.map(|(y, z)| Point3::new(x, y, z)).to_vec())
-                    .expect("it is a square"),
+                name: "wall".to_owned(),
+                shape: Shape::Polygon(
+                    Polygon::new(corners.map(|(y, z)| Point3::new(x, y, z)).to_vec())
+                        .expect("it is a square"),
+                ),
                 role: Role::Wall,
                 paint: color::paint(&scene, "white").expect("white is built in"),
             }

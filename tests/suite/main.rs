@@ -13,3 +13,4 @@ mod paper;
 mod physics;
 mod pipeline;
 mod scenes;
+mod traps;

@@ -5,7 +5,7 @@
 
 use crate::scenes::{BARE, scene, set_board_ahead};
 use catoptric::model::{MirrorPlane, beam};
-use catoptric::sim::cast::Polygon;
+use catoptric::sim::cast::{Polygon, Shape};
 use catoptric::sim::color;
 use catoptric::sim::footprint::Ray;
 use catoptric::sim::noise::{Draws, Purpose};
@@ -134,6 +134,7 @@ fn traced(
         .enumerate()
         .map(|(i, corners)| Facet {
             name: format!("facet-{i}"),
+            two_sided: false,
             shape: FacetShape::Polygon(PolygonShape {
                 corners_mm: corners.iter().map(|c| (c.coords * 1e3).into()).collect(),
             }),
@@ -141,7 +142,8 @@ fn traced(
         .collect();
     let structure = Structure::nominal(&scene).expect("the facets are polygons");
     let target = Target {
-        polygon: Polygon::new(board.to_vec()).expect("the board has an area"),
+        name: "board".to_owned(),
+        shape: Shape::Polygon(Polygon::new(board.to_vec()).expect("the board has an area")),
         role: Role::Board,
         paint: color::paint(&scene, "white").expect("white is built in"),
     };
@@ -237,6 +239,7 @@ fn a_45_degree_mirror_and_a_wall_add_their_two_legs() {
     let mut scene = scene(BARE);
     scene.superstructure.facet.push(Facet {
         name: "fold".to_owned(),
+        two_sided: false,
         shape: FacetShape::Polygon(PolygonShape {
             corners_mm: vec![
                 [1270.0, 20.0, -50.0],

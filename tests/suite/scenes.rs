@@ -117,6 +117,7 @@ fn random_facet(name: &str, slot: usize, sign: f64, draw: &FacetDraw) -> catoptr
     let elevation = (30.0 + 35.0 * elevation) * if up { 1.0 } else { -1.0 };
     Facet {
         name: name.to_owned(),
+        two_sided: false,
         shape: FacetShape::Wedge(Wedge {
             azimuth_deg: if sign > 0.0 {
                 [first, last]

@@ -1,7 +1,14 @@
 //! Rays against surfaces: the one user of parry.
 //!
-//! Facets, boards and walls are exact plane polygons, posts and housing exact boxes, all in one bounding volume
-//! hierarchy. A ray that leaves a mirror excludes that mirror by its index, never by an epsilon.
+//! Facets, boards and walls are exact plane polygons, posts and housing exact boxes and cylinders, all in one bounding
+//! volume hierarchy; a mesh has one of its own below it. A ray that leaves a mirror excludes that mirror by its index,
+//! never by an epsilon.
+
+mod cylinder;
+mod triangles;
+
+pub use cylinder::Cylinder;
+pub use triangles::Triangles;
 
 use crate::footprint::Ray;
 use crate::layout::area_vector;
@@ -12,6 +19,7 @@ use parry3d::math::Vector;
 use parry3d::partitioning::{Bvh, BvhBuildStrategy};
 use parry3d::query::RayCast;
 use parry3d::shape::Cuboid;
+use std::sync::Arc;
 
 /// A convex plane polygon; its front is the side from which the corners run counter-clockwise.
 #[derive(Debug, Clone)]
@@ -40,6 +48,10 @@ pub enum Shape {
     Polygon(Polygon),
     /// A box.
     Block(Block),
+    /// A cylinder.
+    Cylinder(Cylinder),
+    /// A mesh.
+    Mesh(Arc<Triangles>),
 }
 
 /// Where a ray meets a surface.
@@ -102,11 +114,20 @@ impl Polygon {
         if !(distance > 0.0 && distance < FARTHEST) {
             return None;
         }
-        let point = ray.origin.coords + ray.direction.into_inner() * distance;
+        let point = ray.origin + ray.direction.into_inner() * distance;
+        self.contains(&point).then_some(distance)
+    }
+
+    /// Whether a point of its plane lies within its outline.
+    pub fn contains(&self, point: &Point3<f64>) -> bool {
         self.edges
             .iter()
-            .all(|(inwards, edge)| inwards.dot(&point) >= edge - EDGE_SLACK)
-            .then_some(distance)
+            .all(|(inwards, edge)| inwards.dot(&point.coords) >= edge - EDGE_SLACK)
+    }
+
+    /// The same outline, seen from the other side.
+    pub fn turned(&self) -> Option<Self> {
+        Self::new(self.corners.iter().rev().copied().collect())
     }
 }
 
@@ -142,23 +163,46 @@ impl Block {
     }
 }
 
+impl Shape {
+    fn bounds(&self) -> Aabb {
+        match self {
+            Self::Polygon(polygon) => padded(polygon.corners.iter().copied()),
+            Self::Block(block) => padded(block.corners().into_iter()),
+            Self::Cylinder(cylinder) => padded(cylinder.corners().into_iter()),
+            Self::Mesh(mesh) => padded(mesh.vertices().iter().copied()),
+        }
+    }
+
+    /// Distance at which a ray meets it, and its normal there.
+    fn cast(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
+        match self {
+            Self::Polygon(polygon) => Some((polygon.cast(ray)?, polygon.normal)),
+            Self::Block(block) => block.cast(ray),
+            Self::Cylinder(cylinder) => cylinder.cast(ray),
+            Self::Mesh(mesh) => mesh.cast(ray),
+        }
+    }
+
+    /// Whether a point is inside a closed body: what a ray from there meets first is a back.
+    pub(crate) fn holds(&self, point: &Point3<f64>) -> bool {
+        let ray = Ray {
+            origin: *point,
+            direction: Vector3::x_axis(),
+        };
+        self.cast(&ray)
+            .is_some_and(|(_, normal)| normal.dot(&ray.direction) > 0.0)
+    }
+
+    /// Distance at which a ray meets it.
+    pub(crate) fn distance(&self, ray: &Ray) -> Option<f64> {
+        Some(self.cast(ray)?.0)
+    }
+}
+
 impl World {
     /// Indexes the shapes; a hit names a shape by its place in this list.
     pub fn new(shapes: Vec<Shape>) -> Self {
-        let boxes: Vec<Aabb> = shapes
-            .iter()
-            .map(|shape| {
-                let corners = match shape {
-                    Shape::Polygon(polygon) => polygon.corners.clone(),
-                    Shape::Block(block) => block.corners(),
-                };
-                let points = corners.iter().map(|c| to_glam(&c.coords));
-                let mut aabb = Aabb::from_points(points);
-                aabb.mins -= Vector::splat(BOX_SLACK);
-                aabb.maxs += Vector::splat(BOX_SLACK);
-                aabb
-            })
-            .collect();
+        let boxes: Vec<Aabb> = shapes.iter().map(Shape::bounds).collect();
         Self {
             bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes),
             shapes,
@@ -173,16 +217,10 @@ impl World {
             if left == Some(leaf) {
                 return None;
             }
-            match &self.shapes[leaf] {
-                Shape::Polygon(polygon) => polygon.cast(ray),
-                Shape::Block(block) => block.cast(ray).map(|(distance, _)| distance),
-            }
+            self.shapes[leaf].distance(ray)
         })?;
         let surface = surface as usize;
-        let normal = match &self.shapes[surface] {
-            Shape::Polygon(polygon) => polygon.normal,
-            Shape::Block(block) => block.cast(ray)?.1,
-        };
+        let (_, normal) = self.shapes[surface].cast(ray)?;
         Some(Hit {
             surface,
             distance,
@@ -191,6 +229,14 @@ impl World {
             front: normal.dot(&ray.direction) < 0.0,
         })
     }
+}
+
+/// A box around points, a little larger than they need.
+fn padded(points: impl Iterator<Item = Point3<f64>>) -> Aabb {
+    let mut aabb = Aabb::from_points(points.map(|p| to_glam(&p.coords)));
+    aabb.mins -= Vector::splat(BOX_SLACK);
+    aabb.maxs += Vector::splat(BOX_SLACK);
+    aabb
 }
 
 fn to_glam(v: &Vector3<f64>) -> Vector {

@@ -6,6 +6,7 @@
 
 mod experiment;
 mod outline;
+mod stage;
 mod structure;
 mod values;
 
@@ -42,8 +43,14 @@ pub struct Problem {
 pub fn problems(scene: &Scene) -> Vec<Problem> {
     let mut found = Findings(Vec::new());
     values::check(scene, &mut found);
-    structure::check(scene, &mut found);
-    experiment::check(scene, &mut found);
+    stage::check(scene, &mut found);
+    // Where there is no laboratory, structure and procedure have nothing to be checked against.
+    if !scene.has_no_laboratory() {
+        structure::check(scene, &mut found);
+        if scene.room.has_walls() {
+            experiment::check(scene, &mut found);
+        }
+    }
     found.0
 }
 

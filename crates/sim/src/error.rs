@@ -43,4 +43,24 @@ pub enum SimError {
         /// Why it fits nowhere.
         reason: String,
     },
+    /// A surface in the room whose description spans none.
+    #[error("surface {name:?} of the room has no shape: {reason}")]
+    Surface {
+        /// The surface.
+        name: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A mesh that nobody has read.
+    #[error("the mesh {file:?} has not been read")]
+    Mesh {
+        /// Its file, as the scene names it.
+        file: String,
+    },
+    /// A scene to trace rays in, and no more.
+    #[error(
+        "the scene has no laboratory: recording takes room.size_m, a [superstructure] with markers, and a board or a \
+         facet; this scene can be traced"
+    )]
+    NoLaboratory,
 }

@@ -51,16 +51,25 @@ fn wedge_corners(wedge: &Wedge) -> Option<Vec<Point3<f64>>> {
     Some(corners)
 }
 
-fn rectangle_corners(rectangle: &RectangleShape) -> Option<Vec<Point3<f64>>> {
-    let m = Unit::try_new(Vector3::from(rectangle.normal), f64::MIN_POSITIVE)?;
+fn rectangle_corners(shape: &RectangleShape) -> Option<Vec<Point3<f64>>> {
+    rectangle(
+        Point3::from(Vector3::from(shape.center_mm) * 1e-3),
+        shape.normal.into(),
+        [1e-3 * shape.width_mm, 1e-3 * shape.height_mm],
+    )
+}
+
+/// Corners of a rectangle whose width runs horizontally, in metres; `None` for a normal of no length.
+pub(crate) fn rectangle(
+    center: Point3<f64>,
+    normal: Vector3<f64>,
+    [width, height]: [f64; 2],
+) -> Option<Vec<Point3<f64>>> {
+    let m = Unit::try_new(normal, f64::MIN_POSITIVE)?;
     // A mirror parallel to the scan plane has no horizontal side of its own; x will do.
     let across = Unit::try_new(Vector3::z().cross(&m), 1e-9).unwrap_or(Vector3::x_axis());
     let along = m.cross(&across);
-    let center = Point3::from(Vector3::from(rectangle.center_mm) * 1e-3);
-    let (x, y) = (
-        across.into_inner() * (0.5e-3 * rectangle.width_mm),
-        along * (0.5e-3 * rectangle.height_mm),
-    );
+    let (x, y) = (across.into_inner() * (0.5 * width), along * (0.5 * height));
     Some(vec![
         center - x - y,
         center + x - y,

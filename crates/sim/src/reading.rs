@@ -315,38 +315,16 @@ impl Sensor {
     /// The surfaces that a beam's light reaches, each with its pulses.
     fn illuminate(&self, setting: &Setting<'_>, beam: usize) -> Vec<Part> {
         let mut parts: Vec<Part> = Vec::new();
-        for (sub_ray, path) in self.paths(setting, beam) {
-            let End::Hit(hit) = path.end else { continue };
-            let paint: &Paint = setting.paint(hit.surface);
-            let cos_incidence = hit.normal.dot(&path.last.direction).abs();
-            let on = Illumination {
-                reflectivity: paint.reflectivity,
-                cos_incidence,
-                share: sub_ray.weight,
-                range: path.length,
-                mirrors: libm::pow(self.mirror_reflectivity, path.facets().len() as f64),
-            };
-            let power = power::received(&self.light, &on);
-            let same_way = |p: &Part| p.surface == hit.surface && p.facets[..p.count] == *path.facets();
-            let index = match parts.iter().position(same_way) {
-                Some(index) => index,
-                None => {
-                    parts.push(Part::new(hit.surface, path.facets()));
-                    parts.len() - 1
-                }
-            };
-            let part = &mut parts[index];
-            part.pulses.push(Pulse {
-                range: path.length,
-                power,
-            });
-            part.share += sub_ray.weight;
-            part.power += power;
-            part.mean_range += power * path.length;
-            part.mean_cos += power * cos_incidence;
-            if sub_ray.wide == 0.0 && sub_ray.narrow == 0.0 {
-                part.chief = Some((path.length, cos_incidence));
+        let azimuth = beam::azimuth(beam);
+        for sub_ray in &self.sub_rays {
+            let ray = footprint::ray(&self.shape, azimuth, sub_ray);
+            let path = setting.trace(&ray);
+            let chief = sub_ray.wide == 0.0 && sub_ray.narrow == 0.0;
+            self.add_end(&mut parts, setting, sub_ray, &path, chief);
+            for ghost in setting.ghosts(&ray, &path) {
+                self.add_end(&mut parts, setting, sub_ray, &ghost, false);
             }
+            self.add_mirrors(&mut parts, setting, sub_ray, &path);
         }
         if self.sub_rays.iter().all(|s| s.wide != 0.0 || s.narrow != 0.0) {
             Self::add_chief(&mut parts, &self.chief_path(setting, beam));
@@ -356,6 +334,79 @@ impl Sensor {
             part.mean_cos /= part.power;
         }
         parts
+    }
+
+    /// Adds the light that a sub-ray leaves where its way ends.
+    fn add_end(
+        &self,
+        parts: &mut Vec<Part>,
+        setting: &Setting<'_>,
+        sub_ray: &SubRay,
+        path: &Path,
+        chief: bool,
+    ) {
+        let End::Hit(hit) = path.end else { return };
+        let paint: &Paint = setting.paint(hit.surface);
+        let on = Illumination {
+            reflectivity: paint.reflectivity,
+            cos_incidence: hit.normal.dot(&path.last.direction).abs(),
+            share: sub_ray.weight,
+            range: path.length,
+            mirrors: libm::pow(self.mirror_reflectivity, path.silvered as f64) * path.gain,
+        };
+        self.add_light(parts, (hit.surface, path.facets()), &on, path.gain, chief);
+    }
+
+    /// Adds what the mirrors on a sub-ray's way scatter themselves.
+    fn add_mirrors(&self, parts: &mut Vec<Part>, setting: &Setting<'_>, sub_ray: &SubRay, path: &Path) {
+        let reflectivity = setting.diffuse_reflectivity();
+        if reflectivity == 0.0 {
+            return;
+        }
+        for (count, meeting) in path.meetings().enumerate() {
+            let on = Illumination {
+                reflectivity,
+                cos_incidence: meeting.cos_incidence.max(0.0),
+                share: sub_ray.weight,
+                range: meeting.length,
+                mirrors: libm::pow(self.mirror_reflectivity, meeting.silvered as f64) * meeting.gain,
+            };
+            let chief = sub_ray.wide == 0.0 && sub_ray.narrow == 0.0;
+            let way = (meeting.surface, &path.facets()[..count]);
+            self.add_light(parts, way, &on, reflectivity * meeting.gain, chief);
+        }
+    }
+
+    /// Adds light to the part of a surface and the facets on the way there; `gain` is what is left of its energy.
+    fn add_light(
+        &self,
+        parts: &mut Vec<Part>,
+        (surface, facets): (usize, &[usize]),
+        on: &Illumination,
+        gain: f64,
+        chief: bool,
+    ) {
+        let power = power::received(&self.light, on);
+        let same_way = |p: &Part| p.surface == surface && p.facets[..p.count] == *facets;
+        let index = match parts.iter().position(same_way) {
+            Some(index) => index,
+            None => {
+                parts.push(Part::new(surface, facets));
+                parts.len() - 1
+            }
+        };
+        let part = &mut parts[index];
+        part.pulses.push(Pulse {
+            range: on.range,
+            power,
+        });
+        part.share += on.share * gain;
+        part.power += power;
+        part.mean_range += power * on.range;
+        part.mean_cos += power * on.cos_incidence;
+        if chief {
+            part.chief = Some((on.range, on.cos_incidence));
+        }
     }
 
     /// Lends the chief ray's range to the part it falls on, where the bundle itself holds no chief ray.

@@ -4,15 +4,16 @@
 //! the laser's own frame sits a little off in its housing: everything bolted to the housing then moves in the true
 //! sensor frame.
 
-use crate::cast::{Block, Polygon, Shape};
+use crate::cast::{Block, Cylinder, Polygon, Shape, Triangles};
 use crate::error::SimError;
 use crate::layout;
 use crate::noise::{Draws, Purpose};
 use crate::scanner::HOUSING_MM;
-use crate::scene::{Facet, Scene};
+use crate::scene::{Facet, Glass, MeshShape, Post, PostShape, Scene};
 use catoptric_model::Pose;
 use catoptric_model::frame::yaw_pitch_roll;
 use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use std::sync::Arc;
 
 /// A mirror in the sensor frame.
 #[derive(Debug, Clone)]
@@ -23,7 +24,25 @@ pub struct BuiltFacet {
     pub face: Polygon,
     /// The bare structure behind the mirror, by its thickness.
     pub backing: Polygon,
+    /// Glass before the reflecting surface.
+    pub glass: Option<Glass>,
+    /// What a mirror with two reflecting sides has beside its face.
+    pub back: Option<Back>,
     slope: Slope,
+}
+
+/// The other side of a mirror.
+#[derive(Debug, Clone)]
+pub enum Back {
+    /// The face itself: the mirror has no thickness.
+    Face,
+    /// A reflecting outline behind the face, and the opaque rim between the two.
+    Body {
+        /// The outline, facing away from the face.
+        face: Polygon,
+        /// One strip for every edge.
+        rim: Vec<Polygon>,
+    },
 }
 
 /// An opaque part in the sensor frame.
@@ -102,7 +121,59 @@ fn centroid(corners: &[Point3<f64>]) -> Point3<f64> {
     Point3::from(corners.iter().map(|c| c.coords).sum::<Vector3<f64>>() / corners.len() as f64)
 }
 
+impl Back {
+    /// The back of a mirror of some thickness, in metres. `None` for an outline without an area.
+    pub(crate) fn of(face: &Polygon, thickness: f64) -> Option<Self> {
+        if thickness == 0.0 {
+            return Some(Self::Face);
+        }
+        let behind = face.normal.into_inner() * thickness;
+        let back: Vec<_> = face.corners.iter().map(|c| c - behind).collect();
+        let next = |i: usize| (i + 1) % back.len();
+        let rim = (0..back.len()).filter_map(|i| {
+            Polygon::new(vec![
+                back[i],
+                back[next(i)],
+                face.corners[next(i)],
+                face.corners[i],
+            ])
+        });
+        Some(Self::Body {
+            rim: rim.collect(),
+            face: Polygon::new(back.clone())?.turned()?,
+        })
+    }
+}
+
 impl BuiltFacet {
+    /// An even mirror that is where it is said to be. `None` for an outline without an area.
+    pub(crate) fn exact(
+        name: String,
+        face: Polygon,
+        thickness: f64,
+        two_sided: bool,
+        glass: Option<Glass>,
+    ) -> Option<Self> {
+        let behind = face.normal.into_inner() * thickness;
+        let backing = Polygon::new(face.corners.iter().map(|c| c - behind).collect())?;
+        let back = two_sided.then(|| Back::of(&face, thickness));
+        Some(Self {
+            slope: Slope {
+                center: face.origin,
+                axes: [Vector3::zeros(); 2],
+                height: [0.0; 7],
+            },
+            name,
+            backing,
+            glass,
+            back: match back {
+                Some(back) => Some(back?),
+                None => None,
+            },
+            face,
+        })
+    }
+
     /// Normal of the reflecting surface at one of its points.
     pub fn normal_at(&self, point: &Point3<f64>) -> Unit<Vector3<f64>> {
         if self.slope.height == [0.0; 7] {
@@ -160,8 +231,17 @@ impl Structure {
         Ok(Self {
             rig_from_sensor: nominal * mount_error,
             facets,
-            parts: parts(scene, &sensor_from_drawing),
+            parts: parts(scene, &sensor_from_drawing)?,
         })
+    }
+
+    /// Nothing at all: for a scene of which only the room is looked at.
+    pub fn empty() -> Self {
+        Self {
+            rig_from_sensor: Pose::identity(),
+            facets: Vec::new(),
+            parts: Vec::new(),
+        }
     }
 }
 
@@ -209,39 +289,92 @@ fn build_facet(
         None => (0.0, (0, 0)),
     };
     let slope = Slope::new(&face, rms, &mut Draws::new(seed, Purpose::FacetSlope, index));
+    let back = match facet.two_sided {
+        true => Some(
+            Back::of(&face, scene.superstructure.mirror.thickness_mm * 1e-3)
+                .ok_or_else(|| fail("its corners lie on a line"))?,
+        ),
+        false => None,
+    };
     Ok(BuiltFacet {
         name: facet.name.clone(),
         face,
         backing,
+        glass: scene.superstructure.mirror.glass,
+        back,
         slope,
     })
 }
 
-fn parts(scene: &Scene, sensor_from_drawing: &Pose) -> Vec<Part> {
-    let block = |name: String, center_mm: [f64; 3], size_mm: [f64; 3], yaw_deg: f64, color: String| {
-        let place = Pose::from_parts(
-            Translation3::from(Vector3::from(center_mm) * 1e-3),
-            yaw_pitch_roll(yaw_deg.to_radians(), 0.0, 0.0),
-        );
-        let shape = Shape::Block(Block::new(
-            sensor_from_drawing * place,
-            Vector3::from(size_mm) * 1e-3,
-        ));
-        Part { name, shape, color }
-    };
+/// The shape of a post, placed by the drawing; `frame_from_drawing` takes it further.
+///
+/// # Errors
+/// [`SimError::Mesh`] for a mesh that nobody has read.
+pub(crate) fn post_shape(scene: &Scene, post: &Post, frame_from_drawing: &Pose) -> Result<Shape, SimError> {
+    let turn = yaw_pitch_roll(
+        post.yaw_deg.to_radians(),
+        post.pitch_deg.to_radians(),
+        post.roll_deg.to_radians(),
+    );
+    let place = Pose::from_parts(Translation3::from(Vector3::from(post.center_mm) * 1e-3), turn);
+    let frame_from_post = frame_from_drawing * place;
+    Ok(match &post.shape {
+        // Without any size there is nothing; the checks of the scene say so.
+        None => Shape::Block(Block::new(
+            frame_from_post,
+            Vector3::from(post.size_mm.unwrap_or_default()) * 1e-3,
+        )),
+        Some(PostShape::Cylinder(c)) => Shape::Cylinder(Cylinder::new(
+            frame_from_post,
+            c.diameter_mm * 1e-3,
+            c.height_mm * 1e-3,
+        )),
+        Some(PostShape::Mesh(mesh)) => mesh_shape(scene, mesh, &frame_from_post)?,
+    })
+}
+
+/// A mesh in its place.
+///
+/// # Errors
+/// [`SimError::Mesh`] for a mesh that nobody has read.
+pub(crate) fn mesh_shape(
+    scene: &Scene,
+    shape: &MeshShape,
+    frame_from_mesh: &Pose,
+) -> Result<Shape, SimError> {
+    let mesh = scene.meshes.get(&shape.file)?;
+    let triangles = Triangles::new(mesh, shape.units.in_metres(), frame_from_mesh);
+    Ok(Shape::Mesh(Arc::new(triangles)))
+}
+
+fn parts(scene: &Scene, sensor_from_drawing: &Pose) -> Result<Vec<Part>, SimError> {
     let posts = scene.superstructure.post.iter();
     let mut parts: Vec<Part> = posts
-        .map(|p| block(p.name.clone(), p.center_mm, p.size_mm, p.yaw_deg, p.color.clone()))
-        .collect();
+        .map(|p| {
+            Ok(Part {
+                name: p.name.clone(),
+                shape: post_shape(scene, p, sensor_from_drawing)?,
+                color: p.color.clone(),
+            })
+        })
+        .collect::<Result<_, SimError>>()?;
     if scene.scanner.housing {
-        let housing = HOUSING_MM.iter();
-        parts.extend(
-            housing.map(|&(center, size)| {
-                block("housing".to_owned(), center, size, 0.0, "structure".to_owned())
-            }),
-        );
+        parts.extend(HOUSING_MM.iter().map(|&(center, size)| {
+            let place = Pose::from_parts(
+                Translation3::from(Vector3::from(center) * 1e-3),
+                UnitQuaternion::identity(),
+            );
+            Part {
+                name: "housing".to_owned(),
+                shape: Shape::Block(Block::new(
+                    sensor_from_drawing * place,
+                    Vector3::from(size) * 1e-3,
+                )),
+                color: "structure".to_owned(),
+            }
+        }));
     }
-    parts
+    Ok(parts)
 }
 
 #[cfg(test)]
@@ -258,6 +391,8 @@ mod tests {
             name: String::new(),
             backing: face.clone(),
             face,
+            glass: None,
+            back: None,
             slope,
         };
         // Over the square around the facet's circle, on which the root mean square is defined.

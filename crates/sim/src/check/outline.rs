@@ -1,5 +1,7 @@
 //! What every beam meets in the drawing.
 
+use crate::cast::Shape;
+use crate::footprint::Ray;
 use crate::layout;
 use crate::placement;
 use crate::scene::Scene;
@@ -77,7 +79,28 @@ struct Block {
 /// Everything around the scanner, in the sensor frame of the drawing.
 pub(super) struct Obstacles {
     pub(super) facets: Vec<Option<Face>>,
-    posts: Vec<Block>,
+    posts: Vec<Solid>,
+}
+
+/// An opaque body.
+enum Solid {
+    Block(Block),
+    /// A cylinder or a mesh; `None` for a mesh that has not been read.
+    Other(Option<Shape>),
+}
+
+impl Solid {
+    /// Distance at which a beam meets it from outside.
+    fn distance(&self, u: &Unit<Vector3<f64>>) -> Option<f64> {
+        let ray = Ray {
+            origin: Point3::origin(),
+            direction: *u,
+        };
+        match self {
+            Self::Block(block) => block.distance(u),
+            Self::Other(shape) => shape.as_ref()?.distance(&ray),
+        }
+    }
 }
 
 impl Face {
@@ -134,16 +157,24 @@ impl Block {
 
 impl Obstacles {
     pub(super) fn of(scene: &Scene) -> Self {
-        let structure = &scene.superstructure;
+        let drawn = &scene.superstructure;
         let face = |shape| layout::corners(shape).and_then(Face::new);
-        let facets = structure.facet.iter().map(|f| face(&f.shape)).collect();
-        let posts = structure.post.iter().map(|post| {
-            let center = Vector3::from(post.center_mm) * 1e-3;
-            let turn = yaw_pitch_roll(post.yaw_deg.to_radians(), 0.0, 0.0);
-            Block {
-                post_from_sensor: Pose::from_parts(Translation3::from(center), turn).inverse(),
-                half: Vector3::from(post.size_mm) * 0.5e-3,
+        let facets = drawn.facet.iter().map(|f| face(&f.shape)).collect();
+        let posts = drawn.post.iter().map(|post| match (post.size_mm, &post.shape) {
+            (Some(size), None) => {
+                let center = Vector3::from(post.center_mm) * 1e-3;
+                let turn = yaw_pitch_roll(
+                    post.yaw_deg.to_radians(),
+                    post.pitch_deg.to_radians(),
+                    post.roll_deg.to_radians(),
+                );
+                Solid::Block(Block {
+                    post_from_sensor: Pose::from_parts(Translation3::from(center), turn).inverse(),
+                    half: Vector3::from(size) * 0.5e-3,
+                })
             }
+            (_, None) => Solid::Other(None),
+            _ => Solid::Other(structure::post_shape(scene, post, &Pose::identity()).ok()),
         });
         Self {
             facets,
@@ -179,9 +210,13 @@ impl Obstacles {
 
     /// Whether the scanner's origin is inside a post.
     pub(super) fn post_holds_origin(&self, post: usize) -> bool {
-        let block = &self.posts[post];
-        let origin = block.post_from_sensor * Point3::origin();
-        (0..3).all(|axis| origin[axis].abs() <= block.half[axis])
+        match &self.posts[post] {
+            Solid::Block(block) => {
+                let origin = block.post_from_sensor * Point3::origin();
+                (0..3).all(|axis| origin[axis].abs() <= block.half[axis])
+            }
+            Solid::Other(shape) => shape.as_ref().is_some_and(|s| s.holds(&Point3::origin())),
+        }
     }
 }
 

@@ -44,6 +44,20 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
         }
     }
     for (i, post) in scene.superstructure.post.iter().enumerate() {
+        let path = structure.key("post").index(i);
+        match (&post.size_mm, &post.shape) {
+            (None, None) => found.add(
+                &path,
+                "has neither `size_mm` nor `shape`",
+                "give a box its size_mm, or a shape.cylinder or shape.mesh".to_owned(),
+            ),
+            (Some(_), Some(_)) => found.add(
+                &path.key("size_mm"),
+                "is the size of a box, and `shape` makes the post something else",
+                "delete one of the two".to_owned(),
+            ),
+            _ => {}
+        }
         if obstacles.post_holds_origin(i) {
             found.add(
                 &structure.key("post").index(i).key("center_mm"),
@@ -139,6 +153,15 @@ fn check_rectangle(shape: &RectangleShape, path: &Path, found: &mut Findings) {
 }
 
 fn check_polygon(corners: &[Point3<f64>], path: &Path, found: &mut Findings) {
+    if !check_outline(corners, path, found) {
+        return;
+    }
+    let help = "list the corners in the opposite order: counter-clockwise seen from the scanner's side";
+    check_side(corners, path, help, found);
+}
+
+/// Whether corners go round a convex plane polygon.
+pub(super) fn check_outline(corners: &[Point3<f64>], path: &Path, found: &mut Findings) -> bool {
     let count = distinct_points(corners);
     if count < 3 {
         found.add(
@@ -146,7 +169,7 @@ fn check_polygon(corners: &[Point3<f64>], path: &Path, found: &mut Findings) {
             format_args!("has {count} different corners; at least 3 are needed"),
             None,
         );
-        return;
+        return false;
     }
     if spread(corners) < CUTTING_ERROR_M {
         found.add(
@@ -157,7 +180,7 @@ fn check_polygon(corners: &[Point3<f64>], path: &Path, found: &mut Findings) {
             ),
             "move at least one corner off the line".to_owned(),
         );
-        return;
+        return false;
     }
     let area = layout::area_vector(corners);
     // The two lobes of a bow tie cancel; what rounding leaves of them has no direction.
@@ -167,7 +190,7 @@ fn check_polygon(corners: &[Point3<f64>], path: &Path, found: &mut Findings) {
             "crosses itself; list the corners in order around the mirror",
             None,
         );
-        return;
+        return false;
     };
     let center = corners.iter().map(|c| c.coords).sum::<Vector3<f64>>() / corners.len() as f64;
     let off_plane = |c: &Point3<f64>| normal.dot(&(c.coords - center)).abs();
@@ -182,7 +205,7 @@ fn check_polygon(corners: &[Point3<f64>], path: &Path, found: &mut Findings) {
             ),
             "mirrors are plane; three corners always are".to_owned(),
         );
-        return;
+        return false;
     }
     if let Some(corner) = outside_corner(corners, &normal) {
         found.add(
@@ -190,10 +213,9 @@ fn check_polygon(corners: &[Point3<f64>], path: &Path, found: &mut Findings) {
             "makes the outline concave, or it is out of order; corners go round a convex polygon",
             "a concave mirror is two convex facets".to_owned(),
         );
-        return;
+        return false;
     }
-    let help = "list the corners in the opposite order: counter-clockwise seen from the scanner's side";
-    check_side(corners, path, help, found);
+    true
 }
 
 /// A corner that makes the outline other than convex: one at which it turns the wrong way, or else one that is on the

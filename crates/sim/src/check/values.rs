@@ -96,6 +96,10 @@ fn colors(scene: &Scene, found: &mut Findings) {
     for (i, board) in scene.board.iter().enumerate() {
         used.push((Path::of("board").index(i).key("color"), &board.color));
     }
+    for (i, surface) in scene.room.surface.iter().enumerate() {
+        let path = Path::of("room").key("surface").index(i).key("color");
+        used.push((path, &surface.color));
+    }
     for name in scene.errors.color.keys() {
         used.push((Path::of("errors").key("color").key(name), name));
     }

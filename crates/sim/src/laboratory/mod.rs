@@ -10,8 +10,8 @@ mod truth;
 pub use chance::Chances;
 pub use room::board_markers;
 
-use crate::cast::Polygon;
-use crate::color;
+use crate::cast::{Polygon, Shape};
+use crate::color::{self, Paint};
 use crate::error::SimError;
 use crate::mocap::{self, Body};
 use crate::noise::{Draws, Purpose};
@@ -19,6 +19,7 @@ use crate::optics::{Mirrors, Role, Setting, Target};
 use crate::placement::{self, Planned};
 use crate::reading::{Return, Sensor};
 use crate::scene::{EchoChoice, ErrorModel, Scene};
+use crate::stage::Stage;
 use crate::structure::Structure;
 use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::{Dataset, Pose, PoseKind, PoseLabel, RangeBias, Stretch, beam};
@@ -31,6 +32,7 @@ pub struct Laboratory {
     seed: u64,
     sensor: Sensor,
     structure: Structure,
+    stage: Stage,
     planned: Vec<Planned>,
     /// Where each planned board really stands, in the room frame.
     boards: Vec<Option<Pose>>,
@@ -47,6 +49,9 @@ impl Laboratory {
     /// # Errors
     /// A facet without a shape, an unknown color, a board that fits nowhere.
     pub fn new(scene: &Scene, seed: u64) -> Result<Self, SimError> {
+        if scene.has_no_laboratory() || !scene.room.has_walls() {
+            return Err(SimError::NoLaboratory);
+        }
         let sensor = Sensor::new(scene)?;
         let planned = placement::plan(scene, &sensor)?;
         let boards = planned
@@ -54,9 +59,12 @@ impl Laboratory {
             .enumerate()
             .map(|(i, p)| Some(misplaced(scene, seed, i, &p.board?.1)))
             .collect();
+        let structure = Structure::as_built(scene, seed)?;
+        let room_from_sensor = placement::room_from_rig(&scene.room) * structure.rig_from_sensor;
         let laboratory = Self {
             seed,
-            structure: Structure::as_built(scene, seed)?,
+            stage: Stage::new(scene, &room_from_sensor.inverse())?,
+            structure,
             believed: knowledge::believed_bias(scene, seed, sensor.bias()),
             scene: scene.clone(),
             sensor,
@@ -127,27 +135,18 @@ impl Laboratory {
     fn targets(&self, number: usize) -> Result<Vec<Target>, SimError> {
         let sensor_from_room = self.room_from_sensor().inverse();
         let wall_paint = color::paint(&self.scene, &self.scene.room.color)?;
-        let polygon =
-            |corners: Vec<Point3<f64>>| Polygon::new(corners.iter().map(|c| sensor_from_room * c).collect());
-        let walls = room::walls(&self.scene).into_iter().filter_map(polygon);
-        let mut targets: Vec<Target> = walls
-            .map(|polygon| Target {
-                polygon,
-                role: Role::Wall,
-                paint: wall_paint.clone(),
-            })
-            .collect();
+        let mut targets = wall_targets(&self.scene, &sensor_from_room, &wall_paint);
         if let (Some((board, _)), Some(room_from_board)) = (&self.planned[number].board, &self.boards[number])
         {
             let board = &self.scene.board[*board];
             let corners = room::outline(board)
                 .corners()
-                .iter()
                 .map(|c| room_from_board * c)
-                .collect();
-            if let Some(polygon) = polygon(corners) {
+                .to_vec();
+            if let Some(polygon) = placed(&sensor_from_room, corners) {
                 targets.push(Target {
-                    polygon,
+                    name: board.name.clone(),
+                    shape: Shape::Polygon(polygon),
                     role: Role::Board,
                     paint: color::paint(&self.scene, &board.color)?,
                 });
@@ -166,7 +165,13 @@ impl Laboratory {
         } else {
             Mirrors::Attached
         };
-        let setting = Setting::new(&self.scene, &self.structure, mirrors, self.targets(number)?)?;
+        let setting = Setting::in_room(
+            &self.scene,
+            &self.structure,
+            mirrors,
+            Some(&self.stage),
+            self.targets(number)?,
+        )?;
         Ok((0..beam::COUNT)
             .into_par_iter()
             .map(|b| self.sensor.observe(&setting, b))
@@ -294,6 +299,26 @@ impl Laboratory {
             poses,
         })
     }
+}
+
+/// Walls, floor and ceiling, moved into another frame.
+pub(crate) fn wall_targets(scene: &Scene, frame_from_room: &Pose, paint: &Paint) -> Vec<Target> {
+    room::walls(scene)
+        .into_iter()
+        .filter_map(|(name, corners)| {
+            Some(Target {
+                name: name.to_owned(),
+                shape: Shape::Polygon(placed(frame_from_room, corners)?),
+                role: Role::Wall,
+                paint: paint.clone(),
+            })
+        })
+        .collect()
+}
+
+/// The polygon of corners that are moved into another frame.
+fn placed(frame_from_room: &Pose, corners: Vec<Point3<f64>>) -> Option<Polygon> {
+    Polygon::new(corners.iter().map(|c| frame_from_room * c).collect())
 }
 
 /// Where a board really stands when a person means to put it somewhere.

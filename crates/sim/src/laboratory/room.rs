@@ -45,8 +45,15 @@ pub fn board_markers(board: &Board) -> Vec<Marker> {
         .collect()
 }
 
-/// Corners of walls, floor and ceiling in the room frame, each counter-clockwise seen from inside.
-pub(super) fn walls(scene: &Scene) -> Vec<Vec<Point3<f64>>> {
+/// Names of the two walls of each axis.
+const WALLS: [[&str; 2]; 3] = [
+    ["-x wall", "+x wall"],
+    ["-y wall", "+y wall"],
+    ["floor", "ceiling"],
+];
+
+/// Names and corners of walls, floor and ceiling in the room frame, each counter-clockwise seen from inside.
+pub(super) fn walls(scene: &Scene) -> Vec<(&'static str, Vec<Point3<f64>>)> {
     let [x, y, z] = scene.room.size_m;
     let (low, high) = (
         Vector3::new(-0.5 * x, -0.5 * y, 0.0),
@@ -71,7 +78,7 @@ pub(super) fn walls(scene: &Scene) -> Vec<Vec<Point3<f64>>> {
             if !inwards {
                 corners.reverse();
             }
-            walls.push(corners);
+            walls.push((WALLS[axis][usize::from(!inwards)], corners));
         }
     }
     walls

@@ -3,20 +3,27 @@
 //! Every key carries its unit. Values that nobody published are defaults marked *assumed*. The checks that need more
 //! than one value are in [`crate::check`].
 
+mod body;
 mod detection;
 mod errors;
 mod room;
 mod scanner;
 mod superstructure;
 
+pub use body::{
+    MeshShape, MeshUnits, PlanePolygon, PlaneRectangle, PlaneShape, PostCylinder, PostShape, RoomBox,
+    RoomCylinder, RoomMirror, RoomSurface, SurfaceShape,
+};
 pub use detection::{Detection, Detector, EchoChoice, Principle};
 pub use errors::{Characterization, Correlated, ErrorModel, Errors, Interference, NoiseTable, WarmUp};
 pub use room::{Board, BoardPose, Color, Experiment, Mocap, MocapProfile, Room};
 pub use scanner::{BeamShape, Light, Limits, Mount, Preset, Scanner};
 pub use superstructure::{
-    AsBuilt, Facet, FacetShape, Marker, Mirror, PolygonShape, Post, RectangleShape, Superstructure, Wedge,
+    AsBuilt, Facet, FacetShape, Glass, Marker, Mirror, PolygonShape, Post, RectangleShape, Superstructure,
+    Wedge,
 };
 
+use crate::mesh::Meshes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -37,6 +44,7 @@ pub struct Scene {
     #[serde(default = "one")]
     pub seed: u64,
     /// The scanner.
+    #[serde(default = "ust_20lx")]
     pub scanner: Scanner,
     /// Terms of Eq. 1.
     #[serde(default)]
@@ -45,6 +53,7 @@ pub struct Scene {
     #[serde(default)]
     pub detection: Detection,
     /// Mirrors, posts and markers.
+    #[serde(default)]
     pub superstructure: Superstructure,
     /// Surface colors beside the built-in ones.
     #[serde(default)]
@@ -53,6 +62,7 @@ pub struct Scene {
     #[serde(default)]
     pub board: Vec<Board>,
     /// The room.
+    #[serde(default)]
     pub room: Room,
     /// Motion capture.
     #[serde(default)]
@@ -66,8 +76,62 @@ pub struct Scene {
     /// How well step 1 knows those errors.
     #[serde(default)]
     pub characterization: Characterization,
+    /// The meshes that the scene names, as whoever read it has read them too. No part of the file.
+    #[serde(skip)]
+    pub meshes: Meshes,
 }
 
 fn one() -> u64 {
     1
+}
+
+/// A UST-20LX as its data sheet and the other defaults have it.
+fn ust_20lx() -> Scanner {
+    Scanner {
+        preset: Preset::Ust20lx,
+        sub_rays: 19,
+        beam: None,
+        custom: None,
+        housing: true,
+        mount: Mount::default(),
+    }
+}
+
+impl Scene {
+    /// Whether it holds nothing but what stands in the room, so that rays can be traced and nothing be recorded.
+    pub fn has_no_laboratory(&self) -> bool {
+        let structure = &self.superstructure;
+        let nothing_around =
+            structure.facet.is_empty() && structure.post.is_empty() && structure.marker.is_empty();
+        nothing_around && self.board.is_empty() && !self.room.has_walls()
+    }
+
+    /// Every mesh that it names, with the key that does.
+    pub fn mesh_shapes(&self) -> Vec<(String, &MeshShape)> {
+        let posts = self.superstructure.post.iter().enumerate();
+        let posts = posts.filter_map(|(i, post)| match &post.shape {
+            Some(PostShape::Mesh(mesh)) => Some((format!("superstructure.post[{i}].shape.mesh.file"), mesh)),
+            _ => None,
+        });
+        let surfaces = self.room.surface.iter().enumerate();
+        let surfaces = surfaces.filter_map(|(i, surface)| match &surface.shape {
+            SurfaceShape::Mesh(mesh) => Some((format!("room.surface[{i}].shape.mesh.file"), mesh)),
+            _ => None,
+        });
+        posts.chain(surfaces).collect()
+    }
+
+    /// The same meshes, to give them other files.
+    pub fn mesh_shapes_mut(&mut self) -> impl Iterator<Item = &mut MeshShape> {
+        let posts = self.superstructure.post.iter_mut();
+        let posts = posts.filter_map(|post| match &mut post.shape {
+            Some(PostShape::Mesh(mesh)) => Some(mesh),
+            _ => None,
+        });
+        let surfaces = self.room.surface.iter_mut();
+        posts.chain(surfaces.filter_map(|surface| match &mut surface.shape {
+            SurfaceShape::Mesh(mesh) => Some(mesh),
+            _ => None,
+        }))
+    }
 }

@@ -1,6 +1,7 @@
 //! The room with its boards and colors, motion capture, and the procedure.
 
 use super::Marker;
+use super::body::{RoomMirror, RoomSurface};
 use super::errors::NoiseTable;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -41,22 +42,52 @@ fn white() -> String {
     "white".to_owned()
 }
 
-/// A box-shaped room; the room frame stands on the middle of the floor.
+/// A box-shaped room and what stands in it; the room frame stands on the middle of the floor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, default)]
 pub struct Room {
-    /// Extents along x, y and z, in metres.
+    /// Extents along x, y and z, in metres. Left out, as only `trace` allows, there are no walls.
+    #[serde(skip_serializing_if = "has_no_walls")]
     #[schemars(inner(range(min = 0.5, max = 100.0)))]
     pub size_m: [f64; 3],
     /// Color of walls, floor and ceiling.
-    #[serde(default = "white")]
     pub color: String,
     /// Origin of the rig in the room, in metres.
     pub rig_position_m: [f64; 3],
     /// Yaw of the rig in the room, in degrees.
-    #[serde(default)]
     #[schemars(range(min = -360.0, max = 360.0))]
     pub rig_yaw_deg: f64,
+    /// Mirrors that stand in the room by themselves.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub mirror: Vec<RoomMirror>,
+    /// Surfaces that stand in the room by themselves.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub surface: Vec<RoomSurface>,
+}
+
+/// A room of no size has no walls.
+fn has_no_walls(size_m: &[f64; 3]) -> bool {
+    *size_m == [0.0; 3]
+}
+
+impl Room {
+    /// Whether there are walls.
+    pub fn has_walls(&self) -> bool {
+        !has_no_walls(&self.size_m)
+    }
+}
+
+impl Default for Room {
+    fn default() -> Self {
+        Self {
+            size_m: [0.0; 3],
+            color: white(),
+            rig_position_m: [0.0; 3],
+            rig_yaw_deg: 0.0,
+            mirror: Vec::new(),
+            surface: Vec::new(),
+        }
+    }
 }
 
 /// How good motion capture is.

@@ -1,5 +1,6 @@
 //! What is built around the scanner: mirrors, posts, markers, and how far they are from the drawing.
 
+use super::body::PostShape;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -10,10 +11,11 @@ pub struct Superstructure {
     /// The mirrors.
     #[serde(default)]
     pub facet: Vec<Facet>,
-    /// Opaque boxes.
+    /// Opaque bodies.
     #[serde(default)]
     pub post: Vec<Post>,
     /// Markers of the rig body, in the rig frame.
+    #[serde(default)]
     pub marker: Vec<Marker>,
     /// The mirror material.
     #[serde(default)]
@@ -31,6 +33,27 @@ fn four() -> u32 {
     4
 }
 
+impl Default for Superstructure {
+    fn default() -> Self {
+        Self {
+            facet: Vec::new(),
+            post: Vec::new(),
+            marker: Vec::new(),
+            mirror: Mirror::default(),
+            as_built: AsBuilt::default(),
+            max_bounces: four(),
+        }
+    }
+}
+
+pub(super) fn is_false(value: &bool) -> bool {
+    !value
+}
+
+pub(super) fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
 /// A plane mirror.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -39,6 +62,9 @@ pub struct Facet {
     pub name: String,
     /// Its outline.
     pub shape: FacetShape,
+    /// Whether the back of its body, `mirror.thickness_mm` behind the face, reflects too.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub two_sided: bool,
 }
 
 /// Outline of a facet.
@@ -99,21 +125,33 @@ pub struct PolygonShape {
     pub corners_mm: Vec<[f64; 3]>,
 }
 
-/// An opaque box.
+/// An opaque body: a box with `size_mm`, or another `shape`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Post {
     /// Name.
     pub name: String,
-    /// Center, in millimetres.
+    /// Origin of its own frame, in millimetres; the center of a box or cylinder.
     pub center_mm: [f64; 3],
-    /// Extents along its own x, y and z, in millimetres.
-    #[schemars(inner(range(min = 0.01, max = 10000.0)))]
-    pub size_mm: [f64; 3],
+    /// Extents of a box along its own x, y and z, in millimetres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(inner(range(min = 0.01, max = 10000.0))))]
+    pub size_mm: Option<[f64; 3]>,
+    /// What it is instead of a box.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shape: Option<PostShape>,
     /// Turn about z, in degrees.
     #[serde(default)]
     #[schemars(range(min = -360.0, max = 360.0))]
     pub yaw_deg: f64,
+    /// Pitch, in degrees: yaw, pitch and roll follow one another about the body's own z, y and x.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    #[schemars(range(min = -360.0, max = 360.0))]
+    pub pitch_deg: f64,
+    /// Roll, in degrees.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    #[schemars(range(min = -360.0, max = 360.0))]
+    pub roll_deg: f64,
     /// Surface color.
     #[serde(default = "structure")]
     pub color: String,
@@ -143,6 +181,34 @@ pub struct Mirror {
     /// Thickness between the bare structure and the reflecting face, in millimetres.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub thickness_mm: f64,
+    /// Glass before the reflecting surface; without it, the mirrors are front-surface mirrors. The drawing then shows
+    /// the front of the glass.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub glass: Option<Glass>,
+    /// Share of the light that dust and scratches of a mirror scatter, as a Lambertian surface in its place would.
+    #[serde(skip_serializing_if = "is_zero")]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub diffuse_reflectivity: f64,
+}
+
+/// Glass before the reflecting surface of a mirror.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Glass {
+    /// Refractive index (float glass at 905 nm: 1.51).
+    #[serde(default = "float_glass")]
+    #[schemars(range(min = 1.0, max = 4.0))]
+    pub index: f64,
+    /// Thickness, in millimetres.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub thickness_mm: f64,
+    /// Whether the front of the glass reflects too: Fresnel's share, a second and weaker way of the light.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub ghost: bool,
+}
+
+fn float_glass() -> f64 {
+    1.51
 }
 
 impl Default for Mirror {
@@ -150,6 +216,8 @@ impl Default for Mirror {
         Self {
             reflectivity: 0.9,
             thickness_mm: 1.0,
+            glass: None,
+            diffuse_reflectivity: 0.0,
         }
     }
 }

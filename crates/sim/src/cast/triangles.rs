@@ -1,0 +1,267 @@
+//! A ray against a triangle mesh, without a gap between triangles that share an edge.
+//!
+//! Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", Journal of Computer Graphics Techniques 2(1), 2013:
+//! space is sheared so that the ray becomes the z axis, and three edge functions in the x–y plane decide. A vertex
+//! is sheared alike for every triangle that holds it, and an edge's function only changes its sign when the edge is
+//! walked the other way; so two triangles never both disown a ray at the edge between them. Unlike the paper, which
+//! computes in f32 and falls back to f64 where a function is zero, the sign of a function that rounding could have
+//! changed is found from the exact products (fused multiply-add).
+
+use super::{FARTHEST, padded, to_glam};
+use crate::footprint::Ray;
+use crate::mesh::Mesh;
+use catoptric_model::Pose;
+use nalgebra::{Point3, Unit, Vector3};
+use parry3d::bounding_volume::Aabb;
+use parry3d::partitioning::{Bvh, BvhBuildStrategy};
+
+/// A mesh in its place, with an index over its triangles.
+pub struct Triangles {
+    vertices: Vec<Point3<f64>>,
+    triangles: Vec<[u32; 3]>,
+    bvh: Bvh,
+}
+
+/// A ray as the triangle test wants it.
+struct Sheared<'a> {
+    ray: &'a Ray,
+    /// The axis along which the ray goes farthest, and the two others.
+    axes: [usize; 3],
+    shear: Vector3<f64>,
+}
+
+impl std::fmt::Debug for Triangles {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Triangles({})", self.triangles.len())
+    }
+}
+
+impl Triangles {
+    /// A mesh in metres after multiplication with `scale`, then placed.
+    pub fn new(mesh: &Mesh, scale: f64, frame_from_mesh: &Pose) -> Self {
+        let place = |p: &Point3<f64>| frame_from_mesh * Point3::from(p.coords * scale);
+        let vertices: Vec<Point3<f64>> = mesh.vertices().iter().map(place).collect();
+        let triangles = mesh.triangles().to_vec();
+        let boxes: Vec<Aabb> = triangles
+            .iter()
+            .map(|t| padded(t.iter().map(|&v| vertices[v as usize])))
+            .collect();
+        Self {
+            bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes),
+            vertices,
+            triangles,
+        }
+    }
+
+    fn corners(&self, triangle: usize) -> [Point3<f64>; 3] {
+        self.triangles[triangle].map(|v| self.vertices[v as usize])
+    }
+
+    /// The vertices, in metres.
+    pub(super) fn vertices(&self) -> &[Point3<f64>] {
+        &self.vertices
+    }
+
+    /// Distance and normal of the nearest triangle along a ray.
+    pub(super) fn cast(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
+        let sheared = Sheared::new(ray);
+        let parry_ray = parry3d::query::Ray::new(to_glam(&ray.origin.coords), to_glam(&ray.direction));
+        let (triangle, distance) = self.bvh.cast_ray(&parry_ray, FARTHEST, |leaf, _| {
+            sheared.meet(&self.corners(leaf as usize))
+        })?;
+        let [a, b, c] = self.corners(triangle as usize);
+        // A sliver without an area has no normal; any that looks back does.
+        let normal = Unit::try_new((b - a).cross(&(c - a)), f64::MIN_POSITIVE).unwrap_or(-ray.direction);
+        Some((distance, normal))
+    }
+}
+
+impl<'a> Sheared<'a> {
+    fn new(ray: &'a Ray) -> Self {
+        let d = ray.direction.into_inner();
+        let z = d.iamax();
+        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+        Self {
+            ray,
+            axes: [x, y, z],
+            shear: Vector3::new(d[x] / d[z], d[y] / d[z], 1.0 / d[z]),
+        }
+    }
+
+    /// Distance at which the ray meets a triangle, from either side; its edges and corners belong to it.
+    fn meet(&self, corners: &[Point3<f64>; 3]) -> Option<f64> {
+        let [kx, ky, kz] = self.axes;
+        let [a, b, c] = corners.map(|p| {
+            let p = p - self.ray.origin;
+            Vector3::new(
+                p[kx] - self.shear.x * p[kz],
+                p[ky] - self.shear.y * p[kz],
+                self.shear.z * p[kz],
+            )
+        });
+        let (u, v, w) = (edge(&c, &b), edge(&a, &c), edge(&b, &a));
+        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+            return None;
+        }
+        let sum = u + v + w;
+        if sum == 0.0 {
+            return None;
+        }
+        let distance = (u * a.z + v * b.z + w * c.z) / sum;
+        (distance > 0.0 && distance < FARTHEST).then_some(distance)
+    }
+}
+
+/// The edge function p×q, its sign exact.
+fn edge(p: &Vector3<f64>, q: &Vector3<f64>) -> f64 {
+    let (left, right) = (p.x * q.y, p.y * q.x);
+    let value = left - right;
+    // Both products are off by half a unit in their last place at most, and so is the difference.
+    if value.abs() > 2.0 * f64::EPSILON * (left.abs() + right.abs()) {
+        return value;
+    }
+    let (left_rest, right_rest) = (p.x.mul_add(q.y, -left), p.y.mul_add(q.x, -right));
+    value + (left_rest - right_rest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::{Draws, Purpose};
+    use rayon::prelude::*;
+    use std::collections::BTreeMap;
+
+    /// Rays shot at the mesh; CATOPTRIC_MESH_RAYS=10000000 for the number that the project promises.
+    const DEFAULT_RAYS: u64 = 1_000_000;
+
+    /// A closed mesh that can be seen whole from the origin: a divided octahedron, every vertex at a random distance.
+    fn random_star(seed: u64, divisions: u32) -> Mesh {
+        let mut vertices: Vec<Point3<f64>> = [
+            [1.0, 0.0, 0.0],
+            [-1.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.0, -1.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [0.0, 0.0, -1.0],
+        ]
+        .map(Point3::from)
+        .to_vec();
+        let mut triangles = Vec::new();
+        for (x, y, z) in (0..8).map(|i| (i & 1, 2 + (i >> 1 & 1), 4 + (i >> 2 & 1))) {
+            let turns = (x + y + z) % 2 == 0;
+            triangles.push(if turns { [x, y, z] } else { [x, z, y] });
+        }
+        for _ in 0..divisions {
+            let mut middles = BTreeMap::new();
+            let mut middle = |a: u32, b: u32| {
+                *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                    let m = vertices[a as usize].coords + vertices[b as usize].coords;
+                    vertices.push(Point3::from(m.normalize()));
+                    u32::try_from(vertices.len() - 1).expect("a small mesh")
+                })
+            };
+            triangles = triangles
+                .iter()
+                .flat_map(|&[a, b, c]| {
+                    let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+                    [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+                })
+                .collect();
+        }
+        let mut draws = Draws::new(seed, Purpose::Placement, 0);
+        for vertex in &mut vertices {
+            vertex.coords *= 0.5 + draws.uniform();
+        }
+        Mesh::new(vertices, triangles).expect("it is a mesh")
+    }
+
+    #[test]
+    fn a_closed_mesh_never_leaks() {
+        let rays: u64 = std::env::var("CATOPTRIC_MESH_RAYS")
+            .ok()
+            .map_or(DEFAULT_RAYS, |n| n.parse().expect("a number of rays"));
+        let mesh = random_star(17, 4);
+        let place = Pose::new(Vector3::new(0.3, -1.2, 0.7), Vector3::new(0.4, 0.1, -0.8));
+        let placed = Triangles::new(&mesh, 1.0, &place);
+        assert_eq!(placed.triangles.len(), 2048);
+        const BATCH: u64 = 10_000;
+        (0..rays.div_ceil(BATCH)).into_par_iter().for_each(|batch| {
+            let mut draws = Draws::new(3, Purpose::Placement, batch);
+            for shot in 0..BATCH {
+                // A point inside: the star holds a ball of a third of its least radius.
+                let inside = place * Point3::from(draws.normal3().normalize() * (0.1 * draws.uniform()));
+                // Truncation picks a triangle evenly.
+                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+                let number = (draws.uniform() * placed.triangles.len() as f64) as usize;
+                let [a, b, c] = placed.corners(number);
+                let target = match shot % 4 {
+                    0 => a,
+                    1 => a + (b - a) * draws.uniform(),
+                    2 => Point3::from((a.coords + b.coords) * 0.5),
+                    _ => a + (b - a) * draws.uniform() + (c - a) * draws.uniform(),
+                };
+                let outwards = Unit::new_normalize(target - inside);
+                // Outwards nothing gets out; the first thing met from inside is a back.
+                let ray = Ray {
+                    origin: inside,
+                    direction: outwards,
+                };
+                assert!(
+                    placed.cast(&ray).is_some(),
+                    "leaks from {inside} towards {target}"
+                );
+                // And inwards through the same point nothing reaches the middle without meeting it.
+                let outside = inside + outwards.into_inner() * 4.0;
+                let ray = Ray {
+                    origin: outside,
+                    direction: -outwards,
+                };
+                let (distance, _) = placed.cast(&ray).expect("it is in the way");
+                assert!(distance < 4.0, "lets {target} through from outside");
+            }
+        });
+    }
+
+    #[test]
+    fn a_ray_meets_a_triangle_where_its_plane_is() {
+        let mesh = random_star(5, 2);
+        let placed = Triangles::new(&mesh, 2.0, &Pose::identity());
+        let mut draws = Draws::new(9, Purpose::Placement, 0);
+        for _ in 0..10_000 {
+            let ray = Ray {
+                origin: Point3::origin(),
+                direction: Unit::new_normalize(draws.normal3()),
+            };
+            let (found, normal) = placed.cast(&ray).expect("it is closed");
+            // By solving a + s(b − a) + t(c − a) = d·u for every triangle.
+            let solved = (0..placed.triangles.len()).filter_map(|i| {
+                let [a, b, c] = placed.corners(i);
+                let columns = nalgebra::Matrix3::from_columns(&[b - a, c - a, -ray.direction.into_inner()]);
+                let [s, t, d]: [f64; 3] = columns.lu().solve(&-a.coords)?.into();
+                (s >= -1e-12 && t >= -1e-12 && s + t <= 1.0 + 1e-12 && d > 0.0).then_some(d)
+            });
+            let expected = solved.fold(f64::INFINITY, f64::min);
+            assert!((found - expected).abs() < 1e-12, "{found} against {expected}");
+            assert!(normal.dot(&ray.direction) > 0.0, "its fronts look outwards");
+        }
+    }
+
+    #[test]
+    fn damaged_meshes_are_refused() {
+        use crate::mesh::MeshError;
+        let corner = |x: f64| Point3::new(x, 0.0, 0.0);
+        assert_eq!(Mesh::new(vec![], vec![]), Err(MeshError::Empty));
+        let found = Mesh::new(vec![corner(0.0); 3], vec![[0, 1, 3]]);
+        assert!(matches!(found, Err(MeshError::NoVertex { vertex: 3, .. })));
+        let found = Mesh::new(vec![corner(f64::NAN); 3], vec![[0, 1, 2]]);
+        assert_eq!(found, Err(MeshError::NotFinite { vertex: 0 }));
+        // A sliver without an area is met by nothing, and nothing goes wrong.
+        let sliver = Mesh::new(vec![corner(0.0), corner(1.0), corner(2.0)], vec![[0, 1, 2]]).expect("finite");
+        let placed = Triangles::new(&sliver, 1.0, &Pose::identity());
+        let ray = Ray {
+            origin: Point3::new(0.5, 0.0, -1.0),
+            direction: Vector3::z_axis(),
+        };
+        assert!(placed.cast(&ray).is_none());
+    }
+}
