@@ -5,6 +5,7 @@
 //! 3. [`simulating`]: the scene file, what is modelled and how it is checked, truth, determinism
 //! 4. [`calibrating_and_scoring`]: the paper's steps, statuses, covariances, scores, verdicts, your own calibrator
 //! 5. [`files`]: every file and every key
+//! 6. [`physics_of_table_3`]: what of the paper's Table 3 pulse and threshold explain, and what they do not
 //!
 //! The chapters are Markdown files in `docs/guide/`; their Rust examples are run by the tests.
 
@@ -22,3 +23,6 @@ pub mod calibrating_and_scoring {}
 
 #[doc = include_str!("../docs/guide/5-files.md")]
 pub mod files {}
+
+#[doc = include_str!("../docs/guide/6-physics-of-table-3.md")]
+pub mod physics_of_table_3 {}

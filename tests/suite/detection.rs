@@ -687,7 +687,7 @@ fn the_truth_adds_up_to_every_reading() {
 /// What the guide chapter on Table 3 says, in millimetres: growth of the error from 0.9° to 18.5° and to 44.7°.
 #[test]
 fn the_guide_says_of_table_3_what_the_physics_says() {
-    let guide = include_str!("../../docs/guide/physics-of-table-3.md");
+    let guide = include_str!("../../docs/guide/6-physics-of-table-3.md");
     let mut missing = false;
     for (preset, spot) in [(Preset::Ust20lx, "manual"), (Preset::Ust20lxCooper, "Table 1")] {
         for detector in DETECTORS {

@@ -469,6 +469,7 @@ fn documented_keys_are_the_keys_of_the_files() {
         "dataset",
         "--json",
         "--returns",
+        "--readings",
     ];
     let output = run(
         folder.path(),
@@ -488,7 +489,13 @@ fn documented_keys_are_the_keys_of_the_files() {
         );
     }
     let figures = keys(&json(serde_json::from_str(&stdout(&output))), &[]);
-    let section = text.split("## simulate --json").nth(1).unwrap();
+    let section = text
+        .split("## simulate --json")
+        .nth(1)
+        .unwrap()
+        .split("\n## ")
+        .next()
+        .unwrap();
     let documented: BTreeSet<String> = code_words(section).into_iter().collect();
     assert_eq!(
         documented, figures,
