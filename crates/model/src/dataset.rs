@@ -183,27 +183,29 @@ impl PoseRecord {
 
     /// Mean and spread of every beam.
     pub fn summarize(&self) -> Vec<Summary> {
-        (0..self.beams)
-            .map(|beam| {
-                // Welford's recurrence: the naive sum of squares loses the noise under the range.
-                let mut s = Summary::default();
-                let mut sum_squares = 0.0;
-                for r in self.readings(beam) {
-                    if r.is_finite() {
-                        s.count += 1;
-                        let step = r - s.mean;
-                        s.mean += step / s.count as f64;
-                        sum_squares += step * (r - s.mean);
-                    } else {
-                        s.missing += 1;
-                    }
+        // Scan after scan, as the readings lie in memory. Welford's recurrence, in which `sd` holds the sum of squares
+        // until the end: the naive sum loses the noise under the range.
+        let mut summaries = vec![Summary::default(); self.beams];
+        for scan in self.ranges.chunks(self.beams.max(1)) {
+            for (s, r) in summaries.iter_mut().zip(scan) {
+                if r.is_finite() {
+                    s.count += 1;
+                    let step = r - s.mean;
+                    s.mean += step / s.count as f64;
+                    s.sd += step * (r - s.mean);
+                } else {
+                    s.missing += 1;
                 }
-                if s.count > 1 {
-                    s.sd = (sum_squares / (s.count - 1) as f64).sqrt();
-                }
-                s
-            })
-            .collect()
+            }
+        }
+        for s in &mut summaries {
+            s.sd = if s.count > 1 {
+                (s.sd / (s.count - 1) as f64).sqrt()
+            } else {
+                0.0
+            };
+        }
+        summaries
     }
 }
 
