@@ -92,11 +92,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     io::write_file(&report_path, html.as_bytes())?;
 
     let score = &results[0].1;
-    let verdict = match score.verdict {
-        Verdict::Pass => "pass",
-        Verdict::Fail => "fail",
-        Verdict::Blind => "blind",
-    };
+    let verdict = score.verdict.word();
     let [by_beam, by_recursion] = [&lines[0], &lines[1]];
     print(&format!(
         "simulated   scene {:?}, seed {}: {}, {}, {}, {} readings\n\

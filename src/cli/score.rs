@@ -64,11 +64,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
 
 /// A score in a few lines.
 fn words(score: &Score) -> String {
-    let verdict = match score.verdict {
-        Verdict::Pass => "pass",
-        Verdict::Fail => "fail",
-        Verdict::Blind => "blind",
-    };
+    let verdict = score.verdict.word();
     let mut text = format!("{verdict}: method {}\n", score.method);
     let mut line = |name: &str, value: String| text.push_str(&format!("  {name:<22}{value}\n"));
     let beams = &score.beams;

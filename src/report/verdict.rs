@@ -28,11 +28,8 @@ pub(super) fn verdicts(results: &[(Calibration, Score)]) -> String {
                 &format!("<p>Method “{method}” ends at the same answer (largest difference {size}°).</p>\n");
             continue;
         }
-        let (class, badge) = match score.verdict {
-            Verdict::Pass => ("pass", "PASS"),
-            Verdict::Fail => ("fail", "FAIL"),
-            Verdict::Blind => ("blind", "BLIND"),
-        };
+        let class = score.verdict.word();
+        let badge = class.to_uppercase();
         html += &format!(
             "<section class=\"verdict {class}\">\n<h3><span class=\"badge\">{badge}</span> – method “{method}”</h3>\n{said}</section>\n"
         );

@@ -17,6 +17,17 @@ pub enum Verdict {
     Blind,
 }
 
+impl Verdict {
+    /// The word files and pages use.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Pass => "pass",
+            Self::Fail => "fail",
+            Self::Blind => "blind",
+        }
+    }
+}
+
 /// What became of the elements. Without a truth, solved and abstained count what the calibration says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct BeamCounts {

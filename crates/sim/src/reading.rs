@@ -28,8 +28,6 @@ pub struct Sensor {
     limits: Limits,
     detection: Detection,
     receiver: Receiver,
-    pulse_sd: f64,
-    threshold: f64,
     reference_walk: f64,
     bias: RangeBias,
     errors: Errors,
@@ -148,8 +146,6 @@ impl Sensor {
             limits: scene.scanner.limits(),
             detection: scene.detection.clone(),
             receiver,
-            pulse_sd,
-            threshold,
             reference_walk: receiver.lead(reference),
             bias: if biased {
                 RangeBias {
@@ -244,7 +240,7 @@ impl Sensor {
         let (part, mixed, detection) = match parts.as_slice() {
             [] => return None,
             [only] if !physical => {
-                let edge = detect::leading_edge(&only.pulses, self.pulse_sd, self.threshold);
+                let edge = detect::leading_edge(&only.pulses, self.receiver.sd, self.receiver.threshold);
                 edge.map(|_| (only, 0.0, 0.0))?
             }
             _ => self.detect(&parts, physical)?,
@@ -426,9 +422,9 @@ impl Sensor {
     /// own range and only the mixture shifts it.
     fn detect<'a>(&self, parts: &'a [Part], physical: bool) -> Option<(&'a Part, f64, f64)> {
         let all: Vec<Pulse> = parts.iter().flat_map(|p| p.pulses.iter().copied()).collect();
-        let edge = detect::leading_edge(&all, self.pulse_sd, self.threshold)?;
-        let first = edge.compensated(self.pulse_sd, self.threshold);
-        let pulse_length = detect::pulse_length(self.pulse_sd);
+        let edge = detect::leading_edge(&all, self.receiver.sd, self.receiver.threshold)?;
+        let first = edge.compensated(self.receiver.sd, self.receiver.threshold);
+        let pulse_length = detect::pulse_length(self.receiver.sd);
         let in_echo = |p: &&Part| p.power > 0.0 && p.mean_range <= first + pulse_length;
         let part = parts
             .iter()
@@ -439,11 +435,11 @@ impl Sensor {
             if physical {
                 edge.crossing + self.reference_walk
             } else {
-                edge.compensated(self.pulse_sd, self.threshold)
+                edge.compensated(self.receiver.sd, self.receiver.threshold)
             }
         };
         // A surface too dim to be seen without the others stands for its own range.
-        let alone = detect::leading_edge(&part.pulses, self.pulse_sd, self.threshold)
+        let alone = detect::leading_edge(&part.pulses, self.receiver.sd, self.receiver.threshold)
             .map_or(geometric, |edge| read(&edge));
         let detection = if physical { alone - geometric } else { 0.0 };
         Some((part, read(&edge) - alone, detection))

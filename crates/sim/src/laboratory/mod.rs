@@ -279,10 +279,8 @@ impl Laboratory {
     /// The whole experiment in memory.
     ///
     /// # Errors
-    /// As [`Laboratory::stretch`].
-    ///
-    /// # Panics
-    /// If motion capture never saw the rig during a stretch, which only a dropout of nearly 1 brings about.
+    /// As [`Laboratory::stretch`], and [`SimError::Markers`] if motion capture never saw the rig during a stretch, which
+    /// only a dropout of nearly 1 brings about.
     pub fn dataset(&self) -> Result<Dataset, SimError> {
         let poses = (0..self.stretches())
             .into_par_iter()

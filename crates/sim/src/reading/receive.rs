@@ -30,14 +30,14 @@ impl Sensor {
     /// Least height at which an echo has a chance of being detected, in watts.
     fn faintest(&self) -> f64 {
         let share = 1.0 - FAINTEST * self.detection.noise_over_threshold;
-        (self.threshold * share).max(f64::MIN_POSITIVE)
+        (self.receiver.threshold * share).max(f64::MIN_POSITIVE)
     }
 
     /// Chance that an echo of a height is detected: Φ((A − V)/σ).
     fn probability(&self, height: f64) -> f64 {
-        let noise = self.detection.noise_over_threshold * self.threshold;
+        let noise = self.detection.noise_over_threshold * self.receiver.threshold;
         if noise > 0.0 {
-            0.5 * libm::erfc((self.threshold - height) / (noise * std::f64::consts::SQRT_2))
+            0.5 * libm::erfc((self.receiver.threshold - height) / (noise * std::f64::consts::SQRT_2))
         } else {
             1.0
         }
