@@ -26,6 +26,7 @@ pub mod guide;
 pub mod io;
 pub mod report;
 pub mod score;
+pub mod tables;
 pub mod validate;
 
 pub use apply::{CloudFrame, PointCloud, apply};

@@ -2,6 +2,7 @@
 
 use super::Context;
 use super::error::CliError;
+use super::files::read_characterization;
 use super::interrupt;
 use super::output::{counted, print, quoted};
 use catoptric::calib::{self, JacobianForm, Method, Options};
@@ -22,6 +23,9 @@ pub(crate) struct Arguments {
     /// The calibration to write.
     #[arg(long, value_name = "calibration.json")]
     out: PathBuf,
+    /// What step 1 found out about the sensor, instead of what the session believes; as `characterize` writes it.
+    #[arg(long, value_name = "characterization.json")]
+    characterization: Option<PathBuf>,
     /// How derivatives are formed; both end at the same answer.
     #[arg(long, value_enum, default_value_t = JacobianName::Analytic)]
     jacobian: JacobianName,
@@ -44,8 +48,12 @@ enum JacobianName {
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let dataset = io::read_dataset(&arguments.dataset)?;
+    let mut dataset = io::read_dataset(&arguments.dataset)?;
     interrupt::check()?;
+    if let Some(path) = &arguments.characterization {
+        let found = read_characterization(path)?;
+        dataset.session.believed = dataset.session.believed.after(&found);
+    }
     let method = match arguments.method {
         MethodName::Beam => Method::Beam,
         MethodName::Recursive => Method::Recursive,

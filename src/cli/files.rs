@@ -2,7 +2,7 @@
 
 use super::error::CliError;
 use catoptric::io::{self, IoError, dataset};
-use catoptric::model::{Calibration, calibration};
+use catoptric::model::{Calibration, Characterization, calibration, characterization};
 use catoptric::sim::{Truth, truth};
 use std::path::Path;
 
@@ -21,6 +21,13 @@ pub(crate) fn read_truth(folder: &Path) -> Result<Option<Truth>, CliError> {
 pub(crate) fn read_calibration(path: &Path) -> Result<Calibration, CliError> {
     let found: Calibration = io::read_json(path)?;
     require_version(path, found.schema_version, calibration::SCHEMA_VERSION)?;
+    Ok(found)
+}
+
+/// A characterization of the bare sensor.
+pub(crate) fn read_characterization(path: &Path) -> Result<Characterization, CliError> {
+    let found: Characterization = io::read_json(path)?;
+    require_version(path, found.schema_version, characterization::SCHEMA_VERSION)?;
     Ok(found)
 }
 

@@ -2,6 +2,7 @@
 
 mod apply;
 mod calibrate;
+mod characterize;
 mod check;
 mod completions;
 mod demo;
@@ -64,6 +65,8 @@ enum Verb {
     Simulate(simulate::Arguments),
     /// Follow any rays through a scene's mirrors
     Trace(trace::Arguments),
+    /// Find out what the bare sensor's ranges are off by: Tables 1 to 4, Eqs. 3 to 5
+    Characterize(characterize::Arguments),
     /// Estimate where every mirrored beam goes
     Calibrate(calibrate::Arguments),
     /// Say whether a calibration is well formed and physically sane
@@ -134,6 +137,7 @@ fn run(cli: Cli) -> Result<(), CliError> {
         Verb::Demo(arguments) => demo::run(&arguments, &context),
         Verb::Simulate(arguments) => simulate::run(&arguments, &context),
         Verb::Trace(arguments) => trace::run(&arguments, &context),
+        Verb::Characterize(arguments) => characterize::run(&arguments, &context),
         Verb::Calibrate(arguments) => calibrate::run(&arguments, &context),
         Verb::Validate(arguments) => validate::run(&arguments),
         Verb::Score(arguments) => score::run(&arguments, &context),

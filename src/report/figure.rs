@@ -73,6 +73,17 @@ pub(super) struct Dot {
     pub(super) color: RGBColor,
 }
 
+/// A measured value with its uncertainty.
+pub(super) struct Mark {
+    pub(super) x: f64,
+    pub(super) y: f64,
+    /// Half the length of its bar; 0 for none.
+    pub(super) half_bar: f64,
+    pub(super) color: RGBColor,
+    /// Drawn as a ring: it is somebody else's.
+    pub(super) hollow: bool,
+}
+
 /// A stretch of a strip: from one azimuth to another, in one row.
 pub(super) struct Bar {
     pub(super) x: Range<f64>,
@@ -110,6 +121,28 @@ pub(super) fn scatter(
         draw_strokes(&mut chart, strokes)?;
         let dots = points.iter().map(|&(x, y, c)| Circle::new((x, y), 1, c.filled()));
         chart.draw_series(dots)?;
+        Ok(())
+    })
+}
+
+/// Marks over a quantity, and the laws through them.
+pub(super) fn laws(size: (u32, u32), axes: &Axes, title: &str, marks: &[Mark], strokes: &[Stroke]) -> String {
+    draw(size, title, |area| {
+        let mut chart = frame(area, axes, true)?;
+        draw_strokes(&mut chart, strokes)?;
+        let bars = marks.iter().filter(|m| m.half_bar > 0.0).map(|m| {
+            let ends = vec![(m.x, m.y - m.half_bar), (m.x, m.y + m.half_bar)];
+            PathElement::new(ends, m.color.mix(0.7).stroke_width(1))
+        });
+        chart.draw_series(bars)?;
+        let (filled, rings): (Vec<&Mark>, Vec<&Mark>) = marks.iter().partition(|m| !m.hollow);
+        chart.draw_series(
+            filled
+                .iter()
+                .map(|m| Circle::new((m.x, m.y), 3, m.color.filled())),
+        )?;
+        let ring = |m: &&Mark| Circle::new((m.x, m.y), 6, m.color.stroke_width(2));
+        chart.draw_series(rings.iter().map(ring))?;
         Ok(())
     })
 }

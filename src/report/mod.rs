@@ -1,14 +1,18 @@
-//! `report.html`: one self-contained page about an experiment, its calibrations and their scores.
+//! Self-contained pages: `report.html` about an experiment, its calibrations and their scores, and the page beside
+//! `characterization.json`.
 //!
 //! No scripts, nothing fetched, no clock: the same input gives the same bytes. Every plot carries its numbers in a
 //! table.
 
+mod characterization;
 mod figure;
 mod page;
 mod plots;
 mod scores;
 mod verdict;
 mod words;
+
+pub use characterization::characterization;
 
 use crate::apply::PointCloud;
 use crate::score::Score;

@@ -46,6 +46,7 @@ pub(super) fn record(
             color: board.map(|_| "white".to_owned()),
             facet: facet.map(str::to_owned),
             beams: None,
+            test: None,
         },
         room_from_rig,
         room_from_board: board,

@@ -94,7 +94,9 @@ fn equation_4_is_the_line_through_table_3() {
 fn the_cooper_preset_is_table_1_read_as_three_beams() {
     let shape = Preset::Ust20lxCooper.beam_shape();
     let step_mrad = 1e3 * beam::STEP;
-    let (width, _) = line(&TABLE_1.map(|(r, _, w)| (r, w)));
+    let but_2_m = TABLE_1.iter().filter(|(r, ..)| *r != 2.0);
+    let (products, squares) = but_2_m.fold((0.0, 0.0), |(p, s), (r, _, w)| (p + r * w, s + r * r));
+    let width = products / squares;
     let (height, height_at_0) = line(&TABLE_1.map(|(r, h, _)| (r, h)));
     assert!(
         (shape.wide_full_mrad + 2.0 * step_mrad - width).abs() < 0.1,
@@ -107,6 +109,22 @@ fn the_cooper_preset_is_table_1_read_as_three_beams() {
     assert!(
         (shape.narrow_aperture_mm - height_at_0).abs() < 0.02,
         "from {height_at_0} mm"
+    );
+}
+
+#[test]
+fn no_straight_beam_has_all_of_table_1() {
+    // Within 5 % or 1 mm of every width: at 1, 2 and 3 m that asks for a beam whose width bends.
+    let allowed = |index: usize| {
+        let (_, _, width) = TABLE_1[index];
+        let slack = f64::max(1.0, 0.05 * width);
+        (width - slack, width + slack)
+    };
+    let (at_1, at_2, at_3) = (allowed(1), allowed(2), allowed(3));
+    // Halfway between them a straight edge has the mean of both; even the least allowed is too much.
+    assert!(
+        0.5 * (at_1.0 + at_3.0) > at_2.1 + 4.0,
+        "{at_1:?} {at_2:?} {at_3:?}"
     );
 }
 

@@ -82,7 +82,7 @@ pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result
     })
 }
 
-fn check_session(session: &Session) -> Result<(), CalibError> {
+pub(crate) fn check_session(session: &Session) -> Result<(), CalibError> {
     let believed = &session.believed;
     let positive = [
         ("scanner.beams", session.scanner.beams as f64),

@@ -26,6 +26,12 @@ pub enum CalibError {
         /// How many corners it has.
         corners: usize,
     },
+    /// Boards that tell nothing of the bare sensor.
+    #[error("the sensor cannot be characterized: {what}")]
+    Characterization {
+        /// What is missing.
+        what: String,
+    },
     /// A name that is no method's.
     #[error("no method is called {name:?}; there are beam and recursive")]
     UnknownMethod {

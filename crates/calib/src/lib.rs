@@ -14,6 +14,7 @@
 
 mod ahead;
 mod calibrate;
+mod characterize;
 mod choose;
 pub mod common;
 pub mod covariance;
@@ -33,6 +34,7 @@ pub mod solve;
 pub mod spread;
 
 pub use calibrate::calibrate;
+pub use characterize::characterize;
 pub use covariance::{Budget, MountUncertainty};
 pub use element::LEAST_BOARDS;
 pub use error::CalibError;

@@ -9,7 +9,9 @@ use crate::covariance::MountUncertainty;
 use crate::mount_data::{DirectBoard, Selection, Selector};
 use catoptric_model::session::MountTolerance;
 use catoptric_model::{Dataset, Pose, PoseData, Summary, calibration::MountEstimate};
-use nalgebra::{Dyn, Matrix6, OMatrix, SymmetricEigen, Translation3, U6, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{
+    DMatrix, Dyn, Matrix6, OMatrix, SymmetricEigen, Translation3, U6, UnitQuaternion, Vector3, Vector6,
+};
 
 /// A step shorter than this (metres and radians alike) ends the iteration: some roundings of a pose.
 const STEP_TOLERANCE: f64 = 1e-14;
@@ -131,7 +133,8 @@ pub fn motion_between(from: &Pose, to: &Pose) -> Vector6<f64> {
     Vector6::new(t.x, t.y, t.z, w.x, w.y, w.z)
 }
 
-fn same_beams(a: &[DirectBoard], b: &[DirectBoard]) -> bool {
+/// Whether two selections hold the same beams of the same poses.
+pub(crate) fn same_beams(a: &[DirectBoard], b: &[DirectBoard]) -> bool {
     let beams = |s: &[DirectBoard]| -> Vec<(usize, usize)> {
         s.iter()
             .flat_map(|board| board.rays.iter().map(|r| (board.pose, r.beam)))
@@ -172,38 +175,21 @@ fn normal_equations(
         let Some(block) = selector.linearize(board, rig_from_sensor) else {
             continue;
         };
-        // Σ = D + UUᵀ with U the board's own errors; Σ⁻¹ = D⁻¹ − D⁻¹U(I + UᵀD⁻¹U)⁻¹UᵀD⁻¹.
-        let weighted = |m: &nalgebra::DMatrix<f64>| {
-            let mut m = m.clone();
-            for (mut row, variance) in m.row_iter_mut().zip(block.variance.iter()) {
-                row /= *variance;
-            }
-            m
-        };
-        let (u, mut right_side) = (&block.board_errors, block.right_side.clone());
-        let weighted_u = weighted(u);
-        let inner = nalgebra::Matrix4::identity() + fixed(&(u.transpose() * &weighted_u));
-        let plain = weighted(&right_side);
-        if let Some(inverse) = inner.try_inverse() {
-            let correction = dynamic(&inverse) * (weighted_u.transpose() * &right_side);
-            right_side = plain - weighted_u * correction;
-        } else {
-            right_side = plain;
+        let mut right_side = DMatrix::zeros(block.sightings.len(), 7 + width);
+        right_side.columns_mut(0, 6).copy_from(&block.jacobian);
+        for (row, seen) in block.sightings.iter().enumerate() {
+            right_side[(row, 6)] = selector.corrected(seen, &block.color).0 - seen.distance;
+            let common = selector
+                .common
+                .row(seen.distance, seen.cos_incidence, &block.color);
+            right_side.view_mut((row, 7), (1, width)).copy_from(&common);
         }
-        let products = block.jacobian.transpose() * right_side;
+        let products = block.jacobian.transpose() * block.weighted(&right_side);
         sums.information += products.fixed_view::<6, 6>(0, 0);
         sums.right += products.column(6);
         sums.common += products.columns(7, width);
     }
     sums
-}
-
-fn fixed(m: &nalgebra::DMatrix<f64>) -> nalgebra::Matrix4<f64> {
-    m.fixed_view::<4, 4>(0, 0).into_owned()
-}
-
-fn dynamic(m: &nalgebra::Matrix4<f64>) -> nalgebra::DMatrix<f64> {
-    nalgebra::DMatrix::from_column_slice(4, 4, m.as_slice())
 }
 
 impl Prior {

@@ -16,10 +16,51 @@ pub enum PoseKind {
     Bare,
     /// Step 4: the known room, no board in it.
     Room,
-    /// Step 5: a board before beams that no mirror deflects.
+    /// Steps 1 and 5: a board before beams that no mirror deflects.
     Direct,
     /// Steps 7–10: a board in the fan of a facet.
     Facet,
+}
+
+/// What is tested of the bare sensor (step 1).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TestKind {
+    /// Size of the spot over the distance: Figures 2 and 3, Table 1.
+    Spot,
+    /// Mean error and spread over the distance: Table 2.
+    Distance,
+    /// Error over the incidence: Figure 4, Table 3.
+    Angle,
+    /// Error and spread over color and distance: Table 4.
+    Color,
+}
+
+/// What was tested during a stretch.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TestNote {
+    /// What it was for.
+    pub kind: TestKind,
+    /// Number of the setting: stretches of one setting are trials of the same.
+    pub setting: usize,
+    /// Number of the trial, from 1.
+    pub trial: usize,
+    /// The spot as it was seen on the board.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spot: Option<SpotNote>,
+}
+
+/// A spot on a board as seen through an infrared camera.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpotNote {
+    /// Neighbouring beams that make it.
+    pub beams: usize,
+    /// Extent along the scan, in millimetres.
+    pub width_mm: f64,
+    /// Extent across the scan, in millimetres.
+    pub height_mm: f64,
 }
 
 /// What the experimenter noted about a stretch of scans: one message of `/session/pose`.
@@ -44,6 +85,9 @@ pub struct PoseLabel {
     /// First and last beam that the board was set up for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beams: Option<[usize; 2]>,
+    /// What was tested of the bare sensor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub test: Option<TestNote>,
 }
 
 /// Name of the rig as a motion-capture subject.
@@ -280,6 +324,7 @@ mod tests {
                 color: None,
                 facet: None,
                 beams: None,
+                test: None,
             },
             room_from_rig: Pose::identity(),
             room_from_board: None,

@@ -31,6 +31,7 @@ pub mod beam;
 pub mod bias;
 pub mod board;
 pub mod calibration;
+pub mod characterization;
 pub mod cloud;
 pub mod dataset;
 pub mod error;
@@ -43,7 +44,11 @@ pub use beam::Deflection;
 pub use bias::{AngleBias, AngleTable, BiasTerms, ColorBias, DistanceBias, RangeBias};
 pub use board::{BoardPlane, Rectangle};
 pub use calibration::{BeamEstimate, Calibration, Status};
-pub use dataset::{Dataset, PoseKind, PoseLabel, PoseRecord, Stretch, Summary, Track, TrackedFrame};
+pub use characterization::Characterization;
+pub use dataset::{
+    Dataset, PoseKind, PoseLabel, PoseRecord, SpotNote, Stretch, Summary, TestKind, TestNote, Track,
+    TrackedFrame,
+};
 pub use error::ModelError;
 pub use frame::{Pose, PoseData};
 pub use mirror::MirrorPlane;

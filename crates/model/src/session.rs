@@ -3,8 +3,9 @@
 //! This is `session.toml`. It holds the nominal design, not the structure as built; the noise and bias the
 //! experimenter believes in, not the ones the sensor has. The truth is never here.
 
-use crate::bias::RangeBias;
+use crate::bias::{DistanceBias, RangeBias};
 use crate::board::{BoardPlane, Rectangle};
+use crate::characterization::Characterization;
 use crate::frame::PoseData;
 use nalgebra::{Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
@@ -102,6 +103,45 @@ pub struct Beliefs {
     pub angle_gain_sd_mm: f64,
     /// Uncertainty of E_c, in millimetres.
     pub color_bias_sd_mm: f64,
+}
+
+impl Beliefs {
+    /// What is believed once the bare sensor has been characterized.
+    ///
+    /// The bias is the characterization's; each of its uncertainties is the root mean square over the numbers that have
+    /// it. Noise is that of the color the distance was tested in. What was not observed keeps what was believed before.
+    #[must_use]
+    pub fn after(&self, found: &Characterization) -> Self {
+        let mut believed = Self {
+            bias: found.bias.clone(),
+            ..self.clone()
+        };
+        if found.parameter("A_a", None).is_some() {
+            believed.angle_gain_sd_mm = found.typical_sd("A_a");
+        } else {
+            believed.bias.angle = self.bias.angle.clone();
+        }
+        if found.parameters.iter().any(|p| p.symbol == "E_r") {
+            believed.distance_bias_sd_mm = found.typical_sd("E_r");
+        } else {
+            // B_a holds the constant: a table of one node carries how well that is known.
+            believed.bias.distance = DistanceBias {
+                range_m: vec![1.0],
+                error_mm: vec![0.0],
+            };
+            believed.distance_bias_sd_mm = found.typical_sd("B_a");
+        }
+        if found.parameters.iter().any(|p| p.symbol == "B_c") {
+            believed.color_bias_sd_mm = found.typical_sd("B_c");
+        }
+        let reference = |color: &str| !found.bias.color.contains_key(color);
+        let of_reference = found.noise.iter().filter(|n| reference(&n.color));
+        let (sum, count) = of_reference.fold((0.0, 0.0), |(sum, count), n| (sum + n.sd_mm, count + 1.0));
+        if count > 0.0 {
+            believed.range_noise_sd_mm = sum / count;
+        }
+        believed
+    }
 }
 
 /// Step 3: ranges to the structure before the mirrors were glued on.

@@ -19,11 +19,11 @@ pub enum SimError {
         /// The names there are.
         known: String,
     },
-    /// Something that a pose refers to and that the scene does not hold.
-    #[error("pose {pose} refers to {what}, which the scene does not hold")]
+    /// Something that a pose or a test refers to and that the scene does not hold.
+    #[error("{by} refers to {what}, which the scene does not hold")]
     UnknownName {
-        /// The pose.
-        pose: usize,
+        /// What refers to it.
+        by: String,
         /// What it refers to.
         what: String,
     },

@@ -20,6 +20,7 @@ pub mod power;
 pub mod reading;
 pub mod scanner;
 pub mod scene;
+pub mod spot;
 pub mod stage;
 pub mod structure;
 pub mod trace;

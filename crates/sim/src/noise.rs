@@ -40,6 +40,8 @@ pub enum Purpose {
     Correlated = 11,
     /// Steps by interference; row = scan, column = beam.
     Interference = 12,
+    /// How a person misreads the edges of a spot; row = pose.
+    SpotReading = 13,
 }
 
 /// The draws of one row.

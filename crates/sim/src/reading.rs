@@ -170,6 +170,16 @@ impl Sensor {
         self.sub_rays.len()
     }
 
+    /// Shape of a beam.
+    pub fn shape(&self) -> &BeamShape {
+        &self.shape
+    }
+
+    /// The sub-rays of a beam themselves.
+    pub fn bundle(&self) -> &[SubRay] {
+        &self.sub_rays
+    }
+
     fn paths<'a>(
         &'a self,
         setting: &'a Setting<'_>,

@@ -151,6 +151,7 @@ fn stretch(session: &Session, pose: usize, scans: usize, frames: usize, seed: u6
             color: Some("white".to_owned()),
             facet: Some("port".to_owned()),
             beams: Some([1, 3]),
+            test: None,
         },
         start_s,
         scan_period_s: 0.025,

@@ -13,7 +13,7 @@ use crate::observations::BoardView;
 use catoptric_model::{Deflection, Session, range};
 use nalgebra::{DMatrix, DVector, Dyn, Matrix2, Matrix6, OMatrix, U2, U6};
 
-pub(crate) use plane::plane_fit;
+pub(crate) use plane::PlaneFit;
 use plane::plane_variance;
 
 /// How well the mounting of the sensor is known: small motions of the sensor about its own axes, three shifts in

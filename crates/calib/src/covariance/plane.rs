@@ -10,40 +10,67 @@ pub(super) fn plane_variance(
     board: &BoardView,
     marker_sd: f64,
 ) -> f64 {
-    let (a, cofactor) = plane_fit(markers, at, &board.plane.normal);
-    marker_sd * marker_sd * (a.transpose() * cofactor * a)[0]
+    let fit = PlaneFit::new(markers, &board.plane.normal);
+    let a = fit.coordinates(at);
+    marker_sd * marker_sd * (a.transpose() * fit.cofactor * a)[0]
 }
 
-/// What the error of a plane through markers at a point depends on: a and (Σ a_i a_iᵀ)⁻¹, both about the centroid.
-///
-/// Fewer than three markers, or markers on a line, leave the plane's tilt to chance; then only their mean offset is
-/// counted, since no honest number can be given for the rest.
-pub(crate) fn plane_fit(
-    markers: &[Point3<f64>],
-    at: &Point3<f64>,
-    normal: &Unit<Vector3<f64>>,
-) -> (Vector3<f64>, Matrix3<f64>) {
-    let count = markers.len().max(1) as f64;
-    let centroid = markers.iter().map(|m| m.coords).sum::<Vector3<f64>>() / count;
-    let across = Vector3::x() - normal.into_inner() * normal.x;
-    let other = Vector3::y() - normal.into_inner() * normal.y;
-    // Whichever axis is farther from the normal gives a first direction in the plane.
-    let first = if across.norm() > other.norm() {
-        across
-    } else {
-        other
+/// A plane fitted through markers, in coordinates about their centroid.
+pub(crate) struct PlaneFit {
+    centroid: Vector3<f64>,
+    axes: [Vector3<f64>; 2],
+    /// (Σ a_i a_iᵀ)⁻¹.
+    cofactor: Matrix3<f64>,
+}
+
+impl PlaneFit {
+    /// The fit through some markers.
+    ///
+    /// Fewer than three markers, or markers on a line, leave the plane's tilt to chance; then only their mean offset is
+    /// counted, since no honest number can be given for the rest.
+    pub(crate) fn new(markers: &[Point3<f64>], normal: &Unit<Vector3<f64>>) -> Self {
+        let count = markers.len().max(1) as f64;
+        let centroid = markers.iter().map(|m| m.coords).sum::<Vector3<f64>>() / count;
+        let across = Vector3::x() - normal.into_inner() * normal.x;
+        let other = Vector3::y() - normal.into_inner() * normal.y;
+        // Whichever axis is farther from the normal gives a first direction in the plane.
+        let first = if across.norm() > other.norm() {
+            across
+        } else {
+            other
+        }
+        .normalize();
+        let offset_only = Matrix3::from_diagonal(&Vector3::new(1.0 / count, 0.0, 0.0));
+        let mut fit = Self {
+            centroid,
+            axes: [first, normal.cross(&first)],
+            cofactor: offset_only,
+        };
+        let information: Matrix3<f64> = markers
+            .iter()
+            .map(|m| fit.coordinates(m))
+            .map(|a| a * a.transpose())
+            .sum();
+        let spread = information[(1, 1)] + information[(2, 2)];
+        let determined = information.view((1, 1), (2, 2)).determinant() > 1e-6 * spread * spread;
+        fit.cofactor = information
+            .try_inverse()
+            .filter(|_| determined)
+            .unwrap_or(offset_only);
+        fit
     }
-    .normalize();
-    let second = normal.cross(&first);
-    let coordinates = |p: Vector3<f64>| Vector3::new(1.0, first.dot(&p), second.dot(&p));
-    let information: Matrix3<f64> = markers
-        .iter()
-        .map(|m| coordinates(m.coords - centroid))
-        .map(|a| a * a.transpose())
-        .sum();
-    let spread = information[(1, 1)] + information[(2, 2)];
-    let determined = information.view((1, 1), (2, 2)).determinant() > 1e-6 * spread * spread;
-    let cofactor = information.try_inverse().filter(|_| determined);
-    let offset_only = Matrix3::from_diagonal(&Vector3::new(1.0 / count, 0.0, 0.0));
-    (coordinates(at.coords - centroid), cofactor.unwrap_or(offset_only))
+
+    /// a = (1, x, y) of a point.
+    pub(crate) fn coordinates(&self, at: &Point3<f64>) -> Vector3<f64> {
+        let p = at.coords - self.centroid;
+        Vector3::new(1.0, self.axes[0].dot(&p), self.axes[1].dot(&p))
+    }
+
+    /// Three combinations of a's coefficients whose errors have unit variance for markers of unit variance: a square
+    /// root of the cofactor, column by column.
+    pub(crate) fn errors(&self) -> Matrix3<f64> {
+        let root = self.cofactor.symmetric_eigen();
+        let scale = root.eigenvalues.map(|v| v.max(0.0).sqrt());
+        root.eigenvectors * Matrix3::from_diagonal(&scale)
+    }
 }

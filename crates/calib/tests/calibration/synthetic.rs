@@ -393,6 +393,7 @@ impl Lab<'_> {
                 color: board.map(|_| "white".to_owned()),
                 facet,
                 beams: None,
+                test: None,
             },
             room_from_rig: self.room_from_rig,
             room_from_board: board.map(|b| self.tracked(&(self.room_from_sensor * b), draw)),

@@ -3,7 +3,8 @@
 use super::outline::{Meets, Obstacles, nominal_room_from_sensor};
 use super::structure::{SCAN_HALF_DEG, rounded};
 use super::{Findings, Path, suggestion};
-use crate::scene::{Board, BoardPose, Scene};
+use crate::placement::{before_beam, stands_in};
+use crate::scene::{Board, BoardPose, Scene, SensorTest};
 use catoptric_model::frame::yaw_pitch_roll;
 use catoptric_model::{BoardPlane, Pose, Rectangle, beam};
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -32,6 +33,14 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
         bench.check_pose(
             pose,
             &Path::of("experiment").key("pose").index(i),
+            rig_has_its_place,
+            found,
+        );
+    }
+    for (i, test) in scene.experiment.test.iter().enumerate() {
+        bench.check_test(
+            test,
+            &Path::of("experiment").key("test").index(i),
             rig_has_its_place,
             found,
         );
@@ -233,6 +242,58 @@ impl Bench<'_> {
             None => self.check_direct(&outline, &sensor_from_board, path, found),
             Some(Ok(facet)) => self.check_in_fan(facet, &outline, &sensor_from_board, path, found),
             Some(Err(_)) => {}
+        }
+    }
+
+    /// Boards before one beam of the bare sensor.
+    fn check_test(&self, test: &SensorTest, path: &Path, place: bool, found: &mut Findings) {
+        let scene = self.scene;
+        let mut boards = Vec::new();
+        for (i, name) in test.board.iter().enumerate() {
+            match scene.board.iter().find(|b| b.name == *name) {
+                Some(board) => boards.push(board),
+                None => found.add(
+                    &path.key("board").index(i),
+                    format_args!("is {name:?}; there is no such board"),
+                    suggestion(name, "boards", scene.board.iter().map(|b| b.name.as_str())),
+                ),
+            }
+        }
+        if !place {
+            return;
+        }
+        let beam = beam::nearest(test.azimuth_deg.to_radians());
+        if let Some(met) = beam.and_then(|b| self.met[b]) {
+            let what = match met {
+                Meets::Facet(facet) => format!("facet {:?}", scene.superstructure.facet[facet].name),
+                _ => "the structure".to_owned(),
+            };
+            found.add(
+                &path.key("azimuth_deg"),
+                format_args!("is {}°, where the beam meets {what}", test.azimuth_deg),
+                "a test of the bare sensor takes a beam that nothing deflects".to_owned(),
+            );
+            return;
+        }
+        for (i, &range) in test.range_m.iter().enumerate() {
+            let too_wide = boards.iter().find_map(|board| {
+                let fits = |incidence: &f64| {
+                    let pose = before_beam(test, range, *incidence, &self.room_from_sensor);
+                    stands_in(board, &pose, &scene.room)
+                };
+                let incidence = test.incidence_deg.iter().find(|incidence| !fits(incidence))?;
+                Some((board, incidence))
+            });
+            if let Some((board, incidence)) = too_wide {
+                found.add(
+                    &path.key("range_m").index(i),
+                    format_args!(
+                        "is {range} m, where board {:?} under {incidence}° would reach through a wall, floor or ceiling",
+                        board.name
+                    ),
+                    room_extent(&scene.room.size_m),
+                );
+            }
         }
     }
 

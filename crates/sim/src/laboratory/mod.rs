@@ -22,9 +22,14 @@ use crate::scene::{EchoChoice, ErrorModel, Scene};
 use crate::stage::Stage;
 use crate::structure::Structure;
 use catoptric_model::dataset::RIG_SUBJECT;
-use catoptric_model::{Dataset, Pose, PoseKind, PoseLabel, RangeBias, Stretch, beam};
+use catoptric_model::{
+    Dataset, Pose, PoseKind, PoseLabel, RangeBias, SpotNote, Stretch, TestKind, TestNote, beam,
+};
 use nalgebra::{Point3, Translation3, UnitQuaternion};
 use rayon::prelude::*;
+
+/// Neighbouring beams whose spot is measured: the paper's triple beam.
+const SPOT_BEAMS: usize = 3;
 
 /// A scene ready to be recorded.
 pub struct Laboratory {
@@ -57,7 +62,14 @@ impl Laboratory {
         let boards = planned
             .iter()
             .enumerate()
-            .map(|(i, p)| Some(misplaced(scene, seed, i, &p.board?.1)))
+            .map(|(i, p)| {
+                let (_, meant) = p.board?;
+                Some(if p.exact {
+                    meant
+                } else {
+                    misplaced(scene, seed, i, &meant)
+                })
+            })
             .collect();
         let structure = Structure::as_built(scene, seed)?;
         let room_from_sensor = placement::room_from_rig(&scene.room) * structure.rig_from_sensor;
@@ -240,7 +252,30 @@ impl Laboratory {
                 .facet
                 .map(|f| self.scene.superstructure.facet[f].name.clone()),
             beams: planned.beams,
+            test: planned.test.map(|test| TestNote {
+                spot: (test.kind == TestKind::Spot)
+                    .then(|| self.spot_note(number))
+                    .flatten(),
+                ..test
+            }),
         }
+    }
+
+    /// The spot of three neighbouring beams around a board's center, as a person reads its edges off the board.
+    fn spot_note(&self, number: usize) -> Option<SpotNote> {
+        let sensor_from_board = self.room_from_sensor().inverse() * self.boards[number]?;
+        let spot = self.sensor.spot(&sensor_from_board, SPOT_BEAMS)?;
+        let mut draws = Draws::new(self.seed, Purpose::SpotReading, number as u64);
+        let sd = self.scene.experiment.spot_sd_mm;
+        let mut read = |extent: f64| {
+            let misread = sd * (draws.normal() - draws.normal());
+            ((extent * 1e3 + misread).max(0.0) * 10.0).round() / 10.0
+        };
+        Some(SpotNote {
+            beams: SPOT_BEAMS,
+            width_mm: read(spot[0]),
+            height_mm: read(spot[1]),
+        })
     }
 
     /// The rig, and the stretch's board.
@@ -321,9 +356,6 @@ fn placed(frame_from_room: &Pose, corners: Vec<Point3<f64>>) -> Option<Polygon> 
 
 /// Where a board really stands when a person means to put it somewhere.
 fn misplaced(scene: &Scene, seed: u64, number: usize, meant: &Pose) -> Pose {
-    if !scene.experiment.pose.is_empty() {
-        return *meant;
-    }
     let mut draws = Draws::new(seed, Purpose::Placement, number as u64);
     let shift = draws.normal3() * (scene.experiment.placement_sd_mm * 1e-3);
     let turn = draws.normal3() * scene.experiment.placement_sd_deg.to_radians();

@@ -1,4 +1,4 @@
-//! Where the boards are put: Cooper, steps 7 to 10, carried out on the drawing as a person would.
+//! Where the boards are put: Cooper, steps 1 and 7 to 10, carried out on the drawing as a person would.
 //!
 //! Every facet's beams are divided into groups that one board can serve. Before each group a board is set up in
 //! several poses: its tilt direction goes round evenly, its tilt and its distance vary, and it must stand in the room
@@ -6,8 +6,11 @@
 
 mod groups;
 mod poses;
+mod sensor_tests;
 
 pub use groups::served_beams;
+pub(crate) use poses::stands_in;
+pub(crate) use sensor_tests::before_beam;
 
 use crate::error::SimError;
 use crate::optics::{Mirrors, Path, Setting};
@@ -15,7 +18,7 @@ use crate::reading::Sensor;
 use crate::scene::{BoardPose, Room, Scene};
 use crate::structure::{self, Structure};
 use catoptric_model::frame::{tangent_basis, yaw_pitch_roll};
-use catoptric_model::{Pose, PoseKind, beam};
+use catoptric_model::{Pose, PoseKind, TestNote, beam};
 use groups::{Group, direct_groups, facet_groups};
 use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use poses::{attitude, place};
@@ -33,6 +36,10 @@ pub struct Planned {
     pub beams: Option<[usize; 2]>,
     /// The board, by its index, and where it is meant to stand.
     pub board: Option<(usize, Pose)>,
+    /// Whether it is put exactly there.
+    pub exact: bool,
+    /// What is tested of the bare sensor.
+    pub test: Option<TestNote>,
 }
 
 /// Where rig and nominal sensor stand in the room.
@@ -43,7 +50,8 @@ pub fn room_from_rig(room: &Room) -> Pose {
     )
 }
 
-/// The whole procedure: bare structure, empty room, boards before undeflected beams, boards before every facet.
+/// The whole procedure: bare structure, empty room, tests of the bare sensor, boards before undeflected beams, boards
+/// before every facet.
 ///
 /// # Errors
 /// [`SimError::Placement`] where a board fits nowhere, [`SimError::UnknownName`] for a pose that refers to nothing.
@@ -60,11 +68,14 @@ pub fn plan(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
         facet: None,
         beams: None,
         board: None,
+        exact: false,
+        test: None,
     };
     let mut planned = vec![
         without_board(PoseKind::Bare, experiment.bare_scans),
         without_board(PoseKind::Room, experiment.room_scans),
     ];
+    planned.extend(sensor_tests::plan(scene, &room_from_sensor)?);
     if !experiment.pose.is_empty() {
         for (index, pose) in experiment.pose.iter().enumerate() {
             planned.push(given(scene, &paths, pose, index)?);
@@ -90,6 +101,8 @@ pub fn plan(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
             facet: None,
             beams: Some([first, last]),
             board: Some((board, pose)),
+            exact: false,
+            test: None,
         });
     }
     for (number, (facet, first, last)) in facet_groups(
@@ -118,6 +131,8 @@ pub fn plan(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
                 facet: Some(facet),
                 beams: Some([first, last]),
                 board: Some((board, pose)),
+                exact: false,
+                test: None,
             });
         }
     }
@@ -129,6 +144,10 @@ fn no_place(scene: &Scene, board: usize, group: &Group, reason: String) -> SimEr
         Some(facet) => format!("facet {:?}", scene.superstructure.facet[facet].name),
         None => format!("beams {} to {}", group.first, group.last),
     };
+    no_place_before(scene, board, target, reason)
+}
+
+fn no_place_before(scene: &Scene, board: usize, target: String, reason: String) -> SimError {
     SimError::Placement {
         board: scene.board[board].name.clone(),
         target,
@@ -138,7 +157,10 @@ fn no_place(scene: &Scene, board: usize, group: &Group, reason: String) -> SimEr
 
 /// A pose that the scene gives itself.
 fn given(scene: &Scene, paths: &[Path], pose: &BoardPose, index: usize) -> Result<Planned, SimError> {
-    let unknown = |what: String| SimError::UnknownName { pose: index, what };
+    let unknown = |what: String| SimError::UnknownName {
+        by: format!("pose {index}"),
+        what,
+    };
     let board = scene.board.iter().position(|b| b.name == pose.board);
     let board = board.ok_or_else(|| unknown(format!("board {:?}", pose.board)))?;
     let facet = match &pose.facet {
@@ -171,5 +193,7 @@ fn given(scene: &Scene, paths: &[Path], pose: &BoardPose, index: usize) -> Resul
         facet,
         beams,
         board: Some((board, level * turn)),
+        exact: true,
+        test: None,
     })
 }

@@ -83,7 +83,7 @@ pub(super) fn place(
 }
 
 /// A board on a ray, tilted against it; its x axis lies along the fan as far as the tilt allows.
-fn facing(ray: &Ray, fan: Vector3<f64>, distance: f64, tilt: f64, turn: f64) -> Pose {
+pub(super) fn facing(ray: &Ray, fan: Vector3<f64>, distance: f64, tilt: f64, turn: f64) -> Pose {
     let (across, up) = tangent_basis(&ray.direction);
     let (sin_turn, cos_turn) = libm::sincos(turn);
     let (sin_tilt, cos_tilt) = libm::sincos(tilt);
@@ -106,7 +106,7 @@ pub(super) fn attitude(center: Point3<f64>, normal: &Unit<Vector3<f64>>, along: 
 }
 
 /// Whether all corners of a board lie inside the room.
-fn stands_in(board: &Board, room_from_board: &Pose, room: &Room) -> bool {
+pub(crate) fn stands_in(board: &Board, room_from_board: &Pose, room: &Room) -> bool {
     let outline = Rectangle {
         width: board.width_mm * 1e-3,
         height: board.height_mm * 1e-3,

@@ -9,6 +9,7 @@ mod errors;
 mod room;
 mod scanner;
 mod superstructure;
+mod test;
 
 pub use body::{
     MeshShape, MeshUnits, PlanePolygon, PlaneRectangle, PlaneShape, PostCylinder, PostShape, RoomBox,
@@ -22,6 +23,7 @@ pub use superstructure::{
     AsBuilt, Facet, FacetShape, Glass, Marker, Mirror, PolygonShape, Post, RectangleShape, Superstructure,
     Wedge,
 };
+pub use test::SensorTest;
 
 use crate::mesh::Meshes;
 use schemars::JsonSchema;

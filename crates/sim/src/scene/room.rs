@@ -3,6 +3,7 @@
 use super::Marker;
 use super::body::{RoomMirror, RoomSurface};
 use super::errors::NoiseTable;
+use super::test::SensorTest;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -127,7 +128,7 @@ impl Default for Mocap {
     }
 }
 
-/// The procedure: Cooper, steps 2 to 10.
+/// The procedure: Cooper, steps 1 to 10.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Experiment {
@@ -167,7 +168,22 @@ pub struct Experiment {
     /// Board poses given one by one. With any, none are chosen by the rules above.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pose: Vec<BoardPose>,
+    /// Tests of the bare sensor: Cooper, step 1.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub test: Vec<SensorTest>,
+    /// How far a person misreads the edge of a spot on a board, 1σ, in millimetres (assumed); he notes whole tenths.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    #[serde(skip_serializing_if = "is_default_spot_reading")]
+    pub spot_sd_mm: f64,
 }
+
+/// The default keeps out of files: a scene without tests has no use for it.
+fn is_default_spot_reading(sd: &f64) -> bool {
+    *sd == SPOT_SD_MM
+}
+
+/// A ruler on the board, read to half its divisions.
+const SPOT_SD_MM: f64 = 0.25;
 
 /// One pose of a board, in the room frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -203,6 +219,8 @@ impl Default for Experiment {
             placement_sd_deg: 2.0,
             pause_s: 5.0,
             pose: Vec::new(),
+            test: Vec::new(),
+            spot_sd_mm: SPOT_SD_MM,
         }
     }
 }

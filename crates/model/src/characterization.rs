@@ -1,0 +1,276 @@
+//! What step 1 finds out about the bare sensor: `characterization.json`.
+//!
+//! Tables 1 to 4 of the paper as measured, and the numbers of Eqs. 3 to 5 fitted to them. Errors are *measured − true*.
+
+use crate::bias::{DistanceBias, RangeBias};
+use crate::calibration::MountEstimate;
+use crate::dataset::{SpotNote, TestKind};
+use serde::{Deserialize, Serialize};
+
+/// Version of `characterization.json`.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// A characterized sensor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Characterization {
+    /// Version of this file's format.
+    pub schema_version: u32,
+    /// Name of the experiment.
+    pub name: String,
+    /// Table 1: the spots that were measured.
+    pub spots: Vec<SpotRow>,
+    /// How the spot grows with the distance; absent without spots at two distances.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spot_law: Option<SpotLaw>,
+    /// Tables 2 to 4: every stretch with a board before beams that nothing deflects, in the order of recording.
+    pub stretches: Vec<StretchRow>,
+    /// What Eq. 3 is to subtract. E_a is the law of Eq. 4, with a table on top of it where the law is rejected.
+    pub bias: RangeBias,
+    /// The numbers that were fitted.
+    pub parameters: Vec<Parameter>,
+    /// Their covariance, in the units of the parameters, row by row.
+    pub covariance: Vec<Vec<f64>>,
+    /// What the boards do not tell.
+    #[serde(default)]
+    pub not_observed: Vec<NotObserved>,
+    /// Eq. 5 as a line through E_r over the distance; absent without three distances.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distance_line: Option<Law>,
+    /// What the cosine law leaves at each incidence that was tested.
+    #[serde(default)]
+    pub angle_misfit: Vec<MisfitRow>,
+    /// Whether Eq. 4's law and its misfits go together; absent without three incidences.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angle_law: Option<Fit>,
+    /// Table 4: white noise of one reading, by color and distance.
+    pub noise: Vec<NoiseRow>,
+    /// Scatter of the means over trials of one setting; absent without repetition.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trial_scatter: Option<Scatter>,
+    /// How well the model fits all means together.
+    pub fit: Fit,
+    /// Where the sensor sits in the rig, as it came out beside the errors.
+    pub rig_from_sensor: MountEstimate,
+}
+
+/// The spot of neighbouring beams on a board.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpotRow {
+    /// Number of the pose.
+    pub pose: usize,
+    /// Distance to the board, in metres.
+    pub distance_m: f64,
+    /// The spot.
+    pub spot: SpotNote,
+}
+
+/// Lines through the extents of the spot: extent = offset + slope·distance.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpotLaw {
+    /// Growth of the width, in millimetres per metre: full milliradians.
+    pub width_slope_mrad: f64,
+    /// Width at distance 0, in millimetres.
+    pub width_offset_mm: f64,
+    /// Growth of the height, in millimetres per metre.
+    pub height_slope_mrad: f64,
+    /// Height at distance 0, in millimetres.
+    pub height_offset_mm: f64,
+}
+
+/// What one beam, the one nearest to the board's center, read of a board.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StretchRow {
+    /// Number of the pose.
+    pub pose: usize,
+    /// What was tested; absent for a board that was set up to find the mounting.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub test: Option<TestKind>,
+    /// Number of the setting.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub setting: Option<usize>,
+    /// Number of the trial.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trial: Option<usize>,
+    /// The board.
+    pub board: String,
+    /// Its color.
+    pub color: String,
+    /// The beam.
+    pub beam: usize,
+    /// Distance along it to the board as tracked, in metres.
+    pub distance_m: f64,
+    /// Angle between the board's normal and the beam, in degrees; negative if the normal is turned to smaller azimuths.
+    pub incidence_deg: f64,
+    /// Readings that are ranges.
+    pub readings: usize,
+    /// Their mean less the distance, in millimetres.
+    pub mean_error_mm: f64,
+    /// Their standard deviation, in millimetres.
+    pub sd_mm: f64,
+}
+
+/// A number of Eqs. 3 to 5.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Parameter {
+    /// Its symbol: `E_r`, `A_a`, `B_a`, `A_c` or `B_c`.
+    pub symbol: String,
+    /// The color it belongs to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub color: Option<String>,
+    /// The distance it belongs to, in metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distance_m: Option<f64>,
+    /// `mm` or `mm/m`.
+    pub unit: String,
+    /// Its value.
+    pub value: f64,
+    /// Its standard deviation.
+    pub sd: f64,
+}
+
+/// A number that the boards leave open.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NotObserved {
+    /// Its symbol, as in [`Parameter`].
+    pub symbol: String,
+    /// The color it belongs to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub color: Option<String>,
+    /// Why, and what would help.
+    pub reason: String,
+}
+
+/// A line with its uncertainty: value = slope·distance + offset.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Law {
+    /// A_c, in millimetres per metre.
+    pub slope_mm_per_m: f64,
+    /// B_c, in millimetres.
+    pub offset_mm: f64,
+    /// Covariance of slope and offset.
+    pub covariance: [[f64; 2]; 2],
+    /// How well the line fits.
+    pub fit: Fit,
+}
+
+/// A sum of squared residuals in their own standard deviations, and what it is held against.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fit {
+    /// χ².
+    pub chi_squared: f64,
+    /// Its degrees of freedom.
+    pub degrees_of_freedom: usize,
+}
+
+/// What the cosine law leaves at an incidence.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MisfitRow {
+    /// Incidence θ_N, in degrees, whichever way the board was turned.
+    pub incidence_deg: f64,
+    /// Stretches.
+    pub stretches: usize,
+    /// E_a by the law, in millimetres.
+    pub law_mm: f64,
+    /// Measured E_a less the law, in millimetres.
+    pub misfit_mm: f64,
+    /// Standard deviation of the misfit, in millimetres.
+    pub sd_mm: f64,
+}
+
+/// White noise of a color at a distance.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoiseRow {
+    /// Color.
+    pub color: String,
+    /// Distance, in metres.
+    pub distance_m: f64,
+    /// Standard deviation of one reading, in millimetres.
+    pub sd_mm: f64,
+    /// Readings less the means taken from them.
+    pub degrees_of_freedom: usize,
+}
+
+/// Scatter of repeated means.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scatter {
+    /// Standard deviation, in millimetres.
+    pub sd_mm: f64,
+    /// Repetitions less the settings.
+    pub degrees_of_freedom: usize,
+}
+
+impl Fit {
+    /// χ² over its degrees of freedom; NaN without any.
+    pub fn reduced(&self) -> f64 {
+        self.chi_squared / self.degrees_of_freedom as f64
+    }
+
+    /// Whether χ² is beyond the value that one fit in a thousand exceeds by chance.
+    pub fn is_rejected(&self) -> bool {
+        self.degrees_of_freedom > 0 && self.chi_squared > upper_quantile(self.degrees_of_freedom)
+    }
+}
+
+/// χ² that is exceeded with probability 0.001 by chance (Wilson and Hilferty 1931: within 1.5 % for any number).
+fn upper_quantile(degrees_of_freedom: usize) -> f64 {
+    /// Standard normal deviate of that probability.
+    const Z: f64 = 3.090_232_306_167_813;
+    let n = degrees_of_freedom as f64;
+    let root = 1.0 - 2.0 / (9.0 * n) + Z * (2.0 / (9.0 * n)).sqrt();
+    n * root * root * root
+}
+
+impl Characterization {
+    /// The fitted number with a symbol, of a color where it belongs to one.
+    pub fn parameter(&self, symbol: &str, color: Option<&str>) -> Option<&Parameter> {
+        self.parameters
+            .iter()
+            .find(|p| p.symbol == symbol && p.color.as_deref() == color)
+    }
+
+    /// Root mean square of the standard deviations of all parameters with a symbol, in their unit; 0 without any.
+    pub fn typical_sd(&self, symbol: &str) -> f64 {
+        let squares = self
+            .parameters
+            .iter()
+            .filter(|p| p.symbol == symbol)
+            .map(|p| p.sd * p.sd);
+        let (sum, count) = squares.fold((0.0, 0.0), |(sum, count), s| (sum + s, count + 1.0));
+        if count > 0.0 { f64::sqrt(sum / count) } else { 0.0 }
+    }
+
+    /// E_r as it was fitted.
+    pub fn distance(&self) -> &DistanceBias {
+        &self.bias.distance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_quantile_is_the_tables() {
+        // χ² at 0.999: 10.828, 29.588, 149.449 for 1, 10, 100 degrees of freedom.
+        for (n, table) in [(1, 10.828), (10, 29.588), (100, 149.449)] {
+            assert!((upper_quantile(n) / table - 1.0).abs() < 0.015, "{n}");
+        }
+        let fit = |chi_squared| Fit {
+            chi_squared,
+            degrees_of_freedom: 10,
+        };
+        assert!(fit(30.0).is_rejected() && !fit(29.0).is_rejected());
+        assert!((fit(15.0).reduced() - 1.5).abs() < 1e-15);
+    }
+}
