@@ -6,6 +6,7 @@
 //! 4. [`calibrating_and_scoring`]: the paper's steps, statuses, covariances, scores, verdicts, your own calibrator
 //! 5. [`files`]: every file and every key
 //! 6. [`physics_of_table_3`]: what of the paper's Table 3 pulse and threshold explain, and what they do not
+//! 7. [`characterizing`]: step 1, Tables 1 to 4 and Eqs. 3 to 5 of the bare sensor
 //!
 //! The chapters are Markdown files in `docs/guide/`; their Rust examples are run by the tests.
 
@@ -26,3 +27,6 @@ pub mod files {}
 
 #[doc = include_str!("../docs/guide/6-physics-of-table-3.md")]
 pub mod physics_of_table_3 {}
+
+#[doc = include_str!("../docs/guide/7-characterizing.md")]
+pub mod characterizing {}

@@ -6,7 +6,7 @@
 use crate::common::{run, stdout};
 use catoptric::io::scene::{self, Layout};
 use catoptric::model::calibration::{FacetEstimate, MountEstimate};
-use catoptric::model::{BeamEstimate, Calibration, RangeBias, Status};
+use catoptric::model::{AngleTable, BeamEstimate, Calibration, RangeBias, Status};
 use catoptric::{calib, score, sim};
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -426,8 +426,13 @@ fn documented_keys_are_the_keys_of_the_files() {
         &["bias.color"],
     );
 
-    let sets = ["experiment.scans_per_pose=1", "scanner.sub_rays=1"].map(str::to_owned);
-    let small = scene::parse(scene::scene_template(Layout::TwoMirror), "two-mirror.toml", &sets).unwrap();
+    let quick = ["experiment.scans_per_pose=1", "scanner.sub_rays=1"].map(str::to_owned);
+    let small = scene::parse(
+        scene::scene_template(Layout::TwoMirror),
+        "two-mirror.toml",
+        &quick,
+    )
+    .unwrap();
     let laboratory = sim::Laboratory::new(&small, small.seed).unwrap();
     let (dataset, truth) = (laboratory.dataset().unwrap(), laboratory.truth().unwrap());
     same(
@@ -445,9 +450,23 @@ fn documented_keys_are_the_keys_of_the_files() {
         &["statuses", "nulls"],
     );
 
+    let sets = ["experiment.scans_per_pose=2", "scanner.sub_rays=1"].map(str::to_owned);
+    let mut bare = scene::load(&root().join("scenes/ust-20lx-cooper.toml"), &sets).unwrap();
+    bare.experiment.test[5].range_m.truncate(1);
+    let laboratory = sim::Laboratory::new(&bare, bare.seed).unwrap();
+    let tested = laboratory.dataset().unwrap();
+    let mut found = calib::characterize(&tested).unwrap();
+    found.bias.angle.table = Some(AngleTable::default());
+    same(
+        "characterization.json",
+        &json(serde_json::to_value(&found)),
+        &["bias.color"],
+    );
+
     let labels: BTreeSet<String> = dataset
         .poses
         .iter()
+        .chain(&tested.poses)
         .flat_map(|p| keys(&json(serde_json::to_value(&p.label)), &[]))
         .collect();
     let topics_and_labels = first_column(&text, "## observations.mcap");
@@ -473,7 +492,7 @@ fn documented_keys_are_the_keys_of_the_files() {
     ];
     let output = run(
         folder.path(),
-        &[&arguments[..], &["--set", &sets[0], "--set", &sets[1]]].concat(),
+        &[&arguments[..], &["--set", &quick[0], "--set", &quick[1]]].concat(),
     );
     assert!(output.status.success());
     let manifest = fs::read_to_string(folder.path().join("dataset/manifest.json")).unwrap();
