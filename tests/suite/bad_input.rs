@@ -281,6 +281,30 @@ fn light_must_reach_every_facet() {
 }
 
 #[test]
+fn housings_that_no_light_leaves() {
+    let preset = "preset = \"ust-20lx\"";
+    let with = |lines: &str| format!("{preset}\n{lines}");
+    expect_one(
+        preset,
+        &with("housing_box = [{ center_mm = [0, 0, 5], size_mm = [50, 50, 20] }]"),
+        "[0, 0, 5]",
+        &["over the origin of the scanner"],
+    );
+    expect_one(
+        preset,
+        &with("housing = false\nhousing_box = [{ center_mm = [0, 0, -30], size_mm = [50, 50, 20] }]"),
+        "[{ center_mm",
+        &["`scanner.housing` is false"],
+    );
+    expect_one(
+        preset,
+        &with("housing_box = [{ center_mm = [0, 0, -30], size_mm = [50, 0, 20] }]"),
+        "0, 20]",
+        &["0.01"],
+    );
+}
+
+#[test]
 fn names_and_markers() {
     expect_one(
         "name = \"b\"",
