@@ -13,4 +13,5 @@ mod paper;
 mod physics;
 mod pipeline;
 mod scenes;
+mod sub_rays;
 mod traps;
