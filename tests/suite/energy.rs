@@ -53,7 +53,7 @@ fn rectangle_facet(name: String, center_mm: Vector3<f64>, normal: Vector3<f64>, 
 fn random_scene(draws: &mut Draws, round: usize) -> Scene {
     let mut scene = scene(BARE);
     scene.scanner.sub_rays = 61;
-    scene.scanner.housing = round % 3 == 0;
+    scene.scanner.housing = round.is_multiple_of(3);
     scene.superstructure.mirror.thickness_mm = 3.0;
     scene.superstructure.mirror.glass = (round % 2 == 1).then_some(Glass {
         index: 1.51,

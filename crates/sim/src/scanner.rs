@@ -146,6 +146,7 @@ impl Limits {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Mount;
 
     /// Extents of all boxes together.
     fn extents(boxes: &[HousingBox]) -> [f64; 3] {
@@ -175,5 +176,29 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn a_scene_can_have_no_housing_its_own_or_the_presets() {
+        let own = HousingBox {
+            center_mm: [0.0, 0.0, -40.0],
+            size_mm: [60.0, 60.0, 50.0],
+        };
+        let boxes = |preset, housing, housing_box: Option<Vec<HousingBox>>| {
+            let scanner = Scanner {
+                preset,
+                sub_rays: 1,
+                beam: None,
+                custom: None,
+                housing,
+                housing_box,
+                mount: Mount::default(),
+            };
+            scanner.housing_boxes().to_vec()
+        };
+        assert!(boxes(Preset::Utm30lxEw, false, None).is_empty());
+        assert_eq!(boxes(Preset::Utm30lxEw, true, None), UTM_30LX_EW_HOUSING);
+        assert_eq!(boxes(Preset::Custom, true, None), UST_20LX_HOUSING);
+        assert_eq!(boxes(Preset::Custom, true, Some(vec![own])), [own]);
     }
 }
