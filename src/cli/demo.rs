@@ -53,6 +53,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
             replace: true,
             returns: false,
             readings: false,
+            sub_rays: false,
         },
         context,
     )?;

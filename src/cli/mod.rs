@@ -17,6 +17,7 @@ mod report;
 mod schema;
 mod score;
 mod simulate;
+mod sub_rays;
 mod trace;
 mod validate;
 

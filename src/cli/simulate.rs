@@ -5,6 +5,7 @@ use super::error::CliError;
 use super::interrupt;
 use super::output::{counted, print, quoted};
 use super::progress::Progress;
+use super::sub_rays;
 use catoptric::io::{self, DatasetWriter, IoError, Provenance, dataset, scene};
 use catoptric::model::{Stretch, beam};
 use catoptric::sim::laboratory::Returns;
@@ -15,7 +16,7 @@ use catoptric::sim::{Laboratory, Scene, SimError, noise};
 use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
-use std::io::Write;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -48,6 +49,9 @@ pub(crate) struct Arguments {
     /// Write also every error of every reading, truth/readings.csv; large.
     #[arg(long)]
     readings: bool,
+    /// Write also the way of every sub-ray, truth/sub_rays.csv; large.
+    #[arg(long)]
+    sub_rays: bool,
 }
 
 /// Figures of a run: what `simulate --json` prints.
@@ -81,6 +85,8 @@ pub(crate) struct Recording<'a> {
     pub(crate) returns: bool,
     /// Whether the truth about every reading is written as well.
     pub(crate) readings: bool,
+    /// Whether the truth about every sub-ray is written as well.
+    pub(crate) sub_rays: bool,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
@@ -94,6 +100,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
             replace: arguments.replace,
             returns: arguments.returns,
             readings: arguments.readings,
+            sub_rays: arguments.sub_rays,
         },
         context,
     )?;
@@ -123,6 +130,9 @@ fn command_line(arguments: &Arguments, seed: u64) -> String {
     }
     if arguments.readings {
         line.push_str(" --readings");
+    }
+    if arguments.sub_rays {
+        line.push_str(" --sub-rays");
     }
     line
 }
@@ -170,6 +180,12 @@ pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Fig
             READINGS_HEADER,
             reading_rows,
         ),
+        (
+            recording.sub_rays,
+            dataset::SUB_RAYS,
+            sub_rays::HEADER,
+            sub_ray_rows,
+        ),
     ] {
         if wanted {
             let mut file = writer.open_file(name)?;
@@ -194,9 +210,10 @@ pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Fig
             timed(&mut || {
                 writer.write_stretch(&recorded.stretch)?;
                 for (file, path, rows) in &mut tables {
-                    let text = rows(&laboratory, *number, recorded);
-                    file.write_all(text.as_bytes())
-                        .map_err(|e| IoError::write(path, e))?;
+                    rows(&laboratory, *number, recorded, &mut |text| {
+                        file.write_all(text.as_bytes())
+                            .map_err(|e| IoError::write(path.as_path(), e).into())
+                    })?;
                 }
                 Ok(())
             })?;
@@ -259,37 +276,60 @@ fn segments(returns: &Returns) -> usize {
     returns.iter().map(pieces).sum()
 }
 
-/// The rows of one stretch in a table of the truth.
-type Rows = fn(&Laboratory, usize, &Recorded) -> String;
+/// Tells the rows of one stretch in a table of the truth, as many at a time as fit in memory well.
+type Rows = fn(&Laboratory, usize, &Recorded, Tell<'_>) -> Result<(), CliError>;
+
+/// Takes rows on.
+pub(crate) type Tell<'a> = &'a mut dyn FnMut(&str) -> Result<(), CliError>;
 
 /// First line of truth/returns.csv. A reading is geometric + mixed + detection + the three biases, then what
 /// truth/readings.csv lists, rounded; a beam without an echo has no row, one with several has one for each.
 const RETURNS_HEADER: &str = "pose,beam,surface,facets,geometric_m,cos_incidence,power_w,share,mixed_m,detection_m,\
                               distance_bias_m,angle_bias_m,color_bias_m,noise_sd_m,echo,detection_probability\n";
 
-fn return_rows(laboratory: &Laboratory, pose: usize, recorded: &Recorded) -> String {
-    let scene = laboratory.scene();
+/// The names of all mirrors, by their index.
+pub(crate) fn mirror_names(scene: &Scene) -> Vec<&str> {
     let facets = scene.superstructure.facet.iter().map(|f| f.name.as_str());
-    let names: Vec<&str> = facets
-        .chain(scene.room.mirror.iter().map(|m| m.name.as_str()))
-        .collect();
-    let name = |facet: &usize| names[*facet];
+    let mirrors = scene.room.mirror.iter().map(|m| m.name.as_str());
+    facets.chain(mirrors).collect()
+}
+
+/// What a surface is, as the tables of the truth say it.
+pub(crate) fn role_name(role: Role) -> &'static str {
+    match role {
+        Role::Facet(_) => "facet",
+        Role::Structure => "structure",
+        Role::Board => "board",
+        Role::Wall => "wall",
+        Role::Object => "object",
+    }
+}
+
+/// A field of free text: a comma or a quote in a name must not end it.
+pub(crate) fn field(text: &str) -> String {
+    format!("\"{}\"", text.replace('"', "\"\""))
+}
+
+/// Names of the mirrors of a way, as one field.
+pub(crate) fn way(names: &[&str], facets: &[usize]) -> String {
+    let facets: Vec<&str> = facets.iter().map(|f| names[*f]).collect();
+    field(&facets.join(">"))
+}
+
+fn return_rows(
+    laboratory: &Laboratory,
+    pose: usize,
+    recorded: &Recorded,
+    tell: Tell<'_>,
+) -> Result<(), CliError> {
+    let names = mirror_names(laboratory.scene());
     let mut text = String::new();
     let echoes = recorded.returns.iter().enumerate().flat_map(|(beam, found)| {
         let echoes = found.iter().flat_map(Return::echoes).enumerate();
         echoes.map(move |(echo, r)| (beam, echo, r))
     });
     for (beam, echo, r) in echoes {
-        let surface = match r.role {
-            Role::Facet(_) => "facet",
-            Role::Structure => "structure",
-            Role::Board => "board",
-            Role::Wall => "wall",
-            Role::Object => "object",
-        };
-        let facets: Vec<&str> = r.facets.iter().map(name).collect();
-        // Names of facets are free text: a comma or a quote in one must not end the field.
-        let facets = format!("\"{}\"", facets.join(">").replace('"', "\"\""));
+        let (surface, facets) = (role_name(r.role), way(&names, &r.facets));
         text.push_str(&format!(
             "{pose},{beam},{surface},{facets},{},{},{},{},{},{},{},{},{},{},{echo},{}\n",
             r.geometric,
@@ -305,7 +345,7 @@ fn return_rows(laboratory: &Laboratory, pose: usize, recorded: &Recorded) -> Str
             r.probability,
         ));
     }
-    text
+    tell(&text)
 }
 
 /// First line of truth/readings.csv. `echo` is the one of truth/returns.csv that was reported, empty where none was
@@ -313,7 +353,12 @@ fn return_rows(laboratory: &Laboratory, pose: usize, recorded: &Recorded) -> Str
 const READINGS_HEADER: &str =
     "pose,scan,beam,echo,lost,drift_m,warm_up_m,noise_m,correlated_m,interference_m,reading_m\n";
 
-fn reading_rows(laboratory: &Laboratory, pose: usize, recorded: &Recorded) -> String {
+fn reading_rows(
+    laboratory: &Laboratory,
+    pose: usize,
+    recorded: &Recorded,
+    tell: Tell<'_>,
+) -> Result<(), CliError> {
     let errors = &laboratory.scene().errors;
     let dropout = match errors.model {
         ErrorModel::None => 0.0,
@@ -336,5 +381,9 @@ fn reading_rows(laboratory: &Laboratory, pose: usize, recorded: &Recorded) -> St
             ));
         }
     }
-    text
+    tell(&text)
+}
+
+fn sub_ray_rows(laboratory: &Laboratory, pose: usize, _: &Recorded, tell: Tell<'_>) -> Result<(), CliError> {
+    sub_rays::rows(laboratory, pose, tell)
 }

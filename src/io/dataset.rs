@@ -4,7 +4,8 @@
 //! manifest.json         where it comes from, SHA-256 of every file
 //! session.toml          what the experimenter knows
 //! observations.mcap     what was recorded
-//! truth/                scene.toml, truth.json, returns.csv, readings.csv: delete it and the dataset is blind
+//! truth/                scene.toml, truth.json, returns.csv, readings.csv, sub_rays.csv: delete it and the dataset is
+//!                       blind
 //! ```
 //!
 //! Reading never opens `truth/`.
@@ -36,6 +37,8 @@ pub const TRUTH: &str = "truth/truth.json";
 pub const RETURNS: &str = "truth/returns.csv";
 /// Name of the truth about every reading.
 pub const READINGS: &str = "truth/readings.csv";
+/// Name of the truth about every sub-ray.
+pub const SUB_RAYS: &str = "truth/sub_rays.csv";
 
 /// A dataset being written. It appears as a whole in [`finish`](Self::finish); dropped before, it never does.
 pub struct DatasetWriter {

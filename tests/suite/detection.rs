@@ -11,15 +11,12 @@ use crate::scenes::{BARE, scene};
 use catoptric::io::scene as scene_file;
 use catoptric::model::{Stretch, beam};
 use catoptric::sim::cast::{Polygon, Shape};
-use catoptric::sim::noise::{Draws, Purpose};
 use catoptric::sim::optics::{self, Mirrors, Role, Setting};
 use catoptric::sim::reading::{Return, Sensor};
-use catoptric::sim::scene::{
-    BeamShape, Correlated, Detector, ErrorModel, Facet, FacetShape, Interference, Preset, RectangleShape,
-};
+use catoptric::sim::scene::{BeamShape, Detector, ErrorModel, Preset};
 use catoptric::sim::structure::Structure;
 use catoptric::sim::{Laboratory, Scene, color, phase};
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 use std::collections::BTreeMap;
 use std::f64::consts::LN_2;
 
@@ -234,7 +231,7 @@ fn a_darker_color_walks_only_before_a_fixed_threshold() {
     let p = pulse_sd(4.0);
     for detector in DETECTORS {
         for (name, reflectivity) in [("white", 0.9), ("pencil_grey", 0.4), ("jet_black", 0.05)] {
-            for distance in [0.5, 1.0, 2.0] {
+            for distance in [0.5, 1.0, 2.0, 4.0] {
                 let mut scene = physical();
                 scene.scanner.sub_rays = 1;
                 scene.detection.detector = detector;
@@ -253,202 +250,6 @@ fn a_darker_color_walks_only_before_a_fixed_threshold() {
             }
         }
     }
-}
-
-#[test]
-fn a_beams_energy_is_all_accounted_for() {
-    let mut draws = Draws::new(17, Purpose::Placement, 0);
-    let (mut compared, mut split) = (0, 0);
-    for _ in 0..40 {
-        let mut scene = scene(BARE);
-        scene.scanner.sub_rays = 127;
-        scene.superstructure.facet = (0..4)
-            .map(|k| {
-                let at = draws.normal3();
-                let center = at.normalize() * (60.0 + 40.0 * draws.uniform());
-                let normal: Vector3<f64> = -center.normalize() + draws.normal3() * 0.4;
-                Facet {
-                    name: format!("facet-{k}"),
-                    two_sided: false,
-                    shape: FacetShape::Rectangle(RectangleShape {
-                        center_mm: [center.x, center.y, 0.1 * center.z],
-                        normal: normal.into(),
-                        width_mm: 30.0,
-                        height_mm: 20.0,
-                    }),
-                }
-            })
-            .collect();
-        let structure = Structure::nominal(&scene).expect("the facets are rectangles");
-        let wall = |x: f64| {
-            let corners = [(-9.0, -9.0), (9.0, -9.0), (9.0, 9.0), (-9.0, 9.0)];
-            optics::Target {
-                name: "wall".to_owned(),
-                shape: Shape::Polygon(
-                    Polygon::new(corners.map(|(y, z)| Point3::new(x, y, z)).to_vec())
-                        .expect("it is a square"),
-                ),
-                role: Role::Wall,
-                paint: color::paint(&scene, "white").expect("white is built in"),
-            }
-        };
-        let setting = Setting::new(&scene, &structure, Mirrors::Attached, vec![wall(3.0), wall(-4.0)])
-            .expect("colors are built in");
-        let sensor = Sensor::new(&scene).expect("white is built in");
-        for index in (0..beam::COUNT).step_by(9) {
-            let shares = sensor.shares(&setting, index);
-            let energy: f64 = shares.iter().map(|s| s.energy).sum();
-            assert!((energy - 1.0).abs() < 1e-12, "beam {index}: {shares:?}");
-            compared += 1;
-            split += usize::from(shares.len() > 1);
-        }
-    }
-    assert!(
-        compared > 4000 && split > 100,
-        "{split} of {compared} beams are split"
-    );
-}
-
-/// A closed room, recorded without boards: stretch 1.
-const ROOM: usize = 1;
-
-/// A laboratory whose second stretch is so many scans of four walls with the noise of Table 2, and nothing else.
-fn noisy_room(scans: u32, edit: impl FnOnce(&mut Scene)) -> Laboratory {
-    let mut scene = scene(BARE);
-    scene.scanner.sub_rays = 1;
-    scene.errors.model = ErrorModel::Empirical;
-    scene.errors.drift_sd_mm = 0.0;
-    scene.errors.quantization_mm = 0.0;
-    scene.experiment.room_scans = scans;
-    scene.experiment.bare_scans = 1;
-    edit(&mut scene);
-    Laboratory::new(&scene, 3).expect("the scene is good")
-}
-
-/// What each reading is off the noise-free range.
-fn errors(laboratory: &Laboratory) -> Vec<f64> {
-    let returns = laboratory.returns(ROOM).expect("colors are built in");
-    let ranges = laboratory.record(ROOM, &returns).ranges;
-    let free: Vec<f64> = returns
-        .iter()
-        .map(|r| r.as_ref().expect("a wall").range())
-        .collect();
-    ranges
-        .iter()
-        .zip(free.iter().cycle())
-        .map(|(r, f)| r - f)
-        .collect()
-}
-
-/// Mean of the products of numbers so many places apart, over n − lag terms.
-fn lagged(z: &[f64], lag: usize) -> f64 {
-    let sum: f64 = z.iter().zip(&z[lag..]).map(|(a, b)| a * b).sum();
-    sum / (z.len() - lag) as f64
-}
-
-/// All six statistics at 99.9 % each; their seed is fixed.
-#[test]
-fn a_million_readings_are_white_and_normal() {
-    const Z: f64 = 3.2905;
-    let laboratory = noisy_room(1000, |_| {});
-    let returns = laboratory.returns(ROOM).expect("colors are built in");
-    let sds: Vec<f64> = returns
-        .iter()
-        .map(|r| r.as_ref().expect("a wall").noise_sd)
-        .collect();
-    let mut z = errors(&laboratory);
-    for (z, sd) in z.iter_mut().zip(sds.iter().cycle()) {
-        *z /= sd;
-    }
-    let n = z.len() as f64;
-    assert!(n > 1e6);
-    let moment = |power: i32| z.iter().map(|z| z.powi(power)).sum::<f64>() / n;
-    assert!((moment(1)).abs() < Z / n.sqrt(), "mean");
-    assert!((moment(2) - 1.0).abs() < Z * (2.0 / n).sqrt(), "variance");
-    assert!((moment(4) - 3.0).abs() < Z * (96.0 / n).sqrt(), "fourth moment");
-    assert!(lagged(&z, 1).abs() < Z / n.sqrt(), "neighbouring beams");
-    assert!(lagged(&z, beam::COUNT).abs() < Z / n.sqrt(), "successive scans");
-    // Kolmogorov and Smirnov: 1.9495/√n is exceeded once in a thousand.
-    z.sort_by(f64::total_cmp);
-    let normal = |x: f64| 0.5 * libm::erfc(-x / std::f64::consts::SQRT_2);
-    let distance = z
-        .iter()
-        .enumerate()
-        .map(|(k, z)| (normal(*z) - (k as f64 + 0.5) / n).abs());
-    let distance = distance.fold(0.0, f64::max) + 0.5 / n;
-    assert!(
-        distance < 1.9495 / n.sqrt(),
-        "distance {distance} from the normal distribution"
-    );
-}
-
-#[test]
-fn without_noise_a_thousand_scans_are_one() {
-    for model in [ErrorModel::None, ErrorModel::Physical, ErrorModel::Both] {
-        let laboratory = noisy_room(1000, |scene| {
-            scene.errors.model = model;
-            scene.errors.noise.sd_mm = vec![0.0; 3];
-            scene.errors.drift_sd_mm = 0.88;
-        });
-        let ranges = laboratory.stretch(ROOM).expect("recorded").ranges;
-        let first = &ranges[..beam::COUNT];
-        assert!(ranges.chunks(beam::COUNT).all(|scan| scan == first), "{model:?}");
-    }
-}
-
-#[test]
-fn correlated_noise_forgets_as_it_is_told_and_is_recomputed_alone() {
-    const Z: f64 = 3.2905;
-    let laboratory = noisy_room(400, |scene| {
-        scene.errors.noise.sd_mm = vec![0.0; 3];
-        scene.errors.correlated = Some(Correlated {
-            sd_mm: 2.0,
-            time_constant_s: 0.1,
-        });
-    });
-    let z: Vec<f64> = errors(&laboratory).iter().map(|e| e / 2e-3).collect();
-    let memory = libm::exp(-0.25_f64);
-    // The sum of products of an AR(1) process at lag k has the variance n·(1 + φ²)/(1 − φ²) or less, for a standard
-    // normal one; twice that at lag 0.
-    let bound = Z * (2.0 * (1.0 + memory * memory) / (1.0 - memory * memory) / z.len() as f64).sqrt();
-    for scans in [0, 1, 2, 8] {
-        let found = lagged(&z, scans * beam::COUNT);
-        let expected = memory.powi(i32::try_from(scans).expect("small"));
-        assert!(
-            (found - expected).abs() < bound,
-            "{found} against {expected} after {scans} scans"
-        );
-    }
-    // The first scan is as wide as all others, and beams know nothing of each other.
-    let first = z[..beam::COUNT].iter().map(|z| z * z).sum::<f64>() / beam::COUNT as f64;
-    assert!(
-        (first - 1.0).abs() < Z * (2.0 / beam::COUNT as f64).sqrt(),
-        "{first}"
-    );
-    assert!(lagged(&z, 1).abs() < bound);
-    let mut in_turn = laboratory.chances(ROOM);
-    let scan_5 = in_turn.nth(5).expect("endless");
-    let alone = laboratory.chances(ROOM).skip_scans(5).next().expect("endless");
-    assert_eq!(scan_5, alone);
-}
-
-#[test]
-fn interference_steps_are_rare_and_even() {
-    let (scans, probability) = (200, 0.01);
-    let laboratory = noisy_room(scans, |scene| {
-        scene.errors.noise.sd_mm = vec![0.0; 3];
-        scene.errors.interference = Some(Interference {
-            step_mm: 150.0,
-            probability,
-        });
-    });
-    let errors = errors(&laboratory);
-    let count = |wanted: f64| errors.iter().filter(|e| (*e - wanted).abs() < 1e-9).count() as f64;
-    let (back, on, none) = (count(-0.15), count(0.15), count(0.0));
-    let n = errors.len() as f64;
-    assert_eq!(back + on + none, n);
-    let bound = 3.2905 * (0.5 * probability * n).sqrt();
-    assert!((back - 0.5 * probability * n).abs() < bound && (on - 0.5 * probability * n).abs() < bound);
 }
 
 /// A scene of the repository, checked as the program checks it, and the stretch with its board.

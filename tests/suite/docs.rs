@@ -489,6 +489,7 @@ fn documented_keys_are_the_keys_of_the_files() {
         "--json",
         "--returns",
         "--readings",
+        "--sub-rays",
     ];
     let output = run(
         folder.path(),
@@ -507,6 +508,19 @@ fn documented_keys_are_the_keys_of_the_files() {
             "a dataset has no {file}"
         );
     }
+    let table = fs::read_to_string(folder.path().join("dataset/truth/sub_rays.csv")).unwrap();
+    let columns: BTreeSet<String> = table
+        .lines()
+        .next()
+        .unwrap()
+        .split(',')
+        .map(str::to_owned)
+        .collect();
+    assert_eq!(
+        first_column(&text, "## sub_rays.csv"),
+        columns,
+        "sub_rays.csv: documented (left) and written (right)"
+    );
     let figures = keys(&json(serde_json::from_str(&stdout(&output))), &[]);
     let section = text
         .split("## simulate --json")

@@ -1,6 +1,7 @@
 //! One binary for all integration tests; each module says what it proves and what it does not.
 #![allow(clippy::unwrap_used, clippy::print_stderr, missing_docs)]
 
+mod bad_geometry;
 mod bad_input;
 mod characterize;
 mod cli;
@@ -10,8 +11,13 @@ mod consistency;
 mod detection;
 mod determinism;
 mod docs;
+mod energy;
+mod noise;
 mod paper;
 mod physics;
 mod pipeline;
+mod properties;
 mod scenes;
+mod sub_rays;
+mod tracing;
 mod traps;

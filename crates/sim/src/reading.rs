@@ -4,10 +4,12 @@
 
 mod receive;
 mod report;
+mod sub_ray;
 
 pub use report::{Chance, MAX_ECHOES};
+pub use sub_ray::{Light as SubRayLight, Stop, SubRayEnd};
 
-use crate::color::{self, Paint};
+use crate::color;
 use crate::detect::{self, Pulse};
 use crate::echo::Receiver;
 use crate::error::SimError;
@@ -18,6 +20,7 @@ use crate::scene::{BeamShape, Detection, EchoChoice, ErrorModel, Errors, Light, 
 use crate::truth::BeamClass;
 use catoptric_model::{BiasTerms, RangeBias, beam};
 use receive::Seen;
+use sub_ray::Arrival;
 
 /// The scanner with everything resolved that does not depend on where it looks.
 pub struct Sensor {
@@ -326,11 +329,17 @@ impl Sensor {
             let ray = footprint::ray(&self.shape, azimuth, sub_ray);
             let path = setting.trace(&ray);
             let chief = sub_ray.wide == 0.0 && sub_ray.narrow == 0.0;
-            self.add_end(&mut parts, setting, sub_ray, &path, chief);
-            for ghost in setting.ghosts(&ray, &path) {
-                self.add_end(&mut parts, setting, sub_ray, &ghost, false);
+            if let Some(arrival) = self.at_end(setting, sub_ray, &path) {
+                self.add(&mut parts, &path, &arrival, chief);
             }
-            self.add_mirrors(&mut parts, setting, sub_ray, &path);
+            for ghost in setting.ghosts(&ray, &path) {
+                if let Some(arrival) = self.at_end(setting, sub_ray, &ghost) {
+                    self.add(&mut parts, &ghost, &arrival, false);
+                }
+            }
+            for arrival in self.on_mirrors(setting, sub_ray, &path) {
+                self.add(&mut parts, &path, &arrival, chief);
+            }
         }
         if self.sub_rays.iter().all(|s| s.wide != 0.0 || s.narrow != 0.0) {
             Self::add_chief(&mut parts, &self.chief_path(setting, beam));
@@ -342,45 +351,10 @@ impl Sensor {
         parts
     }
 
-    /// Adds the light that a sub-ray leaves where its way ends.
-    fn add_end(
-        &self,
-        parts: &mut Vec<Part>,
-        setting: &Setting<'_>,
-        sub_ray: &SubRay,
-        path: &Path,
-        chief: bool,
-    ) {
-        let End::Hit(hit) = path.end else { return };
-        let paint: &Paint = setting.paint(hit.surface);
-        let on = Illumination {
-            reflectivity: paint.reflectivity,
-            cos_incidence: hit.normal.dot(&path.last.direction).abs(),
-            share: sub_ray.weight,
-            range: path.length,
-            mirrors: libm::pow(self.mirror_reflectivity, path.silvered as f64) * path.gain,
-        };
-        self.add_light(parts, (hit.surface, path.facets()), &on, path.gain, chief);
-    }
-
-    /// Adds what the mirrors on a sub-ray's way scatter themselves.
-    fn add_mirrors(&self, parts: &mut Vec<Part>, setting: &Setting<'_>, sub_ray: &SubRay, path: &Path) {
-        let reflectivity = setting.diffuse_reflectivity();
-        if reflectivity == 0.0 {
-            return;
-        }
-        for (count, meeting) in path.meetings().enumerate() {
-            let on = Illumination {
-                reflectivity,
-                cos_incidence: meeting.cos_incidence.max(0.0),
-                share: sub_ray.weight,
-                range: meeting.length,
-                mirrors: libm::pow(self.mirror_reflectivity, meeting.silvered as f64) * meeting.gain,
-            };
-            let chief = sub_ray.wide == 0.0 && sub_ray.narrow == 0.0;
-            let way = (meeting.surface, &path.facets()[..count]);
-            self.add_light(parts, way, &on, reflectivity * meeting.gain, chief);
-        }
+    /// Adds the light of a sub-ray that reaches a surface on its way.
+    fn add(&self, parts: &mut Vec<Part>, path: &Path, arrival: &Arrival, chief: bool) {
+        let way = (arrival.surface, &path.facets()[..arrival.bounces]);
+        self.add_light(parts, way, &arrival.on, arrival.gain, chief);
     }
 
     /// Adds light to the part of a surface and the facets on the way there; `gain` is what is left of its energy.

@@ -1,6 +1,6 @@
 //! The scanner's presets: numbers from data sheets, and from Cooper's Table 1.
 
-use crate::scene::{BeamShape, Limits, Preset, Scanner};
+use crate::scene::{BeamShape, HousingBox, Limits, Preset, Scanner};
 
 /// What the UST-20LX reports (data sheet): 40 Hz, 20 m, one echo. It vouches for 60 mm on, but reports ranges from
 /// 21 mm on.
@@ -11,7 +11,8 @@ pub const UST_20LX: Limits = Limits {
     echoes: 1,
 };
 
-/// What the UTM-30LX-EW reports (data sheet): 40 Hz, 0.1 to 30 m, three echoes.
+/// What the UTM-30LX-EW reports (data sheet): a scan in 25 ms, 0.1 to 30 m, up to three echoes of a beam, 905 nm. That it
+/// reports nothing nearer than the 0.1 m it vouches for is assumed.
 pub const UTM_30LX_EW: Limits = Limits {
     range_min_m: 0.1,
     range_max_m: 30.0,
@@ -22,11 +23,30 @@ pub const UTM_30LX_EW: Limits = Limits {
 /// Steps of a turn of which a scan takes its beams.
 const STEPS_PER_TURN: f64 = 1440.0;
 
-/// Boxes of the scanner's housing in the sensor frame, center and size in millimetres: the body below the window and
-/// the cap above it. The UST-20LX is 50 × 50 × 70 mm; how it is divided around the scan plane is assumed.
-pub const HOUSING_MM: [([f64; 3], [f64; 3]); 2] = [
-    ([0.0, 0.0, -32.0], [50.0, 50.0, 36.0]),
-    ([0.0, 0.0, 16.0], [40.0, 40.0, 8.0]),
+/// Housing of the UST-20LX in the sensor frame: the body below the window and the cap above it. It is 50 × 50 × 70 mm
+/// (data sheet); how it is divided around the scan plane is assumed.
+pub const UST_20LX_HOUSING: [HousingBox; 2] = [
+    HousingBox {
+        center_mm: [0.0, 0.0, -32.0],
+        size_mm: [50.0, 50.0, 36.0],
+    },
+    HousingBox {
+        center_mm: [0.0, 0.0, 16.0],
+        size_mm: [40.0, 40.0, 8.0],
+    },
+];
+
+/// Housing of the UTM-30LX-EW, likewise: 62 × 62 × 87.5 mm (data sheet). The scan plane 55 mm above its foot is the one of
+/// common robot models of the UTM-30LX; the window, as high as the UST-20LX's, and the cap's width are assumed.
+pub const UTM_30LX_EW_HOUSING: [HousingBox; 2] = [
+    HousingBox {
+        center_mm: [0.0, 0.0, -34.5],
+        size_mm: [62.0, 62.0, 41.0],
+    },
+    HousingBox {
+        center_mm: [0.0, 0.0, 22.25],
+        size_mm: [50.0, 50.0, 20.5],
+    },
 ];
 
 impl Preset {
@@ -45,6 +65,14 @@ impl Preset {
         match self {
             Self::Ust20lx | Self::Ust20lxCooper | Self::Custom => UST_20LX,
             Self::Utm30lxEw => UTM_30LX_EW,
+        }
+    }
+
+    /// Boxes of its housing in the sensor frame. A custom scanner that gives none has the UST-20LX's.
+    pub fn housing(self) -> &'static [HousingBox] {
+        match self {
+            Self::Ust20lx | Self::Ust20lxCooper | Self::Custom => &UST_20LX_HOUSING,
+            Self::Utm30lxEw => &UTM_30LX_EW_HOUSING,
         }
     }
 
@@ -80,6 +108,15 @@ impl Scanner {
         self.beam.unwrap_or_else(|| self.preset.beam_shape())
     }
 
+    /// Boxes of the housing in the sensor frame: none, the scene's, or else the preset's.
+    pub fn housing_boxes(&self) -> &[HousingBox] {
+        match (self.housing, &self.housing_box) {
+            (false, _) => &[],
+            (true, Some(boxes)) => boxes,
+            (true, None) => self.preset.housing(),
+        }
+    }
+
     /// What it can report: the scene's for a scanner of one's own, or else the preset's.
     pub fn limits(&self) -> Limits {
         match self.preset {
@@ -104,5 +141,65 @@ impl Limits {
     /// Time between two beams of a scan, in seconds.
     pub fn step_period_s(&self) -> f64 {
         self.scan_period_s() / STEPS_PER_TURN
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Mount;
+
+    /// Extents of all boxes together.
+    fn extents(boxes: &[HousingBox]) -> [f64; 3] {
+        [0, 1, 2].map(|axis| {
+            let end = |sign: f64| {
+                let ends = boxes
+                    .iter()
+                    .map(|b| b.center_mm[axis] + sign * 0.5 * b.size_mm[axis]);
+                ends.map(|e| sign * e).fold(f64::NEG_INFINITY, f64::max)
+            };
+            end(1.0) + end(-1.0)
+        })
+    }
+
+    #[test]
+    fn housings_are_as_large_as_their_data_sheets_say_and_leave_the_scan_plane_free() {
+        for (preset, size) in [
+            (Preset::Ust20lx, [50.0, 50.0, 70.0]),
+            (Preset::Ust20lxCooper, [50.0, 50.0, 70.0]),
+            (Preset::Utm30lxEw, [62.0, 62.0, 87.5]),
+        ] {
+            assert_eq!(extents(preset.housing()), size, "{preset:?}");
+            for part in preset.housing() {
+                assert!(
+                    part.center_mm[2].abs() > 0.5 * part.size_mm[2] + 10.0,
+                    "{preset:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_scene_can_have_no_housing_its_own_or_the_presets() {
+        let own = HousingBox {
+            center_mm: [0.0, 0.0, -40.0],
+            size_mm: [60.0, 60.0, 50.0],
+        };
+        let boxes = |preset, housing, housing_box: Option<Vec<HousingBox>>| {
+            let scanner = Scanner {
+                preset,
+                sub_rays: 1,
+                beam: None,
+                custom: None,
+                housing,
+                housing_box,
+                mount: Mount::default(),
+            };
+            scanner.housing_boxes().to_vec()
+        };
+        assert!(boxes(Preset::Utm30lxEw, false, None).is_empty());
+        assert_eq!(boxes(Preset::Utm30lxEw, true, None), UTM_30LX_EW_HOUSING);
+        assert_eq!(boxes(Preset::Custom, true, None), UST_20LX_HOUSING);
+        assert_eq!(boxes(Preset::Custom, true, Some(vec![own])), [own]);
     }
 }

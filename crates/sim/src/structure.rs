@@ -8,7 +8,6 @@ use crate::cast::{Block, Cylinder, Polygon, Shape, Triangles};
 use crate::error::SimError;
 use crate::layout;
 use crate::noise::{Draws, Purpose};
-use crate::scanner::HOUSING_MM;
 use crate::scene::{Facet, Glass, MeshShape, Post, PostShape, Scene};
 use catoptric_model::Pose;
 use catoptric_model::frame::yaw_pitch_roll;
@@ -358,22 +357,20 @@ fn parts(scene: &Scene, sensor_from_drawing: &Pose) -> Result<Vec<Part>, SimErro
             })
         })
         .collect::<Result<_, SimError>>()?;
-    if scene.scanner.housing {
-        parts.extend(HOUSING_MM.iter().map(|&(center, size)| {
-            let place = Pose::from_parts(
-                Translation3::from(Vector3::from(center) * 1e-3),
-                UnitQuaternion::identity(),
-            );
-            Part {
-                name: "housing".to_owned(),
-                shape: Shape::Block(Block::new(
-                    sensor_from_drawing * place,
-                    Vector3::from(size) * 1e-3,
-                )),
-                color: "structure".to_owned(),
-            }
-        }));
-    }
+    parts.extend(scene.scanner.housing_boxes().iter().map(|part| {
+        let place = Pose::from_parts(
+            Translation3::from(Vector3::from(part.center_mm) * 1e-3),
+            UnitQuaternion::identity(),
+        );
+        Part {
+            name: "housing".to_owned(),
+            shape: Shape::Block(Block::new(
+                sensor_from_drawing * place,
+                Vector3::from(part.size_mm) * 1e-3,
+            )),
+            color: "structure".to_owned(),
+        }
+    }));
     Ok(parts)
 }
 

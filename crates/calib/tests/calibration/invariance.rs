@@ -1,6 +1,6 @@
 //! What must not change an answer, and what must change only its covariance.
 
-use crate::synthetic::World;
+use crate::synthetic::{Draw, World};
 use catoptric_calib::{Method, Options, calibrate};
 use catoptric_model::{Calibration, Dataset};
 
@@ -8,17 +8,38 @@ fn solve(dataset: &Dataset) -> Calibration {
     calibrate(dataset, Method::Beam, &Options::default()).expect("a sound dataset")
 }
 
+/// A random order of a list.
+fn shuffle<T>(list: &mut [T], draw: &mut Draw) {
+    for last in (1..list.len()).rev() {
+        // Truncation picks a place evenly.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        list.swap(last, (draw.uniform() * (last as f64 + 1.0)) as usize);
+    }
+}
+
 #[test]
-fn the_order_of_poses_does_not_matter() {
+fn the_order_of_poses_and_facets_does_not_matter() {
     let mut made = World::noisy(7).make();
-    let forward = solve(&made.dataset);
-    made.dataset.poses.reverse();
-    let backward = solve(&made.dataset);
-    for (a, b) in forward.beams.iter().zip(&backward.beams) {
-        assert_eq!(a.status, b.status);
-        if let (Some(x), Some(y)) = (a.deflection(), b.deflection()) {
-            assert!((x.azimuth - y.azimuth).abs() < 1e-12 && (x.elevation - y.elevation).abs() < 1e-12);
+    let straight = solve(&made.dataset);
+    let mut draw = Draw(3);
+    for round in 0..4 {
+        if round == 0 {
+            made.dataset.poses.reverse();
+        } else {
+            shuffle(&mut made.dataset.poses, &mut draw);
+            shuffle(&mut made.dataset.session.facets, &mut draw);
         }
+        let shuffled = solve(&made.dataset);
+        let mut compared = 0;
+        for (a, b) in straight.beams.iter().zip(&shuffled.beams) {
+            assert_eq!((a.beam, a.status, &a.facet), (b.beam, b.status, &b.facet));
+            if let (Some(x), Some(y)) = (a.deflection(), b.deflection()) {
+                // Sums in another order.
+                assert!((x.azimuth - y.azimuth).abs() < 1e-12 && (x.elevation - y.elevation).abs() < 1e-12);
+                compared += 1;
+            }
+        }
+        assert!(compared > 40, "{compared} elements are solved");
     }
 }
 
@@ -51,6 +72,49 @@ fn twice_the_readings_halve_the_noise_covariance_and_not_the_whole() {
         let ratio = trace(b.covariance_rad2) / trace(a.covariance_rad2);
         assert!(ratio > 0.55 && ratio < 1.0, "beam {}: {ratio}", a.beam);
     }
+}
+
+/// Noise is all there is here: no drift, no error of markers, tables or distances, nothing known of the mounting before.
+/// Whatever else is believed in does not shrink with readings, and the covariance would not halve.
+#[test]
+fn with_noise_alone_twice_the_readings_halve_the_whole_covariance() {
+    let mut made = World {
+        drift_mm: 0.0,
+        marker_mm: 0.0,
+        distance_bias_sd_mm: 0.0,
+        angle_gain_sd_mm: 0.0,
+        color_bias_sd_mm: 0.0,
+        distance_sd_mm: 0.0,
+        ..World::noisy(11)
+    }
+    .make();
+    let session = &mut made.dataset.session;
+    session.believed.range_noise_sd_mm = 8.0;
+    session.mount_tolerance.rotation_sd_deg = [1e4; 3];
+    session.mount_tolerance.translation_sd_mm = [1e6; 3];
+    let once = solve(&made.dataset);
+    for pose in &mut made.dataset.poses {
+        pose.ranges.extend_from_within(..);
+        pose.label.scans *= 2;
+    }
+    let twice = solve(&made.dataset);
+    let mut worst: f64 = 0.0;
+    let mut compared = 0;
+    for (a, b) in once.beams.iter().zip(&twice.beams) {
+        assert_eq!(a.status, b.status);
+        let (Some(x), Some(y)) = (a.covariance_rad2, b.covariance_rad2) else {
+            continue;
+        };
+        let entries = x.iter().flatten().zip(y.iter().flatten());
+        worst = entries
+            .map(|(p, q)| (0.5 * p - q).abs() / (x[0][0] + x[1][1]))
+            .fold(worst, f64::max);
+        compared += 1;
+    }
+    assert!(
+        compared > 40 && worst < 1e-9,
+        "{compared} elements, {worst} off at worst"
+    );
 }
 
 #[test]

@@ -4,7 +4,7 @@ use super::outline::{Face, Meets, Obstacles};
 use super::values::distinct;
 use super::{Findings, Path};
 use crate::layout;
-use crate::scene::{Facet, FacetShape, Marker, RectangleShape, Scene, Wedge};
+use crate::scene::{Facet, FacetShape, Marker, RectangleShape, Scanner, Scene, Wedge};
 use catoptric_model::beam;
 use nalgebra::{Point3, Unit, Vector3};
 
@@ -69,6 +69,7 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
             );
         }
     }
+    check_housing(&scene.scanner, found);
     let path = structure.key("marker");
     check_markers(&scene.superstructure.marker, &path, "the rig", found);
     for (i, board) in scene.board.iter().enumerate() {
@@ -76,6 +77,28 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
         if !board.marker.is_empty() {
             let path = Path::of("board").index(i).key("marker");
             check_markers(&board.marker, &path, &format!("board {:?}", board.name), found);
+        }
+    }
+}
+
+fn check_housing(scanner: &Scanner, found: &mut Findings) {
+    let path = Path::of("scanner").key("housing_box");
+    let boxes = scanner.housing_box.as_deref().unwrap_or_default();
+    if !scanner.housing && !boxes.is_empty() {
+        found.add(
+            &path,
+            "describes a housing, and `scanner.housing` is false",
+            "leave out one of the two".to_owned(),
+        );
+    }
+    for (i, part) in boxes.iter().enumerate() {
+        let holds = |axis: usize| part.center_mm[axis].abs() <= 0.5 * part.size_mm[axis];
+        if holds(0) && holds(1) && holds(2) {
+            found.add(
+                &path.index(i).key("center_mm"),
+                "puts a box of the housing over the origin of the scanner; no beam could leave",
+                "the scan plane is z = 0: leave a window there".to_owned(),
+            );
         }
     }
 }

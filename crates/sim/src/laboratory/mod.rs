@@ -125,6 +125,11 @@ impl Laboratory {
         self.planned.iter().map(|p| p.scans).sum()
     }
 
+    /// The scanner.
+    pub fn sensor(&self) -> &Sensor {
+        &self.sensor
+    }
+
     /// Sub-rays of a beam.
     pub fn sub_rays(&self) -> usize {
         self.sensor.sub_rays()
@@ -167,23 +172,31 @@ impl Laboratory {
         Ok(targets)
     }
 
-    /// What every beam meets during a stretch: traced once, since nothing moves.
+    /// What light can meet during a stretch.
     ///
     /// # Errors
     /// An unknown color.
-    pub fn returns(&self, number: usize) -> Result<Returns, SimError> {
+    pub fn setting(&self, number: usize) -> Result<Setting<'_>, SimError> {
         let mirrors = if self.planned[number].kind == PoseKind::Bare {
             Mirrors::Removed
         } else {
             Mirrors::Attached
         };
-        let setting = Setting::in_room(
+        Setting::in_room(
             &self.scene,
             &self.structure,
             mirrors,
             Some(&self.stage),
             self.targets(number)?,
-        )?;
+        )
+    }
+
+    /// What every beam meets during a stretch: traced once, since nothing moves.
+    ///
+    /// # Errors
+    /// An unknown color.
+    pub fn returns(&self, number: usize) -> Result<Returns, SimError> {
+        let setting = self.setting(number)?;
         Ok((0..beam::COUNT)
             .into_par_iter()
             .map(|b| self.sensor.observe(&setting, b))

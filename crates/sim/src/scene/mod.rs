@@ -18,7 +18,7 @@ pub use body::{
 pub use detection::{Detection, Detector, EchoChoice, Principle};
 pub use errors::{Characterization, Correlated, ErrorModel, Errors, Interference, NoiseTable, WarmUp};
 pub use room::{Board, BoardPose, Color, Experiment, Mocap, MocapProfile, Room};
-pub use scanner::{BeamShape, Light, Limits, Mount, Preset, Scanner};
+pub use scanner::{BeamShape, HousingBox, Light, Limits, Mount, Preset, Scanner};
 pub use superstructure::{
     AsBuilt, Facet, FacetShape, Glass, Marker, Mirror, PolygonShape, Post, RectangleShape, Superstructure,
     Wedge,
@@ -95,6 +95,7 @@ fn ust_20lx() -> Scanner {
         beam: None,
         custom: None,
         housing: true,
+        housing_box: None,
         mount: Mount::default(),
     }
 }

@@ -36,9 +36,12 @@ pub struct Scanner {
     /// Limits of a scanner of one's own, with the preset "custom".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub custom: Option<Limits>,
-    /// Whether the scanner's own housing, for every preset that of the UST-20LX, stands in the way of deflected beams.
+    /// Whether the scanner's own housing stands in the way of deflected beams.
     #[serde(default = "yes")]
     pub housing: bool,
+    /// Boxes of the housing, instead of the preset's; that of a custom scanner is the UST-20LX's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub housing_box: Option<Vec<HousingBox>>,
     /// Where the sensor sits in the rig body.
     #[serde(default)]
     pub mount: Mount,
@@ -93,6 +96,17 @@ pub struct BeamShape {
     /// Whether the ellipse turns with the azimuth, as behind a spinning 45° mirror.
     #[serde(default = "yes")]
     pub turns: bool,
+}
+
+/// A box of the scanner's housing, its sides along the axes of the sensor frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HousingBox {
+    /// Its center in the sensor frame, in millimetres; the scan plane is z = 0.
+    pub center_mm: [f64; 3],
+    /// Its extents, in millimetres.
+    #[schemars(inner(range(min = 0.01, max = 1000.0)))]
+    pub size_mm: [f64; 3],
 }
 
 /// Where the sensor sits in the rig body: the drawing, and how far the real one may be from it.

@@ -1,0 +1,150 @@
+//! What is by chance in readings: its moments, its distribution, and what it shares with other readings.
+//!
+//! Seeds are fixed and bounds are those of 99.9 %. None of this proves that a real scanner's noise is like that.
+
+use crate::scenes::{BARE, scene};
+use catoptric::model::beam;
+use catoptric::sim::scene::{Correlated, ErrorModel, Interference};
+use catoptric::sim::{Laboratory, Scene};
+
+/// A closed room, recorded without boards: stretch 1.
+const ROOM: usize = 1;
+
+/// A laboratory whose second stretch is so many scans of four walls with the noise of Table 2, and nothing else.
+fn noisy_room(scans: u32, edit: impl FnOnce(&mut Scene)) -> Laboratory {
+    let mut scene = scene(BARE);
+    scene.scanner.sub_rays = 1;
+    scene.errors.model = ErrorModel::Empirical;
+    scene.errors.drift_sd_mm = 0.0;
+    scene.errors.quantization_mm = 0.0;
+    scene.experiment.room_scans = scans;
+    scene.experiment.bare_scans = 1;
+    edit(&mut scene);
+    Laboratory::new(&scene, 3).expect("the scene is good")
+}
+
+/// What each reading is off the noise-free range.
+fn errors(laboratory: &Laboratory) -> Vec<f64> {
+    let returns = laboratory.returns(ROOM).expect("colors are built in");
+    let ranges = laboratory.record(ROOM, &returns).ranges;
+    let free: Vec<f64> = returns
+        .iter()
+        .map(|r| r.as_ref().expect("a wall").range())
+        .collect();
+    ranges
+        .iter()
+        .zip(free.iter().cycle())
+        .map(|(r, f)| r - f)
+        .collect()
+}
+
+/// Mean of the products of numbers so many places apart, over n − lag terms.
+fn lagged(z: &[f64], lag: usize) -> f64 {
+    let sum: f64 = z.iter().zip(&z[lag..]).map(|(a, b)| a * b).sum();
+    sum / (z.len() - lag) as f64
+}
+
+/// All six statistics at 99.9 % each; their seed is fixed.
+#[test]
+fn a_million_readings_are_white_and_normal() {
+    const Z: f64 = 3.2905;
+    let laboratory = noisy_room(1000, |_| {});
+    let returns = laboratory.returns(ROOM).expect("colors are built in");
+    let sds: Vec<f64> = returns
+        .iter()
+        .map(|r| r.as_ref().expect("a wall").noise_sd)
+        .collect();
+    let mut z = errors(&laboratory);
+    for (z, sd) in z.iter_mut().zip(sds.iter().cycle()) {
+        *z /= sd;
+    }
+    let n = z.len() as f64;
+    assert!(n > 1e6);
+    let moment = |power: i32| z.iter().map(|z| z.powi(power)).sum::<f64>() / n;
+    assert!((moment(1)).abs() < Z / n.sqrt(), "mean");
+    assert!((moment(2) - 1.0).abs() < Z * (2.0 / n).sqrt(), "variance");
+    assert!((moment(4) - 3.0).abs() < Z * (96.0 / n).sqrt(), "fourth moment");
+    assert!(lagged(&z, 1).abs() < Z / n.sqrt(), "neighbouring beams");
+    assert!(lagged(&z, beam::COUNT).abs() < Z / n.sqrt(), "successive scans");
+    // Kolmogorov and Smirnov: 1.9495/√n is exceeded once in a thousand.
+    z.sort_by(f64::total_cmp);
+    let normal = |x: f64| 0.5 * libm::erfc(-x / std::f64::consts::SQRT_2);
+    let distance = z
+        .iter()
+        .enumerate()
+        .map(|(k, z)| (normal(*z) - (k as f64 + 0.5) / n).abs());
+    let distance = distance.fold(0.0, f64::max) + 0.5 / n;
+    assert!(
+        distance < 1.9495 / n.sqrt(),
+        "distance {distance} from the normal distribution"
+    );
+}
+
+#[test]
+fn without_noise_a_thousand_scans_are_one() {
+    for model in [ErrorModel::None, ErrorModel::Physical, ErrorModel::Both] {
+        let laboratory = noisy_room(1000, |scene| {
+            scene.errors.model = model;
+            scene.errors.noise.sd_mm = vec![0.0; 3];
+            scene.errors.drift_sd_mm = 0.88;
+        });
+        let ranges = laboratory.stretch(ROOM).expect("recorded").ranges;
+        let first = &ranges[..beam::COUNT];
+        assert!(ranges.chunks(beam::COUNT).all(|scan| scan == first), "{model:?}");
+    }
+}
+
+#[test]
+fn correlated_noise_forgets_as_it_is_told_and_is_recomputed_alone() {
+    const Z: f64 = 3.2905;
+    let laboratory = noisy_room(400, |scene| {
+        scene.errors.noise.sd_mm = vec![0.0; 3];
+        scene.errors.correlated = Some(Correlated {
+            sd_mm: 2.0,
+            time_constant_s: 0.1,
+        });
+    });
+    let z: Vec<f64> = errors(&laboratory).iter().map(|e| e / 2e-3).collect();
+    let memory = libm::exp(-0.25_f64);
+    // The sum of products of an AR(1) process at lag k has the variance n·(1 + φ²)/(1 − φ²) or less, for a standard
+    // normal one; twice that at lag 0.
+    let bound = Z * (2.0 * (1.0 + memory * memory) / (1.0 - memory * memory) / z.len() as f64).sqrt();
+    for scans in [0, 1, 2, 8] {
+        let found = lagged(&z, scans * beam::COUNT);
+        let expected = memory.powi(i32::try_from(scans).expect("small"));
+        assert!(
+            (found - expected).abs() < bound,
+            "{found} against {expected} after {scans} scans"
+        );
+    }
+    // The first scan is as wide as all others, and beams know nothing of each other.
+    let first = z[..beam::COUNT].iter().map(|z| z * z).sum::<f64>() / beam::COUNT as f64;
+    assert!(
+        (first - 1.0).abs() < Z * (2.0 / beam::COUNT as f64).sqrt(),
+        "{first}"
+    );
+    assert!(lagged(&z, 1).abs() < bound);
+    let mut in_turn = laboratory.chances(ROOM);
+    let scan_5 = in_turn.nth(5).expect("endless");
+    let alone = laboratory.chances(ROOM).skip_scans(5).next().expect("endless");
+    assert_eq!(scan_5, alone);
+}
+
+#[test]
+fn interference_steps_are_rare_and_even() {
+    let (scans, probability) = (200, 0.01);
+    let laboratory = noisy_room(scans, |scene| {
+        scene.errors.noise.sd_mm = vec![0.0; 3];
+        scene.errors.interference = Some(Interference {
+            step_mm: 150.0,
+            probability,
+        });
+    });
+    let errors = errors(&laboratory);
+    let count = |wanted: f64| errors.iter().filter(|e| (*e - wanted).abs() < 1e-9).count() as f64;
+    let (back, on, none) = (count(-0.15), count(0.15), count(0.0));
+    let n = errors.len() as f64;
+    assert_eq!(back + on + none, n);
+    let bound = 3.2905 * (0.5 * probability * n).sqrt();
+    assert!((back - 0.5 * probability * n).abs() < bound && (on - 0.5 * probability * n).abs() < bound);
+}
