@@ -36,6 +36,7 @@ pub mod dataset;
 pub mod error;
 pub mod frame;
 pub mod mirror;
+pub mod motion;
 pub mod range;
 pub mod session;
 
@@ -47,5 +48,6 @@ pub use dataset::{Dataset, PoseKind, PoseLabel, PoseRecord, Stretch, Summary, Tr
 pub use error::ModelError;
 pub use frame::{Pose, PoseData};
 pub use mirror::MirrorPlane;
+pub use motion::Motion;
 pub use range::{CorrectedRange, RawRange};
 pub use session::Session;
