@@ -23,6 +23,7 @@ pub mod scene;
 pub mod stage;
 pub mod structure;
 pub mod trace;
+pub mod trajectory;
 pub mod truth;
 
 pub use error::SimError;

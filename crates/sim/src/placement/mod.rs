@@ -33,6 +33,8 @@ pub struct Planned {
     pub beams: Option<[usize; 2]>,
     /// The board, by its index, and where it is meant to stand.
     pub board: Option<(usize, Pose)>,
+    /// The flight, by its index.
+    pub flight: Option<usize>,
 }
 
 /// Where rig and nominal sensor stand in the room.
@@ -43,11 +45,26 @@ pub fn room_from_rig(room: &Room) -> Pose {
     )
 }
 
-/// The whole procedure: bare structure, empty room, boards before undeflected beams, boards before every facet.
+/// The whole procedure: bare structure, empty room, boards before undeflected beams, boards before every facet, flights.
 ///
 /// # Errors
 /// [`SimError::Placement`] where a board fits nowhere, [`SimError::UnknownName`] for a pose that refers to nothing.
 pub fn plan(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
+    let mut planned = procedure(scene, sensor)?;
+    let scan_period_s = scene.scanner.limits().scan_period_s();
+    planned.extend(scene.flight.iter().enumerate().map(|(index, flight)| Planned {
+        kind: PoseKind::Flight,
+        scans: flight.scans(scan_period_s),
+        facet: None,
+        beams: None,
+        board: None,
+        flight: Some(index),
+    }));
+    Ok(planned)
+}
+
+/// Everything but flights.
+fn procedure(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
     let structure = Structure::nominal(scene)?;
     let setting = Setting::new(scene, &structure, Mirrors::Attached, Vec::new())?;
     let room_from_sensor = room_from_rig(&scene.room) * structure::nominal_mount(scene);
@@ -60,11 +77,17 @@ pub fn plan(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
         facet: None,
         beams: None,
         board: None,
+        flight: None,
     };
-    let mut planned = vec![
-        without_board(PoseKind::Bare, experiment.bare_scans),
-        without_board(PoseKind::Room, experiment.room_scans),
-    ];
+    let mut planned = Vec::new();
+    let drawn = &scene.superstructure;
+    // Who only flies measures no structure that is not there.
+    if scene.flight.is_empty() || !(drawn.facet.is_empty() && drawn.post.is_empty()) {
+        planned.push(without_board(PoseKind::Bare, experiment.bare_scans));
+    }
+    if scene.room.has_walls() {
+        planned.push(without_board(PoseKind::Room, experiment.room_scans));
+    }
     if !experiment.pose.is_empty() {
         for (index, pose) in experiment.pose.iter().enumerate() {
             planned.push(given(scene, &paths, pose, index)?);
@@ -90,6 +113,7 @@ pub fn plan(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
             facet: None,
             beams: Some([first, last]),
             board: Some((board, pose)),
+            flight: None,
         });
     }
     for (number, (facet, first, last)) in facet_groups(
@@ -118,6 +142,7 @@ pub fn plan(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
                 facet: Some(facet),
                 beams: Some([first, last]),
                 board: Some((board, pose)),
+                flight: None,
             });
         }
     }
@@ -171,5 +196,6 @@ fn given(scene: &Scene, paths: &[Path], pose: &BoardPose, index: usize) -> Resul
         facet,
         beams,
         board: Some((board, level * turn)),
+        flight: None,
     })
 }
