@@ -9,6 +9,7 @@ mod consistency;
 mod detection;
 mod determinism;
 mod docs;
+mod motion;
 mod paper;
 mod physics;
 mod pipeline;
