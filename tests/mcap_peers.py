@@ -245,7 +245,12 @@ def check_stretch(label, messages, session, templates):
     seen = {subject for at in poses.values() for subject in at}
     check("rig" in seen, f"{where}: the rig was never tracked")
     check(label.get("board", "rig") in seen, f"{where}: board {label.get('board')!r} was never tracked")
-    check(len(grouped["/tf"]) == 1, f"{where}: {len(grouped['/tf'])} messages on /tf, not 1")
+    expected = len(grouped["/mocap/rig"]) if label["kind"] == "flight" else 1
+    check(len(grouped["/tf"]) == expected, f"{where}: {len(grouped['/tf'])} messages on /tf, not {expected}")
+    for (time, message), (_, seen_then) in zip(grouped["/tf"][1:], grouped["/mocap/rig"][1:]):
+        (t,) = message["transforms"]
+        off = np.abs(vector(t["transform"]["translation"]) - vector(seen_then["pose"]["position"])).max()
+        check(t["child_frame_id"] == "rig" and off == 0, f"{where}: /tf at {time} is not where the rig was seen")
     placed = {t["child_frame_id"] for t in grouped["/tf"][0][1]["transforms"]}
     check(placed == seen, f"{where}: /tf places {sorted(placed)}, motion capture saw {sorted(seen)}")
     for t in grouped["/tf"][0][1]["transforms"]:

@@ -1,6 +1,8 @@
 //! From the readings of a stretch to points in space: Cooper, Eqs. (9) and (10), with a calibration.
 
 use crate::score::residual;
+#[cfg(doc)]
+use catoptric_model::Motion;
 use catoptric_model::{Calibration, Dataset, Deflection, Pose, PoseKind, PoseRecord, Status, beam, cloud};
 use nalgebra::Point3;
 
@@ -84,6 +86,9 @@ pub enum ApplyError {
 /// corrected by E_r and by E_c of the room's color (of the board's, in a stretch with a board), as calibrated or
 /// believed. Unlike the paper's Eq. 3, E_a is not taken off: the incidence on an unknown scene is unknown.
 ///
+/// In a flight the rig is where motion capture saw it at each reading's own time (see [`Motion::room_from_rig`]); sensor
+/// and rig frame are those of that time, too.
+///
 /// # Errors
 /// [`ApplyError`] if there is no such stretch.
 pub fn apply(
@@ -94,17 +99,22 @@ pub fn apply(
 ) -> Result<PointCloud, ApplyError> {
     let record = find(dataset, pose)?;
     let rig_from_sensor = residual::mount(dataset, calibration);
-    let frame_from_sensor = match frame {
+    let step_period_s = dataset.session.scanner.step_period_s();
+    let room_from_rig = |scan, beam| {
+        let motion = record.motion.as_ref();
+        motion
+            .and_then(|m| m.room_from_rig(m.time_s(scan, beam, step_period_s)))
+            .unwrap_or(record.room_from_rig)
+    };
+    let frame_from_sensor = |scan, beam| match frame {
         CloudFrame::Sensor => Pose::identity(),
         CloudFrame::Rig => rig_from_sensor,
-        CloudFrame::Room => record.room_from_rig * rig_from_sensor,
+        CloudFrame::Room => room_from_rig(scan, beam) * rig_from_sensor,
     };
     let bias = residual::bias(dataset, calibration);
-    let color = record
-        .label
-        .color
-        .as_deref()
-        .unwrap_or(&dataset.session.room.color);
+    // Nothing is believed about a color without a name.
+    let room_color = dataset.session.room.as_ref().map_or("", |room| &room.color);
+    let color = record.label.color.as_deref().unwrap_or(room_color);
     let deflections: Vec<Option<Deflection>> =
         (0..record.beams).map(|b| deflection(calibration, b)).collect();
 
@@ -132,7 +142,7 @@ pub fn apply(
             let corrected = range - terms.distance - terms.color;
             let in_sensor = cloud::lift(deflection, beam::azimuth(beam), corrected);
             result.points.push(CloudPoint {
-                position: frame_from_sensor * in_sensor,
+                position: frame_from_sensor(scan, beam) * in_sensor,
                 beam,
                 scan,
             });

@@ -6,7 +6,7 @@ use catoptric_model::{ColorBias, DistanceBias, RangeBias};
 
 /// Distance of a point from the nearest wall, in metres.
 fn off_wall(dataset: &Dataset, p: &Point3<f64>) -> f64 {
-    let room = &dataset.session.room;
+    let room = dataset.session.room.as_ref().expect("the sample has walls");
     (0..3)
         .flat_map(|i| [(p[i] - room.min_m[i]).abs(), (p[i] - room.max_m[i]).abs()])
         .fold(f64::INFINITY, f64::min)

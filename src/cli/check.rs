@@ -29,15 +29,17 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let outline = outline(&scene);
     // Setting the experiment up finds what no single value shows: a board that fits nowhere.
     let laboratory = Laboratory::new(&scene, scene.seed)?;
-    // The bare structure and the empty room are stretches without a board.
-    let poses = laboratory.stretches().saturating_sub(2);
+    let flights = match scene.flight.len() {
+        0 => String::new(),
+        flights => format!(", {}", counted(flights, "flight")),
+    };
     let mut text = format!(
-        "ok: {}: {}{}, {}, {}, {}, {}\n",
+        "ok: {}: {}{}, {}, {}{flights}, {}, {}\n",
         scene.name,
         counted(outline.facets.len(), "facet"),
         served(&outline),
         counted(scene.board.len(), "board"),
-        counted(poses, "pose"),
+        counted(laboratory.board_poses(), "pose"),
         counted(laboratory.scans(), "scan"),
         counted(laboratory.scans() * beam::COUNT, "reading"),
     );

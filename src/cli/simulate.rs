@@ -8,7 +8,7 @@ use super::progress::Progress;
 use super::sub_rays;
 use catoptric::io::{self, DatasetWriter, IoError, Provenance, dataset, scene};
 use catoptric::model::{Stretch, beam};
-use catoptric::sim::laboratory::Returns;
+use catoptric::sim::laboratory::{Returns, Sight};
 use catoptric::sim::optics::Role;
 use catoptric::sim::reading::Return;
 use catoptric::sim::scene::ErrorModel;
@@ -16,6 +16,7 @@ use catoptric::sim::{Laboratory, Scene, SimError, noise};
 use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
+use std::borrow::Cow;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -199,14 +200,14 @@ pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Fig
     let all: Vec<usize> = (0..laboratory.stretches()).collect();
     for window in all.chunks(WINDOW_PER_THREAD * figures.threads) {
         interrupt::check()?;
-        let recorded: Vec<Recorded> = window
+        let recorded: Vec<Recorded<'_>> = window
             .par_iter()
             .map(|number| Recorded::of(&laboratory, *number))
             .collect::<Result<_, SimError>>()?;
         for (number, recorded) in window.iter().zip(&recorded) {
             figures.trace_s += recorded.trace.as_secs_f64();
             figures.sample_s += recorded.sample.as_secs_f64();
-            figures.segments += figures.sub_rays * segments(&recorded.returns);
+            figures.segments += figures.sub_rays * recorded.segments;
             timed(&mut || {
                 writer.write_stretch(&recorded.stretch)?;
                 for (file, path, rows) in &mut tables {
@@ -246,29 +247,57 @@ pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Fig
 }
 
 /// A stretch, what it was made from, and how long that took.
-struct Recorded {
-    returns: Returns,
+struct Recorded<'a> {
+    sight: Sight<'a>,
+    /// What every beam met; of a flight, during its first scan: all of it would not fit into memory.
+    first: Returns,
     stretch: Stretch,
+    segments: usize,
     trace: Duration,
     sample: Duration,
 }
 
-impl Recorded {
-    fn of(laboratory: &Laboratory, number: usize) -> Result<Self, SimError> {
+impl<'a> Recorded<'a> {
+    fn of(laboratory: &'a Laboratory, number: usize) -> Result<Self, SimError> {
         let begin = Instant::now();
-        let returns = laboratory.returns(number)?;
-        let trace = begin.elapsed();
-        let stretch = laboratory.record(number, &returns);
+        let sight = laboratory.sight(number)?;
+        let first = sight.returns(0);
+        let mut trace = begin.elapsed();
+        let mut segments = segments_of(&first);
+        let mut recorder = laboratory.recorder(number);
+        recorder.add(&first);
+        for scan in 1..laboratory.scans_of(number) {
+            if sight.moves() {
+                let begin = Instant::now();
+                let returns = sight.returns(scan);
+                trace += begin.elapsed();
+                segments += segments_of(&returns);
+                recorder.add(&returns);
+            } else {
+                recorder.add(&first);
+            }
+        }
         Ok(Self {
-            returns,
-            stretch,
+            sight,
+            first,
+            stretch: recorder.finish(),
+            segments,
             trace,
             sample: begin.elapsed() - trace,
         })
     }
+
+    /// What every beam met during a scan; those of a flight are traced again.
+    fn returns(&self, scan: usize) -> Cow<'_, Returns> {
+        if self.sight.moves() && scan > 0 {
+            Cow::Owned(self.sight.returns(scan))
+        } else {
+            Cow::Borrowed(&self.first)
+        }
+    }
 }
 
-fn segments(returns: &Returns) -> usize {
+fn segments_of(returns: &Returns) -> usize {
     let pieces = |r: &Option<_>| {
         r.as_ref()
             .map_or(1, |r: &catoptric::sim::reading::Return| r.facets.len() + 1)
@@ -277,15 +306,16 @@ fn segments(returns: &Returns) -> usize {
 }
 
 /// Tells the rows of one stretch in a table of the truth, as many at a time as fit in memory well.
-type Rows = fn(&Laboratory, usize, &Recorded, Tell<'_>) -> Result<(), CliError>;
+type Rows = fn(&Laboratory, usize, &Recorded<'_>, Tell<'_>) -> Result<(), CliError>;
 
 /// Takes rows on.
 pub(crate) type Tell<'a> = &'a mut dyn FnMut(&str) -> Result<(), CliError>;
 
 /// First line of truth/returns.csv. A reading is geometric + mixed + detection + the three biases, then what
-/// truth/readings.csv lists, rounded; a beam without an echo has no row, one with several has one for each.
+/// truth/readings.csv lists, rounded; a beam without an echo has no row, one with several has one for each. `scan` is
+/// empty where nothing moves and the row holds for every scan.
 const RETURNS_HEADER: &str = "pose,beam,surface,facets,geometric_m,cos_incidence,power_w,share,mixed_m,detection_m,\
-                              distance_bias_m,angle_bias_m,color_bias_m,noise_sd_m,echo,detection_probability\n";
+                              distance_bias_m,angle_bias_m,color_bias_m,noise_sd_m,echo,detection_probability,scan\n";
 
 /// The names of all mirrors, by their index.
 pub(crate) fn mirror_names(scene: &Scene) -> Vec<&str> {
@@ -319,19 +349,30 @@ pub(crate) fn way(names: &[&str], facets: &[usize]) -> String {
 fn return_rows(
     laboratory: &Laboratory,
     pose: usize,
-    recorded: &Recorded,
+    recorded: &Recorded<'_>,
     tell: Tell<'_>,
 ) -> Result<(), CliError> {
+    if !recorded.sight.moves() {
+        return tell(&rows_of_returns(laboratory, pose, &recorded.first, ""));
+    }
+    for scan in 0..laboratory.scans_of(pose) {
+        let returns = recorded.returns(scan);
+        tell(&rows_of_returns(laboratory, pose, &returns, &scan.to_string()))?;
+    }
+    Ok(())
+}
+
+fn rows_of_returns(laboratory: &Laboratory, pose: usize, returns: &Returns, scan: &str) -> String {
     let names = mirror_names(laboratory.scene());
     let mut text = String::new();
-    let echoes = recorded.returns.iter().enumerate().flat_map(|(beam, found)| {
+    let echoes = returns.iter().enumerate().flat_map(|(beam, found)| {
         let echoes = found.iter().flat_map(Return::echoes).enumerate();
         echoes.map(move |(echo, r)| (beam, echo, r))
     });
     for (beam, echo, r) in echoes {
         let (surface, facets) = (role_name(r.role), way(&names, &r.facets));
         text.push_str(&format!(
-            "{pose},{beam},{surface},{facets},{},{},{},{},{},{},{},{},{},{},{echo},{}\n",
+            "{pose},{beam},{surface},{facets},{},{},{},{},{},{},{},{},{},{},{echo},{},{scan}\n",
             r.geometric,
             r.cos_incidence,
             r.power,
@@ -345,7 +386,7 @@ fn return_rows(
             r.probability,
         ));
     }
-    tell(&text)
+    text
 }
 
 /// First line of truth/readings.csv. `echo` is the one of truth/returns.csv that was reported, empty where none was
@@ -356,7 +397,7 @@ const READINGS_HEADER: &str =
 fn reading_rows(
     laboratory: &Laboratory,
     pose: usize,
-    recorded: &Recorded,
+    recorded: &Recorded<'_>,
     tell: Tell<'_>,
 ) -> Result<(), CliError> {
     let errors = &laboratory.scene().errors;
@@ -364,10 +405,11 @@ fn reading_rows(
         ErrorModel::None => 0.0,
         _ => errors.dropout,
     };
-    let mut text = String::new();
     let scans = recorded.stretch.ranges.chunks(beam::COUNT);
     for (scan, (readings, chances)) in scans.zip(laboratory.chances(pose)).enumerate() {
-        let beams = recorded.returns.iter().zip(&chances).zip(readings).enumerate();
+        let returns = recorded.returns(scan);
+        let mut text = String::new();
+        let beams = returns.iter().zip(&chances).zip(readings).enumerate();
         for (beam, ((found, chance), reading)) in beams {
             let mut echoes = found.iter().flat_map(Return::echoes).zip(chance.detection);
             let detected = echoes.position(|(echo, chance)| chance < echo.probability);
@@ -380,10 +422,16 @@ fn reading_rows(
                 chance.drift, chance.warm_up, chance.correlated, chance.interference,
             ));
         }
+        tell(&text)?;
     }
-    tell(&text)
+    Ok(())
 }
 
-fn sub_ray_rows(laboratory: &Laboratory, pose: usize, _: &Recorded, tell: Tell<'_>) -> Result<(), CliError> {
-    sub_rays::rows(laboratory, pose, tell)
+fn sub_ray_rows(
+    laboratory: &Laboratory,
+    pose: usize,
+    recorded: &Recorded<'_>,
+    tell: Tell<'_>,
+) -> Result<(), CliError> {
+    sub_rays::rows(laboratory, pose, &recorded.sight, tell)
 }

@@ -4,6 +4,7 @@ use super::error::CliError;
 use super::simulate::{Tell, field, mirror_names, role_name, way};
 use catoptric::model::beam;
 use catoptric::sim::Laboratory;
+use catoptric::sim::laboratory::Sight;
 use catoptric::sim::optics::Setting;
 use catoptric::sim::reading::{Stop, SubRayEnd, SubRayLight};
 use rayon::prelude::*;
@@ -16,19 +17,40 @@ pub(crate) const HEADER: &str = "pose,scan,beam,sub_ray,wide,narrow,weight,light
 /// Beams whose rows are in memory at a time.
 const BEAMS_AT_ONCE: usize = 64;
 
-/// Tells the rows of a stretch.
-pub(crate) fn rows(laboratory: &Laboratory, pose: usize, tell: Tell<'_>) -> Result<(), CliError> {
-    let setting = laboratory.setting(pose)?;
+/// Tells the rows of a stretch, of a flight scan by scan.
+pub(crate) fn rows(
+    laboratory: &Laboratory,
+    pose: usize,
+    sight: &Sight<'_>,
+    tell: Tell<'_>,
+) -> Result<(), CliError> {
+    if !sight.moves() {
+        return rows_of_scan(laboratory, pose, sight, None, tell);
+    }
+    (0..laboratory.scans_of(pose))
+        .try_for_each(|scan| rows_of_scan(laboratory, pose, sight, Some(scan), tell))
+}
+
+/// Tells the rows of a scan, or of a stretch whose scans are all alike.
+fn rows_of_scan(
+    laboratory: &Laboratory,
+    pose: usize,
+    sight: &Sight<'_>,
+    scan: Option<usize>,
+    tell: Tell<'_>,
+) -> Result<(), CliError> {
+    let setting = sight.setting();
     let mirrors = mirror_names(laboratory.scene());
     let names = setting.names();
+    let named = scan.map_or(String::new(), |scan| scan.to_string());
     let all: Vec<usize> = (0..beam::COUNT).collect();
     for beams in all.chunks(BEAMS_AT_ONCE) {
         let texts: Vec<String> = beams
             .par_iter()
             .map(|&beam| {
-                let ends = laboratory.sensor().sub_ray_ends(&setting, beam);
+                let ends = sight.sub_ray_ends(scan.unwrap_or(0), beam);
                 ends.iter()
-                    .map(|end| format!("{pose},,{beam},{}", row(&setting, &names, &mirrors, end)))
+                    .map(|end| format!("{pose},{named},{beam},{}", row(setting, &names, &mirrors, end)))
                     .collect()
             })
             .collect();

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | `/tf_static` | `tf2_msgs/TFMessage`: laser in rig, as the drawing has it | once, at the beginning |
 //! | `/session/pose` | the [`PoseLabel`](catoptric_model::PoseLabel) as JSON | before the messages of its stretch |
-//! | `/tf` | `tf2_msgs/TFMessage`: the bodies as first seen | at the start of a stretch |
+//! | `/tf` | `tf2_msgs/TFMessage`: the bodies as first seen | at the start of a stretch; in a flight every frame after |
 //! | `/points` | `sensor_msgs/PointCloud2`: the plane as scanned | the first scan of a stretch, not every scan |
 //! | `/scan` | `sensor_msgs/LaserScan` | every scan |
 //! | `/echoes` | `sensor_msgs/MultiEchoLaserScan` | every scan of a scanner that reports more than one echo |
@@ -137,6 +137,21 @@ impl<W: Write> RecordingWriter<W> {
                     (
                         self.channels.transforms,
                         messages::encode_transforms(time, &transforms),
+                    )
+                }
+                Event::Moved { track, frame } => {
+                    let track = &stretch.tracks[track];
+                    let Some(pose) = track.frames[frame].pose else {
+                        continue;
+                    };
+                    let transform = FrameTransform {
+                        parent: ROOM_FRAME,
+                        child: &track.subject,
+                        pose,
+                    };
+                    (
+                        self.channels.transforms,
+                        messages::encode_transforms(time, &[transform]),
                     )
                 }
                 Event::Points => {

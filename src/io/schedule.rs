@@ -1,8 +1,8 @@
 //! In which order the messages of a stretch are written: by time, and at one time by kind.
 
 use super::messages::NS_PER_S;
-use catoptric_model::Stretch;
-use std::collections::BTreeMap;
+use catoptric_model::{PoseKind, Stretch};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// When every recording begins, in nanoseconds since 1970: fixed, so that equal experiments are equal files.
 pub const EPOCH_NS: u64 = 1_518_000_000 * NS_PER_S;
@@ -12,6 +12,7 @@ pub const EPOCH_NS: u64 = 1_518_000_000 * NS_PER_S;
 pub(super) enum Event {
     Label,
     Transforms,
+    Moved { track: usize, frame: usize },
     Points,
     Scan(usize),
     Echoes(usize),
@@ -59,6 +60,7 @@ pub(super) fn schedule(
             events.push((time, Event::Echoes(k)));
         }
     }
+    let mut first_seen = BTreeSet::new();
     for (time, members) in frames {
         let mut with_markers = false;
         for &(track, frame) in members {
@@ -66,6 +68,10 @@ pub(super) fn schedule(
             with_markers |= !seen.markers.is_empty();
             if seen.pose.is_some() {
                 events.push((*time, Event::Pose { track, frame }));
+                // Where a body was first seen, the transforms at the start of the stretch say.
+                if stretch.label.kind == PoseKind::Flight && !first_seen.insert(track) {
+                    events.push((*time, Event::Moved { track, frame }));
+                }
             }
         }
         if with_markers {

@@ -47,9 +47,11 @@ pub(super) fn record(
             facet: facet.map(str::to_owned),
             beams: None,
             test: None,
+            flight: None,
         },
         room_from_rig,
         room_from_board: board,
+        motion: None,
         beams: beam::COUNT,
         ranges: Vec::new(),
     }
@@ -80,6 +82,6 @@ pub(super) fn reading(b: &TrueBeam, pose: &PoseRecord, session: &Session, room_f
     }
     let origin = room_from_sensor * deflection.deflection_point(azimuth);
     let exit = Unit::new_unchecked(room_from_sensor * exit.into_inner());
-    let wall = session.room.cast(&origin, &exit);
+    let wall = session.room.as_ref().and_then(|room| room.cast(&origin, &exit));
     wall.map_or(range::NO_RETURN, |(s, _)| deflection.distance + s)
 }

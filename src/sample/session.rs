@@ -29,11 +29,11 @@ pub(super) fn session(mirrors: &[Mirror]) -> Session {
             rotation_sd_deg: [0.5, 0.5, 0.2],
             translation_sd_mm: [0.5, 0.5, 0.5],
         },
-        room: RoomSurvey {
+        room: Some(RoomSurvey {
             min_m: [-3.0, -4.0, 0.0],
             max_m: [5.0, 3.5, 3.0],
             color: "white".to_owned(),
-        },
+        }),
         believed: Beliefs {
             range_noise_sd_mm: 2.0,
             drift_sd_mm: 0.9,

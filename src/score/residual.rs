@@ -65,10 +65,10 @@ pub fn boards(dataset: &Dataset, calibration: &Calibration) -> SurfaceResidual {
 /// Point-to-wall residual of every reading of the solved elements in the empty room: data no method fits angles to.
 pub fn walls(dataset: &Dataset, calibration: &Calibration) -> SurfaceResidual {
     let rig_from_sensor = mount(dataset, calibration);
-    let room = &dataset.session.room;
     collect(dataset, calibration, PoseKind::Room, |pose| {
         let room_from_sensor = pose.room_from_rig * rig_from_sensor;
         move |beam: usize, deflection: &Deflection| {
+            let room = dataset.session.room.as_ref()?;
             let origin = room_from_sensor * deflection.deflection_point(beam::azimuth(beam));
             let exit = deflection.exit_direction(beam::azimuth(beam));
             let exit = Unit::new_unchecked(room_from_sensor * exit.into_inner());

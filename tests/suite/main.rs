@@ -12,6 +12,7 @@ mod detection;
 mod determinism;
 mod docs;
 mod energy;
+mod motion;
 mod noise;
 mod paper;
 mod physics;

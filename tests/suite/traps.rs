@@ -195,8 +195,7 @@ const ROOM: usize = 1;
 #[test]
 fn tied_distances() {
     let laboratory = laboratory("tied-distances");
-    let setting = laboratory.setting(ROOM).unwrap();
-    let ends = laboratory.sensor().sub_ray_ends(&setting, beam::FORWARD);
+    let ends = laboratory.sight(ROOM).unwrap().sub_ray_ends(0, beam::FORWARD);
     assert_eq!(ends.len(), 256);
     let distances: BTreeSet<u64> = ends.iter().map(|e| e.path.to_bits()).collect();
     assert!(

@@ -16,7 +16,7 @@ pub(crate) struct Ahead {
     pub(crate) spread: f64,
 }
 
-/// What a ray in the sensor frame meets, board or room, and the surface's color.
+/// What a ray in the sensor frame meets, board or room, and the surface's color; `None` where no room is known.
 pub(crate) fn ahead<'s>(
     session: &'s Session,
     room_from_sensor: &Pose,
@@ -24,11 +24,9 @@ pub(crate) fn ahead<'s>(
     origin: &Point3<f64>,
     direction: &Unit<Vector3<f64>>,
 ) -> Option<(Ahead, &'s str)> {
-    let wall = |v: &Unit<Vector3<f64>>| {
-        session
-            .room
-            .cast(&(room_from_sensor * origin), &(room_from_sensor.rotation * v))
-    };
+    let room = session.room.as_ref()?;
+    let wall =
+        |v: &Unit<Vector3<f64>>| room.cast(&(room_from_sensor * origin), &(room_from_sensor.rotation * v));
     let (distance, plane) = wall(direction)?;
     let cone = cone_half_angle(session);
     let path = origin.coords.norm();
@@ -65,5 +63,5 @@ pub(crate) fn ahead<'s>(
         plane,
         spread,
     };
-    Some((ahead, &session.room.color))
+    Some((ahead, &room.color))
 }

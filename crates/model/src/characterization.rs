@@ -263,12 +263,10 @@ mod tests {
 
     #[test]
     fn the_quantile_is_the_tables() {
-        // χ² at 0.999: 10.828, 29.588, 149.449 for 1, 10, 100 degrees of freedom.
-        for (n, table) in [(1, 10.828), (10, 29.588), (100, 149.449)] {
-            assert!(
-                (0.0..0.031 / n as f64).contains(&(upper_quantile(n) / table - 1.0).abs()),
-                "{n}"
-            );
+        // χ² at 0.999: 10.828, 29.588, 149.449 for 1, 10, 100 degrees of freedom; the law is a little high for few.
+        for (n, table, high) in [(1, 10.828, 0.031), (10, 29.588, 0.006), (100, 149.449, 0.0006)] {
+            let off = upper_quantile(n) / table - 1.0;
+            assert!((0.0..high).contains(&off), "{n}: {off}");
         }
         let fit = |chi_squared| Fit {
             chi_squared,

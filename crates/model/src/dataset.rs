@@ -4,6 +4,7 @@
 
 use crate::error::ModelError;
 use crate::frame::Pose;
+use crate::motion::Motion;
 use crate::session::Session;
 use nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -20,6 +21,18 @@ pub enum PoseKind {
     Direct,
     /// Steps 7–10: a board in the fan of a facet.
     Facet,
+    /// The rig moves through the room while it scans: nothing a calibration is made from, something it is applied to.
+    Flight,
+}
+
+impl PoseKind {
+    /// Whether it says what the mirrors do: they are attached, and nothing moves.
+    pub fn is_evidence(self) -> bool {
+        match self {
+            Self::Room | Self::Direct | Self::Facet => true,
+            Self::Bare | Self::Flight => false,
+        }
+    }
 }
 
 /// What is tested of the bare sensor (step 1).
@@ -88,6 +101,9 @@ pub struct PoseLabel {
     /// What was tested of the bare sensor.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub test: Option<TestNote>,
+    /// Flight that was flown.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub flight: Option<String>,
 }
 
 /// Name of the rig as a motion-capture subject.
@@ -113,7 +129,7 @@ pub struct Track {
     pub frames: Vec<TrackedFrame>,
 }
 
-/// One stretch of scans with nothing moving, as it was recorded.
+/// One stretch of scans as it was recorded, with nothing moving unless it is a flight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stretch {
     /// What the experimenter noted.
@@ -132,15 +148,17 @@ pub struct Stretch {
     pub tracks: Vec<Track>,
 }
 
-/// One stretch of scans with nothing moving, and where motion capture saw rig and board.
+/// One stretch of scans, and where motion capture saw rig and board.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseRecord {
     /// What the experimenter noted.
     pub label: PoseLabel,
-    /// Rig as tracked, mean over the stretch.
+    /// Rig as tracked, mean over the stretch; of a flight, as first seen.
     pub room_from_rig: Pose,
     /// Board as tracked, mean over the stretch; `None` where none was set up.
     pub room_from_board: Option<Pose>,
+    /// Where the rig was during a flight; `None` where nothing moved.
+    pub motion: Option<Motion>,
     /// Beams of a scan.
     pub beams: usize,
     /// Readings in metres, scan after scan; −∞ too close, +∞ no return, NaN invalid (REP-117).
@@ -205,17 +223,34 @@ impl Stretch {
                 .find(|t| t.subject == subject)
                 .and_then(Track::mean_pose)
         };
-        let room_from_rig = mean(RIG_SUBJECT).ok_or_else(|| {
+        let motion = (self.label.kind == PoseKind::Flight).then(|| self.motion());
+        let room_from_rig = match &motion {
+            Some(motion) => motion.frames.first().map(|(_, pose)| *pose),
+            None => mean(RIG_SUBJECT),
+        };
+        let room_from_rig = room_from_rig.ok_or_else(|| {
             ModelError::Inconsistent(format!("pose {}: the rig was never tracked", self.label.pose))
         })?;
         let room_from_board = self.label.board.as_deref().and_then(mean);
         Ok(PoseRecord {
             room_from_rig,
             room_from_board,
+            motion,
             beams: self.beams,
             ranges: self.ranges,
             label: self.label,
         })
+    }
+
+    /// Where the rig was seen, frame by frame.
+    fn motion(&self) -> Motion {
+        let rig = self.tracks.iter().filter(|t| t.subject == RIG_SUBJECT);
+        let frames = rig.flat_map(|t| &t.frames);
+        Motion {
+            start_s: self.start_s,
+            scan_period_s: self.scan_period_s,
+            frames: frames.filter_map(|f| Some((f.time_s, f.pose?))).collect(),
+        }
     }
 }
 
@@ -325,9 +360,11 @@ mod tests {
                 facet: None,
                 beams: None,
                 test: None,
+                flight: None,
             },
             room_from_rig: Pose::identity(),
             room_from_board: None,
+            motion: None,
             beams: 2,
             ranges: vec![1.0, f64::INFINITY, 2.0, f64::NAN, 3.0, 5.0],
         };

@@ -46,6 +46,18 @@ pub fn yaw_pitch_roll(yaw: f64, pitch: f64, roll: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_euler_angles(roll, pitch, yaw)
 }
 
+/// The attitude part of the way from one to another along the shorter arc, at a constant rate (slerp).
+///
+/// `share` is 0 at `from` and 1 at `to`, and may lie beyond. Equal attitudes give exactly that attitude; of two that
+/// are half a turn apart, either arc may be taken.
+pub fn slerp(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>, share: f64) -> UnitQuaternion<f64> {
+    if from == to {
+        return *from;
+    }
+    let turn = from.inverse() * to;
+    UnitQuaternion::new_normalize((from * turn.powf(share)).into_inner())
+}
+
 /// Two unit vectors `(across, up)` that span the plane perpendicular to a direction.
 ///
 /// `across` is horizontal and points to growing azimuth, `up` to growing elevation; `(direction, across, up)` is
@@ -73,6 +85,20 @@ mod tests {
         let back = Pose::from(&PoseData::from(&pose));
         let p = Point3::new(4.0, 5.0, -6.0);
         assert!((pose * p - back * p).norm() < 1e-14);
+    }
+
+    #[test]
+    fn slerp_turns_at_a_constant_rate_along_the_shorter_arc() {
+        let at = |angle: f64| yaw_pitch_roll(angle, 0.0, 0.0);
+        for (from, to, share, expected) in [
+            (0.2, 1.2, 0.25, 0.45),
+            (0.2, 1.2, 1.5, 1.7),
+            (3.0, -3.0, 0.5, std::f64::consts::PI),
+        ] {
+            assert!(slerp(&at(from), &at(to), share).angle_to(&at(expected)) < 1e-15);
+        }
+        let q = yaw_pitch_roll(0.3, -0.2, 1.1);
+        assert_eq!(slerp(&q, &q, 0.37), q);
     }
 
     #[test]

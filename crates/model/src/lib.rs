@@ -37,6 +37,7 @@ pub mod dataset;
 pub mod error;
 pub mod frame;
 pub mod mirror;
+pub mod motion;
 pub mod range;
 pub mod session;
 
@@ -52,5 +53,6 @@ pub use dataset::{
 pub use error::ModelError;
 pub use frame::{Pose, PoseData};
 pub use mirror::MirrorPlane;
+pub use motion::Motion;
 pub use range::{CorrectedRange, RawRange};
 pub use session::Session;

@@ -27,8 +27,9 @@ pub struct Session {
     pub nominal_rig_from_sensor: PoseData,
     /// How far the sensor may be from where the drawing puts it.
     pub mount_tolerance: MountTolerance,
-    /// The room the experiment stands in.
-    pub room: RoomSurvey,
+    /// The room the experiment stands in; `None` where there are no walls that were surveyed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub room: Option<RoomSurvey>,
     /// What is believed about the errors.
     pub believed: Beliefs,
     /// Step 3: the bare structure, measured before the mirrors were attached.
@@ -194,6 +195,13 @@ pub struct BoardSheet {
     pub color: String,
     /// Markers on the face, in the board frame; the first three are P_p1…P_p3.
     pub markers: Vec<Marker>,
+}
+
+impl ScannerSheet {
+    /// Time between two beams of a scan, in seconds: the scanner turns once from one scan to the next.
+    pub fn step_period_s(&self) -> f64 {
+        self.step_deg / 360.0 / self.scan_rate_hz
+    }
 }
 
 impl Marker {

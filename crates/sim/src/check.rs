@@ -5,6 +5,7 @@
 //! structure as built are small against everything that is refused here.
 
 mod experiment;
+mod flight;
 mod outline;
 mod stage;
 mod structure;
@@ -50,6 +51,7 @@ pub fn problems(scene: &Scene) -> Vec<Problem> {
         if scene.room.has_walls() {
             experiment::check(scene, &mut found);
         }
+        flight::check(scene, &mut found);
     }
     found.0
 }

@@ -57,10 +57,16 @@ pub enum SimError {
         /// Its file, as the scene names it.
         file: String,
     },
+    /// A flight with fewer than two waypoints, or with times that do not increase.
+    #[error("flight {name:?} goes nowhere: it takes at least two waypoints whose times increase")]
+    Flight {
+        /// The flight.
+        name: String,
+    },
     /// A scene to trace rays in, and no more.
     #[error(
-        "the scene has no laboratory: recording takes room.size_m, a [superstructure] with markers, and a board or a \
-         facet; this scene can be traced"
+        "the scene has no laboratory: recording takes a [superstructure] with markers, and either room.size_m and a \
+         board or a facet, or a [[flight]]; this scene can be traced"
     )]
     NoLaboratory,
 }

@@ -24,6 +24,7 @@ pub mod spot;
 pub mod stage;
 pub mod structure;
 pub mod trace;
+pub mod trajectory;
 pub mod truth;
 
 pub use error::SimError;

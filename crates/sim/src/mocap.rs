@@ -78,9 +78,9 @@ pub struct Body<'a> {
     pub index: usize,
     /// Its markers in its own frame, in metres.
     pub template: &'a [Point3<f64>],
-    /// Where it really is.
-    pub room_from_body: Pose,
-    /// Number of the placement: a body that stays where it is keeps its constant errors.
+    /// Where it really is, at a time in seconds since its first frame.
+    pub room_from_body: &'a (dyn Fn(f64) -> Pose + Sync),
+    /// Number of the placement: a body that stays where it is keeps its constant errors, and so does one in flight.
     pub placement: usize,
 }
 
@@ -99,29 +99,31 @@ pub fn track(
     let errors = mocap.profile.errors();
     let column = |marker: usize| (body.index * MAX_MARKERS + marker) as u64;
     let mut constant = Draws::new(seed, Purpose::MarkerConstant, body.placement as u64);
-    let places: Vec<Point3<f64>> = body
-        .template
-        .iter()
-        .enumerate()
-        .map(|(marker, place)| {
+    let offsets: Vec<Vector3<f64>> = (0..body.template.len())
+        .map(|marker| {
             constant.seek(column(marker));
-            body.room_from_body * place + constant.normal3().component_mul(&errors.constant)
+            constant.normal3().component_mul(&errors.constant)
         })
         .collect();
     let frames = (0..frames)
         .map(|frame| {
             let mut jitter = Draws::new(seed, Purpose::MarkerJitter, first_frame + frame);
-            let markers: Vec<Option<Point3<f64>>> = places
+            let elapsed_s = frame as f64 / mocap.frame_rate_hz;
+            let room_from_body = (body.room_from_body)(elapsed_s);
+            let markers: Vec<Option<Point3<f64>>> = body
+                .template
                 .iter()
+                .zip(&offsets)
                 .enumerate()
-                .map(|(marker, place)| {
+                .map(|(marker, (place, offset))| {
                     jitter.seek(column(marker));
                     let seen = jitter.uniform() >= mocap.dropout;
+                    let place = room_from_body * place + offset;
                     seen.then(|| place + jitter.normal3().component_mul(&errors.jitter))
                 })
                 .collect();
             TrackedFrame {
-                time_s: start_s + frame as f64 / mocap.frame_rate_hz,
+                time_s: start_s + elapsed_s,
                 pose: solve_pose(body.template, &markers),
                 markers,
             }
@@ -182,7 +184,7 @@ mod tests {
             subject: "rig",
             index: 0,
             template: &template,
-            room_from_body: Pose::identity(),
+            room_from_body: &|_| Pose::identity(),
             placement,
         };
         let first_marker = |placement, frame| {

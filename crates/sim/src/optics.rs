@@ -1,4 +1,8 @@
 //! The way of a ray: from the scanner over mirrors to whatever stops it.
+//!
+//! Rays are cast in the sensor frame. While nothing moves, all surfaces are in it. In a flight the structure is, which
+//! moves with the sensor, and the room is in the sensor frame of the flight's start: every leg is cast into both, each
+//! time from where the sensor is then, and the nearer surface counts.
 
 use crate::cast::{Hit, Shape, World};
 use crate::color::{self, Paint};
@@ -7,9 +11,11 @@ use crate::footprint::Ray;
 use crate::glass::{self, Passage};
 use crate::scene::Scene;
 use crate::stage::Stage;
-use crate::structure::{Back, BuiltFacet, Structure};
-use catoptric_model::mirror;
-use nalgebra::Point3;
+use crate::structure::{Back, BuiltFacet, Part, Structure};
+use catoptric_model::{Pose, mirror};
+use nalgebra::{Point3, Unit, Vector3};
+use std::borrow::Cow;
+use std::sync::Arc;
 
 /// Most mirrors a ray can meet; `max_bounces` may be less.
 pub const MAX_BOUNCES: usize = 8;
@@ -29,13 +35,34 @@ pub enum Role {
     Object,
 }
 
-/// Everything in the sensor frame that light can meet during one stretch.
+/// Everything that light can meet during one stretch, as the sensor sees it from where it is.
 pub struct Setting<'a> {
+    contents: Arc<Contents<'a>>,
+    /// Where the sensor is in the frame that the room is kept in; `None` where it started.
+    start_from_sensor: Option<Pose>,
+}
+
+/// What a setting holds, wherever the sensor is.
+struct Contents<'a> {
+    /// What moves with the sensor, in its frame; all there is while nothing moves.
     world: World,
+    /// What the sensor moves past.
+    room: Option<World>,
     surfaces: Vec<Surface>,
-    facets: Vec<&'a BuiltFacet>,
+    /// Index of the first surface of the room.
+    first_of_room: usize,
+    facets: Vec<Cow<'a, BuiltFacet>>,
     max_bounces: usize,
     diffuse_reflectivity: f64,
+}
+
+/// Where a leg of a ray ends, in the frame that the surface is kept in.
+struct Leg<'p> {
+    hit: Hit,
+    /// Direction of the ray.
+    incoming: Unit<Vector3<f64>>,
+    /// From the sensor frame to that frame, unless it is the same.
+    kept_from_sensor: Option<&'p Pose>,
 }
 
 #[derive(Debug, Clone)]
@@ -204,62 +231,101 @@ impl<'a> Setting<'a> {
         stage: Option<&'a Stage>,
         targets: Vec<Target>,
     ) -> Result<Self, SimError> {
-        let dull = color::paint(scene, "structure")?;
-        let mut list = List::default();
-        for (index, facet) in structure.facets.iter().enumerate() {
-            match mirrors {
-                Mirrors::Attached => list.mirror(facet, index, &dull),
-                Mirrors::Removed => {
-                    let bare = Shape::Polygon(facet.backing.clone());
-                    list.add(&facet.name, bare, Role::Structure, Side::None, dull.clone());
-                }
-            }
-        }
-        for part in &structure.parts {
-            let paint = color::paint(scene, &part.color)?;
-            list.add(&part.name, part.shape.clone(), Role::Structure, Side::None, paint);
-        }
-        for target in targets {
-            list.add(&target.name, target.shape, target.role, Side::None, target.paint);
-        }
-        let mut facets: Vec<&BuiltFacet> = structure.facets.iter().collect();
-        if let Some(stage) = stage {
-            for mirror in &stage.mirrors {
-                list.mirror(mirror, facets.len(), &dull);
-                facets.push(mirror);
-            }
-            for part in &stage.surfaces {
-                let paint = color::paint(scene, &part.color)?;
-                list.add(&part.name, part.shape.clone(), Role::Object, Side::None, paint);
-            }
-        }
-        Ok(Self {
-            world: World::new(list.shapes),
-            surfaces: list.surfaces,
+        let (mut list, mut facets) = structure_list(scene, structure, mirrors)?;
+        let first_of_room = list.shapes.len();
+        let mirrors = stage.map_or([].as_slice(), |s| s.mirrors.as_slice());
+        let parts = stage.map_or([].as_slice(), |s| s.surfaces.as_slice());
+        list.room(
+            scene,
+            &mut facets,
+            targets,
+            mirrors.iter().map(Cow::Borrowed),
+            parts,
+        )?;
+        Ok(Self::of(
+            scene,
+            (list.shapes, None),
+            list.surfaces,
+            first_of_room,
+            facets,
+        ))
+    }
+
+    /// The structure with its mirrors, flying past the targets and what stands in the room, all of it in the sensor
+    /// frame of the flight's start; seen from there.
+    ///
+    /// # Errors
+    /// As [`Setting::new`].
+    pub fn in_flight(
+        scene: &Scene,
+        structure: &'a Structure,
+        stage: Stage,
+        targets: Vec<Target>,
+    ) -> Result<Self, SimError> {
+        let (mut list, mut facets) = structure_list(scene, structure, Mirrors::Attached)?;
+        let first_of_room = list.shapes.len();
+        let mirrors = stage.mirrors.into_iter().map(Cow::Owned);
+        list.room(scene, &mut facets, targets, mirrors, &stage.surfaces)?;
+        let room = list.shapes.split_off(first_of_room);
+        Ok(Self::of(
+            scene,
+            (list.shapes, Some(room)),
+            list.surfaces,
+            first_of_room,
+            facets,
+        ))
+    }
+
+    fn of(
+        scene: &Scene,
+        (shapes, room): (Vec<Shape>, Option<Vec<Shape>>),
+        surfaces: Vec<Surface>,
+        first_of_room: usize,
+        facets: Vec<Cow<'a, BuiltFacet>>,
+    ) -> Self {
+        let contents = Contents {
+            world: World::new(shapes),
+            room: room.map(World::new),
+            surfaces,
+            first_of_room,
             facets,
             max_bounces: (scene.superstructure.max_bounces as usize).min(MAX_BOUNCES),
             diffuse_reflectivity: scene.superstructure.mirror.diffuse_reflectivity,
-        })
+        };
+        Self {
+            contents: Arc::new(contents),
+            start_from_sensor: None,
+        }
+    }
+
+    /// The same from another place of the sensor; exactly the same where it has not moved, and where nothing can.
+    #[must_use]
+    pub fn seen_from(&self, start_from_sensor: &Pose) -> Self {
+        let moved = self.contents.room.is_some() && *start_from_sensor != Pose::identity();
+        Self {
+            contents: Arc::clone(&self.contents),
+            start_from_sensor: moved.then_some(*start_from_sensor),
+        }
     }
 
     /// What a surface is.
     pub fn role(&self, surface: usize) -> Role {
-        self.surfaces[surface].role
+        self.contents.surfaces[surface].role
     }
 
     /// How a surface scatters.
     pub fn paint(&self, surface: usize) -> &Paint {
-        &self.surfaces[surface].paint
+        &self.contents.surfaces[surface].paint
     }
 
     /// Names of all surfaces, by their index.
     pub fn names(&self) -> Vec<&str> {
-        self.surfaces.iter().map(|s| s.name.as_str()).collect()
+        self.contents.surfaces.iter().map(|s| s.name.as_str()).collect()
     }
 
     /// Share of the light that the mirrors themselves scatter.
     pub fn diffuse_reflectivity(&self) -> f64 {
-        self.diffuse_reflectivity
+        self.contents.diffuse_reflectivity
     }
 
     /// Follows a ray from mirror to mirror, always to the nearest surface.
@@ -275,7 +341,7 @@ impl<'a> Setting<'a> {
     /// way and comes home by the other: the energy of all ways together is less than what was sent.
     pub fn ghosts(&self, ray: &Ray, path: &Path) -> impl Iterator<Item = Path> {
         let fronts = path.facets().iter().enumerate();
-        let fronts = fronts.filter(|(_, f)| self.facets[**f].glass.is_some_and(|g| g.ghost));
+        let fronts = fronts.filter(|(_, f)| self.contents.facets[**f].glass.is_some_and(|g| g.ghost));
         fronts.map(|(bounce, _)| self.path(ray, Some(bounce)))
     }
 
@@ -284,7 +350,7 @@ impl<'a> Setting<'a> {
         let mut points = [Point3::origin(); MAX_BOUNCES];
         let mut meetings = [None; MAX_BOUNCES];
         let mut count = 0;
-        let course = self.follow(ray, self.max_bounces, ghost, |bounce| {
+        let course = self.follow(ray, self.contents.max_bounces, ghost, |bounce| {
             facets[count] = bounce.facet;
             points[count] = bounce.point;
             meetings[count] = Some(bounce.meeting);
@@ -305,7 +371,7 @@ impl<'a> Setting<'a> {
 
     /// The mirror that a hit is on, and whether it is the body's back.
     fn reflecting(&self, hit: &Hit) -> Option<(usize, bool)> {
-        let surface = &self.surfaces[hit.surface];
+        let surface = &self.contents.surfaces[hit.surface];
         let Role::Facet(facet) = surface.role else {
             return None;
         };
@@ -334,23 +400,23 @@ impl<'a> Setting<'a> {
             end: End::Escaped,
         };
         let mut left = None;
-        while let Some(hit) = self.world.cast(&course.last, left) {
-            let Some((facet, back)) = self.reflecting(&hit) else {
-                course.length += hit.distance;
-                course.end = End::Hit(hit);
+        while let Some(leg) = self.cast(&course.last, left) {
+            let Some((facet, back)) = self.reflecting(&leg.hit) else {
+                course.length += leg.hit.distance;
+                course.end = End::Hit(leg.in_sensor_frame());
                 break;
             };
             if course.count == limit {
                 course.end = End::Trapped;
                 break;
             }
-            let Some(bounce) = self.bounce(&course, &hit, facet, back, ghost == Some(course.count)) else {
+            let Some(bounce) = self.bounce(&course, &leg, facet, back, ghost == Some(course.count)) else {
                 course.end = End::Trapped;
                 break;
             };
             tell(&bounce);
             let meeting = bounce.meeting;
-            let glass = self.facets[facet].glass.filter(|g| g.ghost);
+            let glass = self.contents.facets[facet].glass.filter(|g| g.ghost);
             if ghost == Some(course.count) {
                 // No glass in the way turns nothing back.
                 course.gain *= bounce.passage.map_or(0.0, |p| p.fresnel);
@@ -370,10 +436,47 @@ impl<'a> Setting<'a> {
         course
     }
 
+    /// The nearest surface along a ray of the sensor frame, `left` (the one it just left) aside.
+    fn cast(&self, ray: &Ray, left: Option<usize>) -> Option<Leg<'_>> {
+        let contents = &*self.contents;
+        let unmoved = |hit| Leg {
+            hit,
+            incoming: ray.direction,
+            kept_from_sensor: None,
+        };
+        let Some(room) = &contents.room else {
+            return contents.world.cast(ray, left).map(unmoved);
+        };
+        let first = contents.first_of_room;
+        let own = contents.world.cast(ray, left.filter(|l| *l < first));
+        let moved = self.start_from_sensor.as_ref();
+        let ray_in_room = moved.map_or(*ray, |pose| placed(ray, pose));
+        let past = room.cast(&ray_in_room, left.and_then(|l| l.checked_sub(first)));
+        match (own, past) {
+            (Some(own), Some(past)) if own.distance <= past.distance => Some(unmoved(own)),
+            (own, None) => own.map(unmoved),
+            (_, Some(past)) => Some(Leg {
+                hit: Hit {
+                    surface: past.surface + first,
+                    ..past
+                },
+                incoming: ray_in_room.direction,
+                kept_from_sensor: moved,
+            }),
+        }
+    }
+
     /// A reflection; `None` if the light comes to the rim of the glass.
-    fn bounce(&self, course: &Course, hit: &Hit, facet: usize, back: bool, ghost: bool) -> Option<Bounce> {
-        let mirror = self.facets[facet];
-        let incoming = course.last.direction;
+    fn bounce(
+        &self,
+        course: &Course,
+        leg: &Leg<'_>,
+        facet: usize,
+        back: bool,
+        ghost: bool,
+    ) -> Option<Bounce> {
+        let mirror = &self.contents.facets[facet];
+        let (hit, incoming) = (&leg.hit, leg.incoming);
         let normal = match (back, hit.front) {
             (false, _) => mirror.normal_at(&hit.point),
             (true, true) => hit.normal,
@@ -413,8 +516,68 @@ impl<'a> Setting<'a> {
                 }
             }
         }
-        Some(bounce)
+        Some(leg.kept_from_sensor.map_or(bounce, |pose| bounce.seen_from(pose)))
     }
+}
+
+impl Leg<'_> {
+    /// Where the leg ends, in the sensor frame.
+    fn in_sensor_frame(&self) -> Hit {
+        self.kept_from_sensor.map_or(self.hit, |pose| Hit {
+            point: pose.inverse_transform_point(&self.hit.point),
+            normal: pose.inverse_transform_unit_vector(&self.hit.normal),
+            ..self.hit
+        })
+    }
+}
+
+impl Bounce {
+    /// The same in the frame of a sensor in another place.
+    fn seen_from(self, kept_from_sensor: &Pose) -> Self {
+        let turned = |v: &Vector3<f64>| kept_from_sensor.inverse_transform_vector(v);
+        Self {
+            point: kept_from_sensor.inverse_transform_point(&self.point),
+            passage: self.passage.map(|p| Passage {
+                to_silver: turned(&p.to_silver),
+                walk: turned(&p.walk),
+                ..p
+            }),
+            after: placed(&self.after, &kept_from_sensor.inverse()),
+            ..self
+        }
+    }
+}
+
+/// A ray moved into another frame.
+fn placed(ray: &Ray, other_from_ray: &Pose) -> Ray {
+    Ray {
+        origin: other_from_ray * ray.origin,
+        direction: other_from_ray * ray.direction,
+    }
+}
+
+/// The structure, with or without its mirrors, and the mirrors themselves.
+fn structure_list<'a>(
+    scene: &Scene,
+    structure: &'a Structure,
+    mirrors: Mirrors,
+) -> Result<(List, Vec<Cow<'a, BuiltFacet>>), SimError> {
+    let dull = color::paint(scene, "structure")?;
+    let mut list = List::default();
+    for (index, facet) in structure.facets.iter().enumerate() {
+        match mirrors {
+            Mirrors::Attached => list.mirror(facet, index, &dull),
+            Mirrors::Removed => {
+                let bare = Shape::Polygon(facet.backing.clone());
+                list.add(&facet.name, bare, Role::Structure, Side::None, dull.clone());
+            }
+        }
+    }
+    for part in &structure.parts {
+        let paint = color::paint(scene, &part.color)?;
+        list.add(&part.name, part.shape.clone(), Role::Structure, Side::None, paint);
+    }
+    Ok((list, structure.facets.iter().map(Cow::Borrowed).collect()))
 }
 
 /// Surfaces as they are listed.
@@ -433,6 +596,30 @@ impl List {
             side,
             paint,
         });
+    }
+
+    /// What is in the room: targets, then mirrors and surfaces.
+    fn room<'a>(
+        &mut self,
+        scene: &Scene,
+        facets: &mut Vec<Cow<'a, BuiltFacet>>,
+        targets: Vec<Target>,
+        mirrors: impl Iterator<Item = Cow<'a, BuiltFacet>>,
+        parts: &[Part],
+    ) -> Result<(), SimError> {
+        let dull = color::paint(scene, "structure")?;
+        for target in targets {
+            self.add(&target.name, target.shape, target.role, Side::None, target.paint);
+        }
+        for mirror in mirrors {
+            self.mirror(&mirror, facets.len(), &dull);
+            facets.push(mirror);
+        }
+        for part in parts {
+            let paint = color::paint(scene, &part.color)?;
+            self.add(&part.name, part.shape.clone(), Role::Object, Side::None, paint);
+        }
+        Ok(())
     }
 
     /// A mirror's face, and its back and rim if it has two sides.

@@ -18,7 +18,7 @@ pub struct Truth {
     pub name: String,
     /// Seed of the run.
     pub seed: u64,
-    /// Where the rig stood.
+    /// Where the rig stood, flights aside.
     pub room_from_rig: PoseData,
     /// Where the sensor sat in the rig.
     pub rig_from_sensor: PoseData,
@@ -100,6 +100,9 @@ pub struct TruePose {
     /// Where the board stood.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub room_from_board: Option<PoseData>,
+    /// Where the sensor was at the start of every scan of a flight; in other stretches it is where it always is.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub room_from_sensor: Vec<PoseData>,
     /// Drift of all its readings, in metres.
     pub drift_m: f64,
     /// What the scanner was off at its first and its last scan because it was not warm, in metres.

@@ -52,11 +52,11 @@ fn session(beams: usize) -> Session {
             rotation_sd_deg: [0.5; 3],
             translation_sd_mm: [2.0; 3],
         },
-        room: RoomSurvey {
+        room: Some(RoomSurvey {
             min_m: [-5.0, -4.0, 0.0],
             max_m: [5.0, 4.0, 3.0],
             color: "white".to_owned(),
-        },
+        }),
         believed: Beliefs {
             range_noise_sd_mm: 10.0,
             drift_sd_mm: 1.0,
@@ -152,6 +152,7 @@ fn stretch(session: &Session, pose: usize, scans: usize, frames: usize, seed: u6
             facet: Some("port".to_owned()),
             beams: Some([1, 3]),
             test: None,
+            flight: None,
         },
         start_s,
         scan_period_s: 0.025,

@@ -39,10 +39,10 @@ pub(in crate::report) fn cloud(
             (p.position.x, p.position.y, color)
         })
         .collect();
-    let room = &dataset.session.room;
     let mut strokes = Vec::new();
     let mut corners = Vec::new();
-    if cloud.frame == CloudFrame::Room {
+    let surveyed = dataset.session.room.as_ref();
+    if let Some(room) = surveyed.filter(|_| cloud.frame == CloudFrame::Room) {
         let [[x0, y0, _], [x1, y1, _]] = [room.min_m, room.max_m];
         corners = vec![(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)];
         strokes.push(Stroke {
@@ -79,7 +79,7 @@ pub(in crate::report) fn cloud(
     let title = "The cloud from above";
     let svg = figure::scatter(level_size(&axes), &axes, title, &points, &strokes);
     let rows = cloud_rows(dataset, calibration, cloud, &facets);
-    let outline = if cloud.frame == CloudFrame::Room {
+    let outline = if cloud.frame == CloudFrame::Room && surveyed.is_some() {
         "The outline is the surveyed room: points belong on its walls, or inside on floor and ceiling; a wall of points that \
          leaves the outline is a mirror whose directions are off. The cross is the scanner. "
     } else {

@@ -26,11 +26,11 @@ fn session() -> Session {
             rotation_sd_deg: [1.0; 3],
             translation_sd_mm: [5.0; 3],
         },
-        room: RoomSurvey {
+        room: Some(RoomSurvey {
             min_m: [-3.0; 3],
             max_m: [3.0; 3],
             color: "white".to_owned(),
-        },
+        }),
         believed: Beliefs {
             range_noise_sd_mm: 4.0,
             drift_sd_mm: 0.0,

@@ -33,6 +33,9 @@ impl<'a> Screen<'a> {
             }
         }
         let total = count + missing;
+        if total == 0 {
+            return Some("no reading of the room or of a board".to_owned());
+        }
         if 2 * close > total {
             return Some(format!("too close in {close} of {total} readings"));
         }
@@ -77,12 +80,12 @@ impl<'a> Screen<'a> {
             .fold(STRUCTURE_RANGE, f64::max)
     }
 
-    /// All stretches with the mirrors on, with their statistics.
+    /// All stretches with the mirrors on and nothing moving, with their statistics.
     fn screened(&self) -> impl Iterator<Item = (&'a PoseRecord, &'a Vec<Summary>)> {
         self.dataset
             .poses
             .iter()
             .zip(self.summaries)
-            .filter(|(record, _)| record.label.kind != PoseKind::Bare)
+            .filter(|(record, _)| record.label.kind.is_evidence())
     }
 }

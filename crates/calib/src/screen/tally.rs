@@ -60,7 +60,7 @@ impl Screen<'_> {
         let mut tally = Tally::default();
         for (pose, record) in self.dataset.poses.iter().enumerate() {
             let summary = &self.summaries[pose][beam];
-            if record.label.kind == PoseKind::Bare || summary.count <= summary.missing {
+            if !record.label.kind.is_evidence() || summary.count <= summary.missing {
                 continue;
             }
             let Expected::Range(expected, tolerance) = self.expected(pose, beam, summary) else {

@@ -306,11 +306,11 @@ impl World {
                 rotation_sd_deg: [1.0; 3],
                 translation_sd_mm: [5.0; 3],
             },
-            room: RoomSurvey {
+            room: Some(RoomSurvey {
                 min_m: [-3.2, -2.7, 0.0],
                 max_m: [3.3, 2.9, 3.4],
                 color: "white".to_owned(),
-            },
+            }),
             believed: Beliefs {
                 range_noise_sd_mm: self.noise_mm,
                 drift_sd_mm: self.drift_mm,
@@ -394,9 +394,11 @@ impl Lab<'_> {
                 facet,
                 beams: None,
                 test: None,
+                flight: None,
             },
             room_from_rig: self.room_from_rig,
             room_from_board: board.map(|b| self.tracked(&(self.room_from_sensor * b), draw)),
+            motion: None,
             beams: world.beams,
             ranges,
         }
@@ -457,6 +459,8 @@ impl Lab<'_> {
             let (s, wall) = self
                 .session
                 .room
+                .as_ref()
+                .expect("this laboratory has walls")
                 .cast(&from, &towards)
                 .expect("it stands in the room");
             (s, wall.cos_incidence(&towards))

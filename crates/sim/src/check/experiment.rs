@@ -99,13 +99,13 @@ fn check_rig(scene: &Scene, found: &mut Findings) {
 }
 
 fn check_boards(scene: &Scene, found: &mut Findings) {
-    if scene.board.is_empty() {
+    if scene.board.is_empty() && !scene.only_flies() {
         let experiment = &scene.experiment;
         if scene.superstructure.facet.is_empty() {
             found.add(
                 &Path::of("board"),
                 "is empty and so is `superstructure.facet`: there would be nothing to record",
-                "add a table [[board]] or [[superstructure.facet]]".to_owned(),
+                "add a table [[board]], [[superstructure.facet]] or [[flight]]".to_owned(),
             );
         } else if experiment.pose.is_empty() {
             found.add(
@@ -138,7 +138,7 @@ fn check_boards(scene: &Scene, found: &mut Findings) {
 }
 
 /// The wall that a point is beyond, and by how much.
-fn outside(point: &Point3<f64>, size_m: &[f64; 3]) -> Option<(&'static str, f64)> {
+pub(super) fn outside(point: &Point3<f64>, size_m: &[f64; 3]) -> Option<(&'static str, f64)> {
     let low = [-0.5 * size_m[0], -0.5 * size_m[1], 0.0];
     (0..3).find_map(|axis| {
         let under = low[axis] - point[axis];
@@ -149,7 +149,7 @@ fn outside(point: &Point3<f64>, size_m: &[f64; 3]) -> Option<(&'static str, f64)
     })
 }
 
-fn room_extent(size_m: &[f64; 3]) -> String {
+pub(super) fn room_extent(size_m: &[f64; 3]) -> String {
     let [x, y, z] = *size_m;
     format!(
         "the room reaches from ({}, {}, 0) m to ({}, {}, {z}) m; its frame stands on the middle of the floor",

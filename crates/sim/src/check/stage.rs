@@ -15,15 +15,15 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
             found.add(
                 &room,
                 "holds nothing, and there is no laboratory either",
-                "add [[room.mirror]] and [[room.surface]] to trace rays; recording takes room.size_m, a \
-                 [superstructure] with markers, and a board or a facet"
+                "add [[room.mirror]] and [[room.surface]] to trace rays; recording takes a \
+                 [superstructure] with markers, and either room.size_m and a board or a facet, or a [[flight]]"
                     .to_owned(),
             );
         }
-    } else if !scene.room.has_walls() {
+    } else if !scene.room.has_walls() && !scene.only_flies() {
         found.add(
             &room.key("size_m"),
-            "is missing; a laboratory has walls",
+            "is missing; boards stand in a room with walls",
             "add size_m = [x, y, z], in metres".to_owned(),
         );
     }

@@ -47,11 +47,11 @@ impl Laboratory {
                 rotation_sd_deg: [tilt, tilt, sd(mount.yaw_tolerance_deg)],
                 translation_sd_mm: [sd(mount.shift_tolerance_mm); 3],
             },
-            room: session::RoomSurvey {
+            room: scene.room.has_walls().then(|| session::RoomSurvey {
                 min_m: [-0.5 * x, -0.5 * y, 0.0],
                 max_m: [0.5 * x, 0.5 * y, z],
                 color: scene.room.color.clone(),
-            },
+            }),
             believed: self.beliefs(),
             bare_structure: self.bare_structure()?,
             rig_markers: known_markers(&scene.superstructure.marker),

@@ -4,27 +4,30 @@
 
 mod chance;
 mod knowledge;
+mod recorder;
 mod room;
+mod sight;
 mod truth;
 
 pub use chance::Chances;
+pub use recorder::Recorder;
 pub use room::board_markers;
+pub use sight::Sight;
 
 use crate::cast::{Polygon, Shape};
 use crate::color::{self, Paint};
 use crate::error::SimError;
 use crate::mocap::{self, Body};
 use crate::noise::{Draws, Purpose};
-use crate::optics::{Mirrors, Role, Setting, Target};
+use crate::optics::{Role, Target};
 use crate::placement::{self, Planned};
 use crate::reading::{Return, Sensor};
-use crate::scene::{EchoChoice, ErrorModel, Scene};
+use crate::scene::{ErrorModel, Scene};
 use crate::stage::Stage;
 use crate::structure::Structure;
+use crate::trajectory::Trajectory;
 use catoptric_model::dataset::RIG_SUBJECT;
-use catoptric_model::{
-    Dataset, Pose, PoseKind, PoseLabel, RangeBias, SpotNote, Stretch, TestKind, TestNote, beam,
-};
+use catoptric_model::{Dataset, Pose, PoseLabel, RangeBias, SpotNote, Stretch, TestKind, TestNote};
 use nalgebra::{Point3, Translation3, UnitQuaternion};
 use rayon::prelude::*;
 
@@ -41,20 +44,23 @@ pub struct Laboratory {
     planned: Vec<Planned>,
     /// Where each planned board really stands, in the room frame.
     boards: Vec<Option<Pose>>,
+    /// The ways of the flights.
+    trajectories: Vec<Trajectory>,
     /// What step 1 believes the biases to be.
     believed: RangeBias,
 }
 
-/// What a beam met during a stretch, free of chance; `None` without an echo.
+/// What a beam met during a scan, free of chance; `None` without an echo.
 pub type Returns = Vec<Option<Return>>;
 
 impl Laboratory {
     /// Builds the structure, sets up the procedure.
     ///
     /// # Errors
-    /// A facet without a shape, an unknown color, a board that fits nowhere.
+    /// A facet without a shape, an unknown color, a board that fits nowhere, a flight that is none.
     pub fn new(scene: &Scene, seed: u64) -> Result<Self, SimError> {
-        if scene.has_no_laboratory() || !scene.room.has_walls() {
+        // Boards stand in a room; a flight needs none.
+        if scene.has_no_laboratory() || !(scene.room.has_walls() || scene.only_flies()) {
             return Err(SimError::NoLaboratory);
         }
         let sensor = Sensor::new(scene)?;
@@ -71,6 +77,12 @@ impl Laboratory {
                 })
             })
             .collect();
+        let trajectory = |flight| {
+            Trajectory::of(flight).ok_or_else(|| SimError::Flight {
+                name: flight.name.clone(),
+            })
+        };
+        let trajectories = scene.flight.iter().map(trajectory).collect::<Result<_, _>>()?;
         let structure = Structure::as_built(scene, seed)?;
         let room_from_sensor = placement::room_from_rig(&scene.room) * structure.rig_from_sensor;
         let laboratory = Self {
@@ -82,6 +94,7 @@ impl Laboratory {
             sensor,
             planned,
             boards,
+            trajectories,
         };
         laboratory.check_markers()?;
         Ok(laboratory)
@@ -120,6 +133,11 @@ impl Laboratory {
         self.planned.len()
     }
 
+    /// Number of stretches with a board.
+    pub fn board_poses(&self) -> usize {
+        self.boards.iter().flatten().count()
+    }
+
     /// Scans of all stretches together.
     pub fn scans(&self) -> usize {
         self.planned.iter().map(|p| p.scans).sum()
@@ -128,6 +146,11 @@ impl Laboratory {
     /// The scanner.
     pub fn sensor(&self) -> &Sensor {
         &self.sensor
+    }
+
+    /// Scans of one stretch.
+    pub fn scans_of(&self, number: usize) -> usize {
+        self.planned[number].scans
     }
 
     /// Sub-rays of a beam.
@@ -172,35 +195,12 @@ impl Laboratory {
         Ok(targets)
     }
 
-    /// What light can meet during a stretch.
-    ///
-    /// # Errors
-    /// An unknown color.
-    pub fn setting(&self, number: usize) -> Result<Setting<'_>, SimError> {
-        let mirrors = if self.planned[number].kind == PoseKind::Bare {
-            Mirrors::Removed
-        } else {
-            Mirrors::Attached
-        };
-        Setting::in_room(
-            &self.scene,
-            &self.structure,
-            mirrors,
-            Some(&self.stage),
-            self.targets(number)?,
-        )
-    }
-
-    /// What every beam meets during a stretch: traced once, since nothing moves.
+    /// What every beam meets during a stretch, traced once since nothing moves; in a flight, during its first scan.
     ///
     /// # Errors
     /// An unknown color.
     pub fn returns(&self, number: usize) -> Result<Returns, SimError> {
-        let setting = self.setting(number)?;
-        Ok((0..beam::COUNT)
-            .into_par_iter()
-            .map(|b| self.sensor.observe(&setting, b))
-            .collect())
+        Ok(self.sight(number)?.returns(0))
     }
 
     /// Records a stretch.
@@ -208,7 +208,24 @@ impl Laboratory {
     /// # Errors
     /// An unknown color.
     pub fn stretch(&self, number: usize) -> Result<Stretch, SimError> {
-        Ok(self.record(number, &self.returns(number)?))
+        let sight = self.sight(number)?;
+        if !sight.moves() {
+            return Ok(self.record(number, &sight.returns(0)));
+        }
+        let mut recorder = self.recorder(number);
+        for scan in 0..self.scans_of(number) {
+            recorder.add(&sight.returns(scan));
+        }
+        Ok(recorder.finish())
+    }
+
+    /// Records a stretch in which nothing moves from what [`Laboratory::returns`] found for it.
+    pub fn record(&self, number: usize, returns: &Returns) -> Stretch {
+        let mut recorder = self.recorder(number);
+        for _ in 0..self.scans_of(number) {
+            recorder.add(returns);
+        }
+        recorder.finish()
     }
 
     /// Number of a stretch's first scan, counted over the whole recording.
@@ -220,36 +237,6 @@ impl Laboratory {
     fn start_s(&self, number: usize) -> f64 {
         let scan_period_s = self.scene.scanner.limits().scan_period_s();
         self.first_scan(number) as f64 * scan_period_s + number as f64 * self.scene.experiment.pause_s
-    }
-
-    /// Records a stretch from what [`Laboratory::returns`] found for it.
-    pub fn record(&self, number: usize, returns: &Returns) -> Stretch {
-        let planned = &self.planned[number];
-        let mut ranges = Vec::with_capacity(planned.scans * beam::COUNT);
-        let all_echoes = self.scene.detection.echo == EchoChoice::All;
-        let mut echoes = all_echoes.then(Vec::new);
-        for chances in self.chances(number).take(planned.scans) {
-            let readings = returns.iter().map(Option::as_ref).zip(&chances);
-            ranges.extend(
-                readings
-                    .clone()
-                    .map(|(found, chance)| self.sensor.read(found, chance)),
-            );
-            if let Some(echoes) = &mut echoes {
-                echoes.extend(readings.map(|(found, chance)| self.sensor.read_all(found, chance)));
-            }
-        }
-        let scan_period_s = self.scene.scanner.limits().scan_period_s();
-        let start_s = self.start_s(number);
-        Stretch {
-            label: self.label(number),
-            start_s,
-            scan_period_s,
-            beams: beam::COUNT,
-            ranges,
-            echoes,
-            tracks: self.tracks(number, start_s, planned.scans as f64 * scan_period_s),
-        }
     }
 
     fn label(&self, number: usize) -> PoseLabel {
@@ -271,6 +258,7 @@ impl Laboratory {
                     .flatten(),
                 ..test
             }),
+            flight: planned.flight.map(|f| self.scene.flight[f].name.clone()),
         }
     }
 
@@ -301,14 +289,16 @@ impl Laboratory {
             ((duration_s * mocap.frame_rate_hz).floor() as u64).max(1),
         );
         let track = |body: &Body<'_>| mocap::track(mocap, self.seed, body, start_s, first_frame, frames);
-        // The rig stays where it is for the whole experiment: one placement.
         let rig = room::points(&self.scene.superstructure.marker);
+        let at_rest = placement::room_from_rig(&self.scene.room);
+        let trajectory = self.planned[number].flight.map(|f| &self.trajectories[f]);
         let mut tracks = vec![track(&Body {
             subject: RIG_SUBJECT,
             index: 0,
             template: &rig,
-            room_from_body: placement::room_from_rig(&self.scene.room),
-            placement: 0,
+            room_from_body: &|elapsed_s| trajectory.map_or(at_rest, |t| t.room_from_rig(elapsed_s)),
+            // The rig stays where it is for the whole experiment, one placement, and is taken up for each flight.
+            placement: if trajectory.is_some() { number + 1 } else { 0 },
         })];
         if let (Some((board, _)), Some(room_from_board)) = (&self.planned[number].board, &self.boards[number])
         {
@@ -317,7 +307,7 @@ impl Laboratory {
                 subject: &self.scene.board[*board].name,
                 index: board + 1,
                 template: &template,
-                room_from_body: *room_from_board,
+                room_from_body: &|_| *room_from_board,
                 placement: number + 1,
             }));
         }

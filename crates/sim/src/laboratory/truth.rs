@@ -4,6 +4,7 @@ use super::Laboratory;
 use crate::error::SimError;
 use crate::optics::{End, Mirrors, Setting};
 use crate::placement;
+use crate::trajectory::Trajectory;
 use crate::truth::{self, TrueBeam, TrueFacet, TruePose, Truth};
 use catoptric_model::{Deflection, PoseData, beam};
 use rayon::prelude::*;
@@ -42,6 +43,7 @@ impl Laboratory {
                     pose: number,
                     kind: self.planned[number].kind,
                     room_from_board: self.boards[number].as_ref().map(PoseData::from),
+                    room_from_sensor: self.flown(number),
                     drift_m: self.drift(number),
                     warm_up_m: self.scene.errors.warm_up.map(|_| {
                         let last = self.planned[number].scans.saturating_sub(1) as f64;
@@ -52,6 +54,17 @@ impl Laboratory {
                 })
                 .collect(),
         })
+    }
+
+    /// Where the sensor was at the start of every scan of a flight.
+    fn flown(&self, number: usize) -> Vec<PoseData> {
+        let planned = &self.planned[number];
+        let trajectory = planned.flight.map(|flight| &self.trajectories[flight]);
+        let at = |trajectory: &Trajectory, scan| {
+            let room_from_rig = trajectory.room_from_rig(self.elapsed_s(scan, 0));
+            PoseData::from(&(room_from_rig * self.structure.rig_from_sensor))
+        };
+        trajectory.map_or_else(Vec::new, |t| (0..planned.scans).map(|scan| at(t, scan)).collect())
     }
 
     fn true_beam(&self, setting: &Setting<'_>, beam: usize) -> TrueBeam {

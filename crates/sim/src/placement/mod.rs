@@ -40,6 +40,8 @@ pub struct Planned {
     pub exact: bool,
     /// What is tested of the bare sensor.
     pub test: Option<TestNote>,
+    /// The flight, by its index.
+    pub flight: Option<usize>,
 }
 
 /// Where rig and nominal sensor stand in the room.
@@ -51,11 +53,28 @@ pub fn room_from_rig(room: &Room) -> Pose {
 }
 
 /// The whole procedure: bare structure, empty room, tests of the bare sensor, boards before undeflected beams, boards
-/// before every facet.
+/// before every facet, flights.
 ///
 /// # Errors
 /// [`SimError::Placement`] where a board fits nowhere, [`SimError::UnknownName`] for a pose that refers to nothing.
 pub fn plan(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
+    let mut planned = procedure(scene, sensor)?;
+    let scan_period_s = scene.scanner.limits().scan_period_s();
+    planned.extend(scene.flight.iter().enumerate().map(|(index, flight)| Planned {
+        kind: PoseKind::Flight,
+        scans: flight.scans(scan_period_s),
+        facet: None,
+        beams: None,
+        board: None,
+        exact: false,
+        test: None,
+        flight: Some(index),
+    }));
+    Ok(planned)
+}
+
+/// Everything but flights.
+fn procedure(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
     let structure = Structure::nominal(scene)?;
     let setting = Setting::new(scene, &structure, Mirrors::Attached, Vec::new())?;
     let room_from_sensor = room_from_rig(&scene.room) * structure::nominal_mount(scene);
@@ -70,11 +89,17 @@ pub fn plan(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
         board: None,
         exact: false,
         test: None,
+        flight: None,
     };
-    let mut planned = vec![
-        without_board(PoseKind::Bare, experiment.bare_scans),
-        without_board(PoseKind::Room, experiment.room_scans),
-    ];
+    let mut planned = Vec::new();
+    let drawn = &scene.superstructure;
+    // Who only flies measures no structure that is not there.
+    if scene.flight.is_empty() || !(drawn.facet.is_empty() && drawn.post.is_empty()) {
+        planned.push(without_board(PoseKind::Bare, experiment.bare_scans));
+    }
+    if scene.room.has_walls() {
+        planned.push(without_board(PoseKind::Room, experiment.room_scans));
+    }
     planned.extend(sensor_tests::plan(scene, &room_from_sensor)?);
     if !experiment.pose.is_empty() {
         for (index, pose) in experiment.pose.iter().enumerate() {
@@ -103,6 +128,7 @@ pub fn plan(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
             board: Some((board, pose)),
             exact: false,
             test: None,
+            flight: None,
         });
     }
     for (number, (facet, first, last)) in facet_groups(
@@ -133,6 +159,7 @@ pub fn plan(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
                 board: Some((board, pose)),
                 exact: false,
                 test: None,
+                flight: None,
             });
         }
     }
@@ -195,5 +222,6 @@ fn given(scene: &Scene, paths: &[Path], pose: &BoardPose, index: usize) -> Resul
         board: Some((board, level * turn)),
         exact: true,
         test: None,
+        flight: None,
     })
 }

@@ -36,6 +36,7 @@ pub(super) fn plan(scene: &Scene, room_from_sensor: &Pose) -> Result<Vec<Planned
                             beams: None,
                             board: Some((board, pose)),
                             exact: false,
+                            flight: None,
                             test: Some(TestNote {
                                 kind: test.kind,
                                 setting,

@@ -6,6 +6,7 @@
 mod body;
 mod detection;
 mod errors;
+mod flight;
 mod room;
 mod scanner;
 mod superstructure;
@@ -17,6 +18,7 @@ pub use body::{
 };
 pub use detection::{Detection, Detector, EchoChoice, Principle};
 pub use errors::{Characterization, Correlated, ErrorModel, Errors, Interference, NoiseTable, WarmUp};
+pub use flight::{Attitude, Flight, Waypoint};
 pub use room::{Board, BoardPose, Color, Experiment, Mocap, MocapProfile, Room};
 pub use scanner::{BeamShape, HousingBox, Light, Limits, Mount, Preset, Scanner};
 pub use superstructure::{
@@ -72,6 +74,9 @@ pub struct Scene {
     /// The procedure.
     #[serde(default)]
     pub experiment: Experiment,
+    /// Flights through the room, recorded after everything else.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub flight: Vec<Flight>,
     /// Errors of the sensor.
     #[serde(default)]
     pub errors: Errors,
@@ -106,7 +111,12 @@ impl Scene {
         let structure = &self.superstructure;
         let nothing_around =
             structure.facet.is_empty() && structure.post.is_empty() && structure.marker.is_empty();
-        nothing_around && self.board.is_empty() && !self.room.has_walls()
+        nothing_around && self.board.is_empty() && self.flight.is_empty() && !self.room.has_walls()
+    }
+
+    /// Whether flights are all that can be recorded, so that no walls are needed.
+    pub fn only_flies(&self) -> bool {
+        !self.flight.is_empty() && self.board.is_empty() && self.experiment.pose.is_empty()
     }
 
     /// Every mesh that it names, with the key that does.

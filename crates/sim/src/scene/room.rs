@@ -47,7 +47,7 @@ fn white() -> String {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Room {
-    /// Extents along x, y and z, in metres. Left out, as only `trace` allows, there are no walls.
+    /// Extents along x, y and z, in metres. Left out, as `trace` and flights allow, there are no walls.
     #[serde(skip_serializing_if = "has_no_walls")]
     #[schemars(inner(range(min = 0.5, max = 100.0)))]
     pub size_m: [f64; 3],

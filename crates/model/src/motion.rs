@@ -1,0 +1,94 @@
+//! Where the rig was while it moved: what motion capture saw of it during a flight, and in between.
+
+use crate::frame::{self, Pose};
+use nalgebra::Translation3;
+
+/// The rig as it was tracked during a stretch of scans in which it moved.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Motion {
+    /// Time at which the first scan began, in seconds since the recording began.
+    pub start_s: f64,
+    /// Time from the start of one scan to the start of the next, in seconds.
+    pub scan_period_s: f64,
+    /// Times of the frames in which the rig was solved, in seconds since the recording began and in their order, and
+    /// `room_from_rig` in each.
+    pub frames: Vec<(f64, Pose)>,
+}
+
+impl Motion {
+    /// Time at which a beam of a scan is read, in seconds since the recording began: start + k·T + i·step.
+    ///
+    /// ```
+    /// use catoptric_model::Motion;
+    /// let motion = Motion { start_s: 2.0, scan_period_s: 0.025, frames: Vec::new() };
+    /// assert_eq!(motion.time_s(4, 72, 0.025 / 1440.0), 2.0 + 0.1 + 0.00125);
+    /// ```
+    pub fn time_s(&self, scan: usize, beam: usize, step_period_s: f64) -> f64 {
+        self.start_s + (scan as f64 * self.scan_period_s + beam as f64 * step_period_s)
+    }
+
+    /// `room_from_rig` at a time; `None` if the rig was never solved.
+    ///
+    /// Between two frames the position is linear in time and the attitude turns at a constant rate along the shorter
+    /// arc. Before the first frame and after the last the motion goes on as between the two nearest: a scan ends up to
+    /// one frame later than the last frame of its stretch. The only frame of all holds for ever.
+    pub fn room_from_rig(&self, time_s: f64) -> Option<Pose> {
+        let (last, before) = self.frames.split_last()?;
+        if before.is_empty() {
+            return Some(last.1);
+        }
+        let after = self.frames.partition_point(|(t, _)| *t <= time_s);
+        let after = after.clamp(1, self.frames.len() - 1);
+        let [(t0, a), (t1, b)] = [self.frames[after - 1], self.frames[after]];
+        if t1 <= t0 {
+            return Some(a);
+        }
+        let share = (time_s - t0) / (t1 - t0);
+        let step = b.translation.vector - a.translation.vector;
+        Some(Pose::from_parts(
+            Translation3::from(a.translation.vector + step * share),
+            frame::slerp(&a.rotation, &b.rotation, share),
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::yaw_pitch_roll;
+    use nalgebra::Point3;
+
+    /// 2 m/s along x and 1.5 rad/s about z, which the rule between frames reproduces exactly.
+    fn truth(time_s: f64) -> Pose {
+        Pose::from_parts(
+            Translation3::new(2.0 * time_s - 1.0, 0.5, 1.8),
+            yaw_pitch_roll(1.5 * time_s, 0.0, 0.0),
+        )
+    }
+
+    fn motion(times: &[f64]) -> Motion {
+        Motion {
+            start_s: 0.0,
+            scan_period_s: 0.025,
+            frames: times.iter().map(|t| (*t, truth(*t))).collect(),
+        }
+    }
+
+    #[test]
+    fn uniform_motion_is_itself_between_frames_and_beyond_them() {
+        // A frame is missing at 0.02 s.
+        let motion = motion(&[0.0, 0.01, 0.03, 0.04]);
+        for time in [-0.005, 0.0, 0.003, 0.01, 0.0211, 0.04, 0.0437] {
+            let (found, expected) = (motion.room_from_rig(time).expect("it was seen"), truth(time));
+            for p in [Point3::origin(), Point3::new(1.0, -2.0, 3.0)] {
+                assert!((found * p - expected * p).norm() < 1e-14, "{time}");
+            }
+        }
+    }
+
+    #[test]
+    fn one_frame_holds_and_none_is_none() {
+        assert_eq!(motion(&[0.01]).room_from_rig(7.0), Some(truth(0.01)));
+        assert_eq!(motion(&[]).room_from_rig(0.0), None);
+    }
+}

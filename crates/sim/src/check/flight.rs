@@ -1,0 +1,146 @@
+//! Flights: whether time goes on, a scan fits in, the turns are clear, and the way stays in the room.
+
+use super::experiment::{outside, room_extent};
+use super::structure::rounded;
+use super::values::distinct;
+use super::{Findings, Path};
+use crate::layout;
+use crate::scene::{Flight, Scene};
+use crate::structure;
+use crate::trajectory::{self, Trajectory};
+use nalgebra::{Point3, Vector3};
+
+/// Turns from waypoint to waypoint must fall this short of half a turn, in degrees: there either arc is the shorter.
+const HALF_TURN_MARGIN_DEG: f64 = 1.0;
+
+/// Places between two waypoints at which the way is looked at.
+const STEPS: u32 = 32;
+
+pub(super) fn check(scene: &Scene, found: &mut Findings) {
+    let flights = Path::of("flight");
+    distinct(&flights, scene.flight.iter().map(|f| f.name.as_str()), found);
+    for (i, flight) in scene.flight.iter().enumerate() {
+        let path = flights.index(i);
+        let before = found.0.len();
+        check_times(flight, &path, found);
+        check_turns(flight, &path, found);
+        if found.0.len() == before {
+            check_scans(scene, flight, &path, found);
+            if scene.room.has_walls() {
+                check_way(scene, flight, &path, found);
+            }
+        }
+    }
+}
+
+fn check_times(flight: &Flight, path: &Path, found: &mut Findings) {
+    let waypoints = path.key("waypoint");
+    if flight.waypoint.len() < 2 {
+        found.add(
+            &waypoints,
+            format_args!(
+                "has {} entries; a flight goes from one to another",
+                flight.waypoint.len()
+            ),
+            "at least 2 are needed; a rig that hovers has the same pose twice".to_owned(),
+        );
+    }
+    for (i, pair) in flight.waypoint.windows(2).enumerate() {
+        if pair[1].time_s <= pair[0].time_s {
+            found.add(
+                &waypoints.index(i + 1).key("time_s"),
+                format_args!(
+                    "is {} s, not more than the {} s before it",
+                    pair[1].time_s, pair[0].time_s
+                ),
+                "times must be strictly increasing".to_owned(),
+            );
+        }
+    }
+}
+
+fn check_turns(flight: &Flight, path: &Path, found: &mut Findings) {
+    for (i, pair) in flight.waypoint.windows(2).enumerate() {
+        let [from, to] = [&pair[0], &pair[1]].map(|w| trajectory::pose(w).rotation);
+        let turn = from.angle_to(&to).to_degrees();
+        if turn > 180.0 - HALF_TURN_MARGIN_DEG {
+            found.add(
+                &path.key("waypoint").index(i + 1),
+                format_args!(
+                    "turns the rig by {}°: which way round is not clear",
+                    rounded(turn)
+                ),
+                "the attitude takes the shorter arc; put a waypoint between the two".to_owned(),
+            );
+        }
+    }
+}
+
+fn check_scans(scene: &Scene, flight: &Flight, path: &Path, found: &mut Findings) {
+    let period = scene.scanner.limits().scan_period_s();
+    let whole = flight.whole_scans(period);
+    let duration = rounded(flight.duration_s());
+    if whole == 0 {
+        let last = flight.waypoint.len().saturating_sub(1);
+        found.add(
+            &path.key("waypoint").index(last).key("time_s"),
+            format_args!("ends the flight after {duration} s, before one scan of {period} s is whole"),
+            None,
+        );
+    } else if let Some(scans) = flight.scans.filter(|s| *s as usize > whole) {
+        found.add(
+            &path.key("scans"),
+            format_args!("is {scans}; the waypoints last {duration} s, which {whole} whole scans fit into"),
+            "put the last waypoint later, or leave `scans` out".to_owned(),
+        );
+    }
+}
+
+/// The rig, the sensor and the mirrors have to stay inside the walls all the way.
+fn check_way(scene: &Scene, flight: &Flight, path: &Path, found: &mut Findings) {
+    let Some(way) = Trajectory::of(flight) else { return };
+    let rig_from_sensor = structure::nominal_mount(scene);
+    let mut parts = vec![("rig".to_owned(), Point3::origin())];
+    parts.push(("sensor".to_owned(), rig_from_sensor * Point3::origin()));
+    for facet in &scene.superstructure.facet {
+        let corners = layout::corners(&facet.shape).unwrap_or_default();
+        parts.extend(
+            corners
+                .iter()
+                .map(|c| (format!("facet {:?}", facet.name), rig_from_sensor * c)),
+        );
+    }
+    let start = flight.waypoint[0].time_s;
+    for (i, pair) in flight.waypoint.windows(2).enumerate() {
+        for step in 0..=STEPS {
+            let share = f64::from(step) / f64::from(STEPS);
+            let time = pair[0].time_s + share * (pair[1].time_s - pair[0].time_s);
+            let room_from_rig = way.room_from_rig(time - start);
+            let beyond = parts.iter().find_map(|(name, place)| {
+                let (wall, beyond) = outside(&(room_from_rig * place), &scene.room.size_m)?;
+                Some((name, wall, beyond))
+            });
+            let Some((name, wall, beyond)) = beyond else {
+                continue;
+            };
+            let waypoint = path.key("waypoint").index(if step == 0 { i } else { i + 1 });
+            let p: Vector3<f64> = room_from_rig.translation.vector;
+            let place = format!("({}, {}, {})", rounded(p.x), rounded(p.y), rounded(p.z));
+            let on_the_way = if step == 0 || step == STEPS {
+                ""
+            } else {
+                " on the way there"
+            };
+            found.add(
+                &waypoint.key("position_m"),
+                format_args!(
+                    "puts the {name} {} m beyond the {wall}{on_the_way}, with the rig at {place} m after {} s",
+                    rounded(beyond),
+                    rounded(time - start)
+                ),
+                room_extent(&scene.room.size_m),
+            );
+            return;
+        }
+    }
+}

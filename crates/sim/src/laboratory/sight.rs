@@ -1,0 +1,110 @@
+//! What the sensor sees during a stretch, scan by scan, free of chance.
+//!
+//! In a flight beam i of scan k is cast from where the sensor is at k·T + i·step after the first waypoint; all the rest
+//! is as where nothing moves. Every scan is a function of the scene, the seed and its number alone.
+
+use super::{Laboratory, Returns, wall_targets};
+use crate::color;
+use crate::error::SimError;
+use crate::optics::{Mirrors, Setting};
+use crate::reading::SubRayEnd;
+use crate::stage::Stage;
+use crate::trajectory::Trajectory;
+use catoptric_model::{Pose, PoseKind, beam};
+use rayon::prelude::*;
+
+/// A stretch with an index over everything that light can meet in it.
+pub struct Sight<'a> {
+    laboratory: &'a Laboratory,
+    setting: Setting<'a>,
+    trajectory: Option<&'a Trajectory>,
+}
+
+impl Laboratory {
+    /// What the sensor sees during a stretch.
+    ///
+    /// # Errors
+    /// An unknown color.
+    pub fn sight(&self, number: usize) -> Result<Sight<'_>, SimError> {
+        let planned = &self.planned[number];
+        let trajectory = planned.flight.map(|flight| &self.trajectories[flight]);
+        let setting = match trajectory {
+            Some(trajectory) => {
+                let start = trajectory.room_from_first() * self.structure.rig_from_sensor;
+                let start_from_room = start.inverse();
+                let wall_paint = color::paint(&self.scene, &self.scene.room.color)?;
+                let walls = wall_targets(&self.scene, &start_from_room, &wall_paint);
+                let stage = Stage::new(&self.scene, &start_from_room)?;
+                Setting::in_flight(&self.scene, &self.structure, stage, walls)?
+            }
+            None => {
+                let mirrors = match planned.kind {
+                    PoseKind::Bare => Mirrors::Removed,
+                    _ => Mirrors::Attached,
+                };
+                let targets = self.targets(number)?;
+                Setting::in_room(&self.scene, &self.structure, mirrors, Some(&self.stage), targets)?
+            }
+        };
+        Ok(Sight {
+            laboratory: self,
+            setting,
+            trajectory,
+        })
+    }
+
+    /// Time at which a beam of a scan is read, in seconds since its stretch began.
+    pub(super) fn elapsed_s(&self, scan: usize, beam: usize) -> f64 {
+        let limits = self.scene.scanner.limits();
+        scan as f64 * limits.scan_period_s() + beam as f64 * limits.step_period_s()
+    }
+}
+
+impl Sight<'_> {
+    /// Whether something moves, so that no two scans need be alike.
+    pub fn moves(&self) -> bool {
+        self.trajectory.is_some()
+    }
+
+    /// Everything that light can meet, as the sensor has it around itself at the start.
+    pub fn setting(&self) -> &Setting<'_> {
+        &self.setting
+    }
+
+    /// What every beam of a scan meets; the same for all scans where nothing moves.
+    pub fn returns(&self, scan: usize) -> Returns {
+        let beams = (0..beam::COUNT).into_par_iter();
+        beams
+            .map(|b| self.seen_by(scan, b, |setting| self.laboratory.sensor.observe(setting, b)))
+            .collect()
+    }
+
+    /// The ways of a beam's sub-rays in a scan, in the sensor frame of its time.
+    pub fn sub_ray_ends(&self, scan: usize, beam: usize) -> Vec<SubRayEnd> {
+        self.seen_by(scan, beam, |setting| {
+            self.laboratory.sensor.sub_ray_ends(setting, beam)
+        })
+    }
+
+    /// Looks from where the sensor is when it reads a beam of a scan.
+    fn seen_by<T>(&self, scan: usize, beam: usize, look: impl FnOnce(&Setting<'_>) -> T) -> T {
+        match self.trajectory {
+            None => look(&self.setting),
+            Some(trajectory) => {
+                let elapsed_s = self.laboratory.elapsed_s(scan, beam);
+                let moved = self.start_from_sensor(trajectory, elapsed_s);
+                look(&self.setting.seen_from(&moved))
+            }
+        }
+    }
+
+    /// Where the sensor is in the frame that it had at the start; exactly there while the rig has not moved.
+    fn start_from_sensor(&self, trajectory: &Trajectory, elapsed_s: f64) -> Pose {
+        let first_from_rig = trajectory.first_from_rig(elapsed_s);
+        if first_from_rig == Pose::identity() {
+            return first_from_rig;
+        }
+        let rig_from_sensor = self.laboratory.structure.rig_from_sensor;
+        rig_from_sensor.inverse() * first_from_rig * rig_from_sensor
+    }
+}
