@@ -230,3 +230,52 @@ fn light_that_ends_nowhere_has_no_place() {
     let weights: f64 = behind.iter().map(|e| e.sub_ray.weight).sum();
     assert!((weights - 1.0).abs() < 1e-12);
 }
+
+#[test]
+fn in_flight_every_scan_has_rows_of_its_own() {
+    let flight = r#"
+[[flight]]
+name = "ahead"
+waypoint = [
+    { time_s = 0, position_m = [0, 0, 1.2] },
+    { time_s = 0.05, position_m = [0.1, 0.02, 1.2], yaw_deg = 3 },
+]
+"#;
+    let (folder, _) = folder_with(&(VALID.to_owned() + flight));
+    record(folder.path(), "set", &["scanner.sub_rays=7"]);
+    let in_flight = |name: &str| {
+        let rows = table(folder.path(), name);
+        let last = rows.last().unwrap()["pose"].clone();
+        let of_flight = rows.into_iter().filter(|r| r["pose"] == last);
+        let mut scans = BTreeMap::<(String, String), Vec<_>>::new();
+        for row in of_flight {
+            scans
+                .entry((row["scan"].clone(), row["beam"].clone()))
+                .or_default()
+                .push(row);
+        }
+        scans
+    };
+    let (rays, returns) = (in_flight("sub_rays.csv"), in_flight("returns.csv"));
+    assert_eq!(rays.len(), 2 * beam::COUNT);
+    let mut moved = 0;
+    for ((scan, beam), rows) in &rays {
+        assert!(scan == "0" || scan == "1", "{scan:?}");
+        let weight: f64 = rows.iter().map(|r| number(r, "weight")).sum();
+        assert!((weight - 1.0).abs() < 1e-12, "{scan} {beam}: {weight}");
+        let Some(found) = returns.get(&(scan.clone(), beam.clone())) else {
+            continue;
+        };
+        let sums = powers(rows);
+        let sums = &sums[&(found[0]["facets"].clone(), found[0]["surface"].clone())];
+        let power = number(&found[0], "power_w");
+        assert!(
+            sums.values().any(|sum| (sum / power - 1.0).abs() < 1e-12),
+            "{scan} {beam}"
+        );
+        let other = &rays[&("0".to_owned(), beam.clone())];
+        moved += usize::from(scan == "1" && other[0]["path_m"] != rows[0]["path_m"]);
+    }
+    // Between the scans the rig goes 50 mm: all that is not on the rig itself is elsewhere.
+    assert!(moved > 900, "{moved}");
+}
