@@ -313,9 +313,10 @@ pub(crate) type Tell<'a> = &'a mut dyn FnMut(&str) -> Result<(), CliError>;
 
 /// First line of truth/returns.csv. A reading is geometric + mixed + detection + the three biases, then what
 /// truth/readings.csv lists, rounded; a beam without an echo has no row, one with several has one for each. `scan` is
-/// empty where nothing moves and the row holds for every scan.
+/// empty where nothing moves and the row holds for every scan; the incidence on the facets is joined as they are.
 const RETURNS_HEADER: &str = "pose,beam,surface,facets,geometric_m,cos_incidence,power_w,share,mixed_m,detection_m,\
-                              distance_bias_m,angle_bias_m,color_bias_m,noise_sd_m,echo,detection_probability,scan\n";
+                              distance_bias_m,angle_bias_m,color_bias_m,noise_sd_m,echo,detection_probability,scan,\
+                              facet_cos_incidence\n";
 
 /// The names of all mirrors, by their index.
 pub(crate) fn mirror_names(scene: &Scene) -> Vec<&str> {
@@ -371,8 +372,10 @@ fn rows_of_returns(laboratory: &Laboratory, pose: usize, returns: &Returns, scan
     });
     for (beam, echo, r) in echoes {
         let (surface, facets) = (role_name(r.role), way(&names, &r.facets));
+        let cosines: Vec<String> = r.facet_cos_incidence.iter().map(f64::to_string).collect();
+        let cosines = cosines.join(">");
         text.push_str(&format!(
-            "{pose},{beam},{surface},{facets},{},{},{},{},{},{},{},{},{},{},{echo},{},{scan}\n",
+            "{pose},{beam},{surface},{facets},{},{},{},{},{},{},{},{},{},{},{echo},{},{scan},{cosines}\n",
             r.geometric,
             r.cos_incidence,
             r.power,

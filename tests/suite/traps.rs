@@ -155,6 +155,11 @@ fn label() {
         (Role::Wall, [0].as_slice())
     );
     assert!((found.range() - 3.0).abs() < 1e-12, "{found:?}");
+    // The mirror stands at 45° and turns the light straight up.
+    let [on_mirror] = found.facet_cos_incidence[..] else {
+        panic!("{found:?}")
+    };
+    assert!((on_mirror - 0.5_f64.sqrt()).abs() < 1e-12, "{on_mirror}");
     let (_, met, _) = way(&scene, &ray([0.0, 0.0, 2.0], [1.0, 0.0, 0.0]));
     assert_eq!(met, ["lift", "ceiling"]);
 }

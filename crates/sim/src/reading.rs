@@ -47,6 +47,8 @@ pub struct Return {
     pub geometric: f64,
     /// Cosine of the incidence on it.
     pub cos_incidence: f64,
+    /// Cosine of the incidence on each of the facets, as for the surface of the chief ray or the mean.
+    pub facet_cos_incidence: Vec<f64>,
     /// Power received from it, in watts.
     pub power: f64,
     /// Share of the beam's energy that falls on it.
@@ -100,10 +102,50 @@ struct Part {
     pulses: Vec<Pulse>,
     share: f64,
     power: f64,
-    /// Range and cosine of incidence of the chief ray, or of the mean.
-    chief: Option<(f64, f64)>,
-    mean_range: f64,
-    mean_cos: f64,
+    /// Where the chief ray meets it.
+    chief: Option<Place>,
+    /// Where its light does on the average.
+    mean: Place,
+}
+
+/// Where light meets a surface.
+#[derive(Debug, Clone, Copy, Default)]
+struct Place {
+    range: f64,
+    cos_incidence: f64,
+    /// Cosine of the incidence on each of the facets before.
+    facets: [f64; MAX_BOUNCES],
+}
+
+impl Place {
+    fn new(path: &Path, bounces: usize, range: f64, cos_incidence: f64) -> Self {
+        let mut facets = [0.0; MAX_BOUNCES];
+        for (cos, meeting) in facets.iter_mut().zip(path.meetings().take(bounces)) {
+            *cos = meeting.cos_incidence;
+        }
+        Self {
+            range,
+            cos_incidence,
+            facets,
+        }
+    }
+
+    /// Adds another with a weight.
+    fn add(&mut self, weight: f64, other: &Self) {
+        self.range += weight * other.range;
+        self.cos_incidence += weight * other.cos_incidence;
+        for (sum, cos) in self.facets.iter_mut().zip(other.facets) {
+            *sum += weight * cos;
+        }
+    }
+
+    fn divide(&mut self, by: f64) {
+        self.range /= by;
+        self.cos_incidence /= by;
+        for cos in &mut self.facets {
+            *cos /= by;
+        }
+    }
 }
 
 impl Sensor {
@@ -272,13 +314,15 @@ impl Sensor {
     /// An echo with everything that it says of its surface; `None` beyond the longest range.
     fn returned(&self, setting: &Setting<'_>, seen: &Seen<'_>) -> Option<Return> {
         let part = seen.part;
-        let (geometric, cos_incidence) = part.place();
+        let place = part.place();
+        let (geometric, cos_incidence) = (place.range, place.cos_incidence);
         let paint = setting.paint(part.surface);
         let found = Return {
             role: setting.role(part.surface),
             facets: part.facets[..part.count].to_vec(),
             geometric,
             cos_incidence,
+            facet_cos_incidence: place.facets[..part.count].to_vec(),
             power: part.power,
             share: part.share,
             mixed: seen.mixed,
@@ -345,33 +389,20 @@ impl Sensor {
             Self::add_chief(&mut parts, &self.chief_path(setting, beam));
         }
         for part in parts.iter_mut().filter(|p| p.power > 0.0) {
-            part.mean_range /= part.power;
-            part.mean_cos /= part.power;
+            part.mean.divide(part.power);
         }
         parts
     }
 
-    /// Adds the light of a sub-ray that reaches a surface on its way.
+    /// Adds the light of a sub-ray that reaches a surface to the part of that surface and the facets on the way.
     fn add(&self, parts: &mut Vec<Part>, path: &Path, arrival: &Arrival, chief: bool) {
-        let way = (arrival.surface, &path.facets()[..arrival.bounces]);
-        self.add_light(parts, way, &arrival.on, arrival.gain, chief);
-    }
-
-    /// Adds light to the part of a surface and the facets on the way there; `gain` is what is left of its energy.
-    fn add_light(
-        &self,
-        parts: &mut Vec<Part>,
-        (surface, facets): (usize, &[usize]),
-        on: &Illumination,
-        gain: f64,
-        chief: bool,
-    ) {
+        let (on, facets) = (&arrival.on, &path.facets()[..arrival.bounces]);
         let power = power::received(&self.light, on);
-        let same_way = |p: &Part| p.surface == surface && p.facets[..p.count] == *facets;
+        let same_way = |p: &Part| p.surface == arrival.surface && p.facets[..p.count] == *facets;
         let index = match parts.iter().position(same_way) {
             Some(index) => index,
             None => {
-                parts.push(Part::new(surface, facets));
+                parts.push(Part::new(arrival.surface, facets));
                 parts.len() - 1
             }
         };
@@ -380,12 +411,12 @@ impl Sensor {
             range: on.range,
             power,
         });
-        part.share += on.share * gain;
+        part.share += on.share * arrival.gain;
         part.power += power;
-        part.mean_range += power * on.range;
-        part.mean_cos += power * on.cos_incidence;
+        let place = Place::new(path, arrival.bounces, on.range, on.cos_incidence);
+        part.mean.add(power, &place);
         if chief {
-            part.chief = Some((on.range, on.cos_incidence));
+            part.chief = Some(place);
         }
     }
 
@@ -396,7 +427,8 @@ impl Sensor {
                 .iter_mut()
                 .find(|p| p.surface == hit.surface && p.facets[..p.count] == *path.facets())
         {
-            part.chief = Some((path.length, hit.normal.dot(&path.last.direction).abs()));
+            let cos_incidence = hit.normal.dot(&path.last.direction).abs();
+            part.chief = Some(Place::new(path, part.count, path.length, cos_incidence));
         }
     }
 
@@ -409,12 +441,12 @@ impl Sensor {
         let edge = detect::leading_edge(&all, self.receiver.sd, self.receiver.threshold)?;
         let first = edge.compensated(self.receiver.sd, self.receiver.threshold);
         let pulse_length = detect::pulse_length(self.receiver.sd);
-        let in_echo = |p: &&Part| p.power > 0.0 && p.mean_range <= first + pulse_length;
+        let in_echo = |p: &&Part| p.power > 0.0 && p.mean.range <= first + pulse_length;
         let part = parts
             .iter()
             .filter(in_echo)
             .max_by(|a, b| a.power.total_cmp(&b.power))?;
-        let (geometric, _) = part.place();
+        let geometric = part.place().range;
         let read = |edge: &detect::Edge| {
             if physical {
                 edge.crossing + self.reference_walk
@@ -431,9 +463,9 @@ impl Sensor {
 }
 
 impl Part {
-    /// Range and cosine of incidence of the chief ray, or the means over the light where it goes elsewhere.
-    fn place(&self) -> (f64, f64) {
-        self.chief.unwrap_or((self.mean_range, self.mean_cos))
+    /// Where the chief ray meets it, or where its light does on the average if that goes elsewhere.
+    fn place(&self) -> Place {
+        self.chief.unwrap_or(self.mean)
     }
 
     fn new(surface: usize, facets: &[usize]) -> Self {
@@ -447,8 +479,7 @@ impl Part {
             share: 0.0,
             power: 0.0,
             chief: None,
-            mean_range: 0.0,
-            mean_cos: 0.0,
+            mean: Place::default(),
         }
     }
 }

@@ -179,6 +179,7 @@ proptest! {
             facets: Vec::new(),
             geometric: range,
             cos_incidence: 1.0,
+            facet_cos_incidence: Vec::new(),
             power: 1.0,
             share: 1.0,
             mixed: 0.0,

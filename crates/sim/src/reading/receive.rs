@@ -60,13 +60,13 @@ impl Sensor {
             }
         };
         let seen = |echo: &Echo| {
-            let inside = |p: &&Part| p.power > 0.0 && (echo.start..=echo.end).contains(&p.mean_range);
+            let inside = |p: &&Part| p.power > 0.0 && (echo.start..=echo.end).contains(&p.mean.range);
             let part = parts
                 .iter()
                 .filter(inside)
                 .max_by(|a, b| a.power.total_cmp(&b.power))
                 .or_else(|| nearest(parts, echo.compensated))?;
-            let (geometric, _) = part.place();
+            let geometric = part.place().range;
             // A surface too dim to be seen without the others stands for its own range.
             let alone = self.receiver.echoes(&part.pulses, self.faintest());
             let alone = alone.iter().max_by(|a, b| a.peak.total_cmp(&b.peak));
@@ -92,7 +92,7 @@ impl Sensor {
         if whole.amplitude < self.faintest() {
             return Vec::new();
         }
-        let (geometric, _) = part.place();
+        let geometric = part.place().range;
         let alone = phase::sum(&part.pulses, ambiguity).map_or(geometric, |p| p.range);
         let base = if physical {
             alone
@@ -111,7 +111,7 @@ impl Sensor {
 
 /// The part whose light is nearest to a range.
 fn nearest(parts: &[Part], range: f64) -> Option<&Part> {
-    let away = |p: &&Part| (p.mean_range - range).abs();
+    let away = |p: &&Part| (p.mean.range - range).abs();
     parts
         .iter()
         .filter(|p| p.power > 0.0)
