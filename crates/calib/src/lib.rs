@@ -22,6 +22,7 @@ pub mod error;
 pub mod initial;
 pub mod jacobian;
 mod judge;
+pub mod least_squares;
 mod mount_data;
 pub mod observability;
 pub mod observations;
