@@ -40,7 +40,7 @@ impl Default for Options {
             step_tolerance: 1e-14,
             gradient_tolerance: 1e-15,
             max_evaluations: 2000,
-            first_radius: 100.0,
+            first_radius: 1.0,
             rank_threshold: 1e-11,
         }
     }
