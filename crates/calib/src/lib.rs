@@ -9,8 +9,9 @@
 //!
 //! [`calibrate`] runs the paper's steps 4–6 and 11–13: it places the sensor in the rig ([`pose`]), sorts the elements
 //! ([`screen`]), solves each deflected one on the boards that it hits ([`solve`], [`recursive`]), says what the boards
-//! leave open ([`observability`]) and how far the answer can be off ([`covariance`]). The crate knows the model, not
-//! the simulator: it cannot see the truth. It reads no file, prints nothing and draws nothing at random.
+//! leave open ([`observability`]) and how far the answer can be off ([`covariance`]). [`least_squares`] solves problems
+//! of many parameters for estimators to be built on it. The crate knows the model, not the simulator: it cannot see the
+//! truth. It reads no file, prints nothing and draws nothing at random.
 
 mod ahead;
 mod calibrate;
@@ -23,6 +24,7 @@ pub mod error;
 pub mod initial;
 pub mod jacobian;
 mod judge;
+pub mod least_squares;
 mod mount_data;
 pub mod observability;
 pub mod observations;

@@ -1,0 +1,145 @@
+//! Gaussian priors as rows: L·(x ⊟ x̄), LᵀL the inverse covariance of a block about its mean.
+
+use super::manifold::{Block, Point};
+use super::problem::{GroupJacobian, GroupedProblem};
+use nalgebra::{DMatrix, DVector};
+
+/// What is believed of one block before any residual.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Prior {
+    block: usize,
+    mean: Block,
+    root: DMatrix<f64>,
+}
+
+impl Prior {
+    /// A belief with independent errors: one standard deviation for each tangent coordinate of the block.
+    ///
+    /// An infinite standard deviation says nothing of its coordinate.
+    ///
+    /// # Panics
+    ///
+    /// If the numbers do not fit the block or are not positive.
+    pub fn independent(block: usize, mean: Block, standard_deviations: &[f64]) -> Self {
+        assert_eq!(
+            standard_deviations.len(),
+            mean.dimension(),
+            "one standard deviation each"
+        );
+        assert!(
+            standard_deviations.iter().all(|sd| *sd > 0.0),
+            "positive standard deviations"
+        );
+        let weights = standard_deviations.iter().map(|sd| 1.0 / sd).collect();
+        Self {
+            block,
+            mean,
+            root: DMatrix::from_diagonal(&DVector::from_vec(weights)),
+        }
+    }
+
+    /// A belief with a covariance in tangent coordinates at the mean; `None` if it is not positive definite.
+    ///
+    /// # Panics
+    ///
+    /// If the covariance does not fit the block.
+    pub fn correlated(block: usize, mean: Block, covariance: &DMatrix<f64>) -> Option<Self> {
+        let n = mean.dimension();
+        assert_eq!(covariance.shape(), (n, n), "the covariance fits the block");
+        // C = KKᵀ, so L = K⁻¹ has LᵀL = C⁻¹.
+        let lower = covariance.clone().cholesky()?.l();
+        let root = lower.solve_lower_triangular(&DMatrix::identity(n, n))?;
+        Some(Self { block, mean, root })
+    }
+
+    /// L·(x ⊟ x̄).
+    ///
+    /// # Panics
+    ///
+    /// If the point has no such block, or one of another kind.
+    pub fn residuals(&self, at: &Point) -> DVector<f64> {
+        &self.root * self.mean.difference(&at.blocks[self.block])
+    }
+
+    /// Derivatives of the rows with respect to all tangent coordinates of the point.
+    ///
+    /// # Panics
+    ///
+    /// As [`residuals`](Self::residuals).
+    pub fn jacobian(&self, at: &Point) -> DMatrix<f64> {
+        let block = &at.blocks[self.block];
+        let mut all = DMatrix::zeros(self.root.nrows(), at.dimension());
+        let part = &self.root * self.mean.difference_jacobian(block);
+        all.columns_mut(at.offset(self.block), block.dimension())
+            .copy_from(&part);
+        all
+    }
+}
+
+/// A problem with priors on shared parameters, as one more group, and on the groups' own, as their last rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct WithPriors<'a, P> {
+    /// The problem without them.
+    pub problem: &'a P,
+    /// On the blocks of the shared point.
+    pub shared: Vec<Prior>,
+    /// On the blocks of each group's own point; groups beyond the last one have none.
+    pub own: Vec<Vec<Prior>>,
+}
+
+impl<P> WithPriors<'_, P> {
+    fn own(&self, group: usize) -> &[Prior] {
+        self.own.get(group).map_or(&[], Vec::as_slice)
+    }
+}
+
+impl<P: GroupedProblem> GroupedProblem for WithPriors<'_, P> {
+    fn groups(&self) -> usize {
+        self.problem.groups() + 1
+    }
+
+    fn residuals(&self, group: usize, shared: &Point, own: &Point) -> Option<DVector<f64>> {
+        if group == self.problem.groups() {
+            return Some(stacked(self.shared.iter().map(|p| p.residuals(shared))));
+        }
+        let measured = self.problem.residuals(group, shared, own)?;
+        let priors = self.own(group).iter().map(|p| p.residuals(own));
+        Some(stacked(std::iter::once(measured).chain(priors)))
+    }
+
+    fn jacobian(&self, group: usize, shared: &Point, own: &Point) -> Option<GroupJacobian> {
+        if group == self.problem.groups() {
+            let all = below(shared.dimension(), self.shared.iter().map(|p| p.jacobian(shared)));
+            let own = DMatrix::zeros(all.nrows(), own.dimension());
+            return Some(GroupJacobian { shared: all, own });
+        }
+        let measured = self.problem.jacobian(group, shared, own)?;
+        let priors = self.own(group).iter().map(|p| p.jacobian(own));
+        let own = below(own.dimension(), std::iter::once(measured.own).chain(priors));
+        let shared = measured.shared.resize_vertically(own.nrows(), 0.0);
+        Some(GroupJacobian { shared, own })
+    }
+
+    fn measured_rows(&self, group: usize, rows: usize) -> usize {
+        if group == self.problem.groups() {
+            return 0;
+        }
+        let priors: usize = self.own(group).iter().map(|p| p.root.nrows()).sum();
+        self.problem.measured_rows(group, rows - priors)
+    }
+}
+
+fn stacked(parts: impl Iterator<Item = DVector<f64>>) -> DVector<f64> {
+    DVector::from_vec(parts.flat_map(|p| p.as_slice().to_vec()).collect())
+}
+
+fn below(columns: usize, parts: impl Iterator<Item = DMatrix<f64>>) -> DMatrix<f64> {
+    let parts: Vec<_> = parts.collect();
+    let mut all = DMatrix::zeros(parts.iter().map(DMatrix::nrows).sum(), columns);
+    let mut row = 0;
+    for part in &parts {
+        all.rows_mut(row, part.nrows()).copy_from(part);
+        row += part.nrows();
+    }
+    all
+}

@@ -1,0 +1,238 @@
+//! What is to be minimized: residuals and their Jacobian, as the caller supplies them.
+//!
+//! A [`Problem`] is a plain one. A [`GroupedProblem`] has an arrow of a Jacobian: each group of residuals depends on the
+//! shared parameters and on its own, which no other group sees, so that its own can be eliminated group by group.
+
+use super::manifold::Point;
+use nalgebra::{DMatrix, DVector};
+use thiserror::Error;
+
+/// Residuals of one point, with derivatives from the caller.
+///
+/// Residuals are best given in units of their standard deviations: then covariances need no further factor. A residual
+/// function that is undefined at a point (a ray that misses its board) returns `None`; the solver then tries nearer.
+pub trait Problem {
+    /// f(x), m numbers; the same m at every point.
+    fn residuals(&self, at: &Point) -> Option<DVector<f64>>;
+    /// ∂f(x ⊞ δ)/∂δ at δ = 0, m × n, with n the dimension of the point's tangent space.
+    fn jacobian(&self, at: &Point) -> Option<DMatrix<f64>>;
+}
+
+/// Derivatives of one group of residuals.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupJacobian {
+    /// With respect to the shared parameters, m × n.
+    pub shared: DMatrix<f64>,
+    /// With respect to the group's own parameters, m × k.
+    pub own: DMatrix<f64>,
+}
+
+/// Residuals in groups, each depending on the shared parameters and on the group's own.
+///
+/// Every [`Problem`] is one: a single group that owns nothing.
+pub trait GroupedProblem {
+    /// Number of groups.
+    fn groups(&self) -> usize;
+    /// Residuals of one group; see [`Problem::residuals`].
+    fn residuals(&self, group: usize, shared: &Point, own: &Point) -> Option<DVector<f64>>;
+    /// Derivatives of one group; see [`Problem::jacobian`].
+    fn jacobian(&self, group: usize, shared: &Point, own: &Point) -> Option<GroupJacobian>;
+    /// How many rows of a group, counted from its first, are measurements that a robust loss may doubt.
+    ///
+    /// The others (priors, by convention the last) always keep their full weight.
+    fn measured_rows(&self, group: usize, rows: usize) -> usize {
+        let _ = group;
+        rows
+    }
+}
+
+impl<P: Problem> GroupedProblem for P {
+    fn groups(&self) -> usize {
+        1
+    }
+
+    fn residuals(&self, _group: usize, shared: &Point, _own: &Point) -> Option<DVector<f64>> {
+        Problem::residuals(self, shared)
+    }
+
+    fn jacobian(&self, _group: usize, shared: &Point, _own: &Point) -> Option<GroupJacobian> {
+        let shared = Problem::jacobian(self, shared)?;
+        let own = DMatrix::zeros(shared.nrows(), 0);
+        Some(GroupJacobian { shared, own })
+    }
+}
+
+/// Values of all parameters: the shared ones, then each group's own.
+///
+/// Its tangent space has the coordinates of `shared` first, then those of `own[0]`, `own[1]`, …
+#[derive(Debug, Clone, PartialEq)]
+pub struct State {
+    /// What all groups share.
+    pub shared: Point,
+    /// What each group owns; groups beyond the last one own nothing.
+    pub own: Vec<Point>,
+}
+
+impl From<Point> for State {
+    fn from(shared: Point) -> Self {
+        Self {
+            shared,
+            own: Vec::new(),
+        }
+    }
+}
+
+const NOTHING: &Point = &Point { blocks: Vec::new() };
+
+impl State {
+    /// Own parameters of a group.
+    pub fn own(&self, group: usize) -> &Point {
+        self.own.get(group).unwrap_or(NOTHING)
+    }
+
+    /// Dimension of the tangent space.
+    pub fn dimension(&self) -> usize {
+        self.shared.dimension() + self.own.iter().map(Point::dimension).sum::<usize>()
+    }
+
+    /// x ⊞ δ.
+    pub fn retract(&self, step: &DVector<f64>) -> Self {
+        let mut from = self.shared.dimension();
+        let shared = self.shared.retract(&step.as_slice()[..from]);
+        let own = self
+            .own
+            .iter()
+            .map(|point| {
+                let to = from + point.dimension();
+                let moved = point.retract(&step.as_slice()[from..to]);
+                from = to;
+                moved
+            })
+            .collect();
+        Self { shared, own }
+    }
+
+    /// Size of each coordinate, against which a step is large or small; see [`Point::extent`].
+    pub fn extent(&self) -> DVector<f64> {
+        let own = self.own.iter().flat_map(Point::extent);
+        DVector::from_vec(self.shared.extent().into_iter().chain(own).collect())
+    }
+}
+
+/// A grouped problem as a plain one: all parameters in one point, one dense Jacobian.
+///
+/// It has the same minimum as the grouped one, at the price of the dense matrix; it serves to check one by the other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Flat<'a, P> {
+    problem: &'a P,
+    shared_blocks: usize,
+    own_blocks: Vec<usize>,
+}
+
+impl<'a, P: GroupedProblem> Flat<'a, P> {
+    /// The problem, and the state as one point: blocks of `shared`, then of each group.
+    pub fn new(problem: &'a P, state: &State) -> (Self, Point) {
+        let blocks = state
+            .own
+            .iter()
+            .fold(state.shared.blocks.clone(), |mut all, own| {
+                all.extend_from_slice(&own.blocks);
+                all
+            });
+        let flat = Self {
+            problem,
+            shared_blocks: state.shared.blocks.len(),
+            own_blocks: state.own.iter().map(|p| p.blocks.len()).collect(),
+        };
+        (flat, Point { blocks })
+    }
+
+    /// A point of the plain problem as a state of the grouped one.
+    pub fn state(&self, at: &Point) -> State {
+        let mut rest = &at.blocks[self.shared_blocks..];
+        let own = self
+            .own_blocks
+            .iter()
+            .map(|count| {
+                let (head, tail) = rest.split_at(*count);
+                rest = tail;
+                Point {
+                    blocks: head.to_vec(),
+                }
+            })
+            .collect();
+        let shared = Point {
+            blocks: at.blocks[..self.shared_blocks].to_vec(),
+        };
+        State { shared, own }
+    }
+}
+
+impl<P: GroupedProblem> Problem for Flat<'_, P> {
+    fn residuals(&self, at: &Point) -> Option<DVector<f64>> {
+        let state = self.state(at);
+        let mut all = Vec::new();
+        for group in 0..self.problem.groups() {
+            let rows = self.problem.residuals(group, &state.shared, state.own(group))?;
+            all.extend_from_slice(rows.as_slice());
+        }
+        Some(DVector::from_vec(all))
+    }
+
+    fn jacobian(&self, at: &Point) -> Option<DMatrix<f64>> {
+        let state = self.state(at);
+        let shared_width = state.shared.dimension();
+        let mut from = shared_width;
+        let mut placed = Vec::new();
+        for group in 0..self.problem.groups() {
+            let part = self.problem.jacobian(group, &state.shared, state.own(group))?;
+            let width = part.own.ncols();
+            placed.push((from, part));
+            from += width;
+        }
+        let rows = placed.iter().map(|(_, part)| part.shared.nrows()).sum();
+        let mut all = DMatrix::zeros(rows, state.dimension());
+        let mut row = 0;
+        for (column, part) in &placed {
+            let height = part.shared.nrows();
+            all.view_mut((row, 0), (height, shared_width))
+                .copy_from(&part.shared);
+            all.view_mut((row, *column), (height, part.own.ncols()))
+                .copy_from(&part.own);
+            row += height;
+        }
+        Some(all)
+    }
+}
+
+/// What keeps a problem from being solved at all.
+#[derive(Debug, Clone, PartialEq, Eq, Error)]
+pub enum ProblemError {
+    /// The residuals or their derivatives are undefined or not finite at a point that the solver must be at.
+    #[error("the residuals of group {group} are undefined or not finite at the {place}")]
+    Undefined {
+        /// Group of residuals.
+        group: usize,
+        /// Which point.
+        place: &'static str,
+    },
+    /// A Jacobian does not fit its residuals or its parameters.
+    #[error(
+        "the Jacobian of group {group} is {found_rows} × {found_columns} for its {parameters} parameters; \
+         needed are {rows} × {columns}"
+    )]
+    Shape {
+        /// Group of residuals.
+        group: usize,
+        /// Whose derivatives: "shared" or "own".
+        parameters: &'static str,
+        /// Rows needed: the number of residuals.
+        rows: usize,
+        /// Columns needed: the dimension of the parameters.
+        columns: usize,
+        /// Rows found.
+        found_rows: usize,
+        /// Columns found.
+        found_columns: usize,
+    },
+}

@@ -1,0 +1,12 @@
+//! Tests of the least-squares solver: against certified and classic problems, derivatives by dual numbers, the dense
+//! solution of grouped problems, and samples of known errors.
+
+mod classics;
+mod duals;
+mod grouped;
+mod information;
+mod manifolds;
+mod nist;
+mod priors;
+mod robust;
+mod sample;
