@@ -19,6 +19,7 @@ mod score;
 mod simulate;
 mod sub_rays;
 mod trace;
+mod truth_tables;
 mod validate;
 
 use clap::{ArgAction, Args, Parser, Subcommand};

@@ -6,12 +6,10 @@ use super::interrupt;
 use super::output::{counted, print, quoted};
 use super::progress::Progress;
 use super::sub_rays;
+use super::truth_tables::{READINGS_HEADER, RETURNS_HEADER, Rows, reading_rows, return_rows, sub_ray_rows};
 use catoptric::io::{self, DatasetWriter, IoError, Provenance, dataset, scene};
 use catoptric::model::{Stretch, beam};
 use catoptric::sim::laboratory::{Returns, Sight};
-use catoptric::sim::optics::Role;
-use catoptric::sim::reading::Return;
-use catoptric::sim::scene::ErrorModel;
 use catoptric::sim::{Laboratory, Scene, SimError, noise};
 use clap::Args;
 use rayon::prelude::*;
@@ -110,8 +108,13 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         return print(&format!("{json}\n"));
     }
     let out = quoted(&arguments.out);
+    let next = if scene.superstructure.facet.is_empty() && !scene.experiment.test.is_empty() {
+        format!("catoptric characterize {out} --out characterization.json")
+    } else {
+        format!("catoptric calibrate {out} --out calibration.json")
+    };
     print(&format!(
-        "wrote {}: {} of {}, seed {}\nnext: catoptric calibrate {out} --out calibration.json\n",
+        "wrote {}: {} of {}, seed {}\nnext: {next}\n",
         arguments.out.display(),
         counted(figures.scans, "scan"),
         counted(figures.beams, "beam"),
@@ -247,11 +250,11 @@ pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Fig
 }
 
 /// A stretch, what it was made from, and how long that took.
-struct Recorded<'a> {
-    sight: Sight<'a>,
+pub(super) struct Recorded<'a> {
+    pub(super) sight: Sight<'a>,
     /// What every beam met; of a flight, during its first scan: all of it would not fit into memory.
-    first: Returns,
-    stretch: Stretch,
+    pub(super) first: Returns,
+    pub(super) stretch: Stretch,
     segments: usize,
     trace: Duration,
     sample: Duration,
@@ -288,7 +291,7 @@ impl<'a> Recorded<'a> {
     }
 
     /// What every beam met during a scan; those of a flight are traced again.
-    fn returns(&self, scan: usize) -> Cow<'_, Returns> {
+    pub(super) fn returns(&self, scan: usize) -> Cow<'_, Returns> {
         if self.sight.moves() && scan > 0 {
             Cow::Owned(self.sight.returns(scan))
         } else {
@@ -303,138 +306,4 @@ fn segments_of(returns: &Returns) -> usize {
             .map_or(1, |r: &catoptric::sim::reading::Return| r.facets.len() + 1)
     };
     returns.iter().map(pieces).sum()
-}
-
-/// Tells the rows of one stretch in a table of the truth, as many at a time as fit in memory well.
-type Rows = fn(&Laboratory, usize, &Recorded<'_>, Tell<'_>) -> Result<(), CliError>;
-
-/// Takes rows on.
-pub(crate) type Tell<'a> = &'a mut dyn FnMut(&str) -> Result<(), CliError>;
-
-/// First line of truth/returns.csv. A reading is geometric + mixed + detection + the three biases, then what
-/// truth/readings.csv lists, rounded; a beam without an echo has no row, one with several has one for each. `scan` is
-/// empty where nothing moves and the row holds for every scan; the incidence on the facets is joined as they are.
-const RETURNS_HEADER: &str = "pose,beam,surface,facets,geometric_m,cos_incidence,power_w,share,mixed_m,detection_m,\
-                              distance_bias_m,angle_bias_m,color_bias_m,noise_sd_m,echo,detection_probability,scan,\
-                              facet_cos_incidence\n";
-
-/// The names of all mirrors, by their index.
-pub(crate) fn mirror_names(scene: &Scene) -> Vec<&str> {
-    let facets = scene.superstructure.facet.iter().map(|f| f.name.as_str());
-    let mirrors = scene.room.mirror.iter().map(|m| m.name.as_str());
-    facets.chain(mirrors).collect()
-}
-
-/// What a surface is, as the tables of the truth say it.
-pub(crate) fn role_name(role: Role) -> &'static str {
-    match role {
-        Role::Facet(_) => "facet",
-        Role::Structure => "structure",
-        Role::Board => "board",
-        Role::Wall => "wall",
-        Role::Object => "object",
-    }
-}
-
-/// A field of free text: a comma or a quote in a name must not end it.
-pub(crate) fn field(text: &str) -> String {
-    format!("\"{}\"", text.replace('"', "\"\""))
-}
-
-/// Names of the mirrors of a way, as one field.
-pub(crate) fn way(names: &[&str], facets: &[usize]) -> String {
-    let facets: Vec<&str> = facets.iter().map(|f| names[*f]).collect();
-    field(&facets.join(">"))
-}
-
-fn return_rows(
-    laboratory: &Laboratory,
-    pose: usize,
-    recorded: &Recorded<'_>,
-    tell: Tell<'_>,
-) -> Result<(), CliError> {
-    if !recorded.sight.moves() {
-        return tell(&rows_of_returns(laboratory, pose, &recorded.first, ""));
-    }
-    for scan in 0..laboratory.scans_of(pose) {
-        let returns = recorded.returns(scan);
-        tell(&rows_of_returns(laboratory, pose, &returns, &scan.to_string()))?;
-    }
-    Ok(())
-}
-
-fn rows_of_returns(laboratory: &Laboratory, pose: usize, returns: &Returns, scan: &str) -> String {
-    let names = mirror_names(laboratory.scene());
-    let mut text = String::new();
-    let echoes = returns.iter().enumerate().flat_map(|(beam, found)| {
-        let echoes = found.iter().flat_map(Return::echoes).enumerate();
-        echoes.map(move |(echo, r)| (beam, echo, r))
-    });
-    for (beam, echo, r) in echoes {
-        let (surface, facets) = (role_name(r.role), way(&names, &r.facets));
-        let cosines: Vec<String> = r.facet_cos_incidence.iter().map(f64::to_string).collect();
-        let cosines = cosines.join(">");
-        text.push_str(&format!(
-            "{pose},{beam},{surface},{facets},{},{},{},{},{},{},{},{},{},{},{echo},{},{scan},{cosines}\n",
-            r.geometric,
-            r.cos_incidence,
-            r.power,
-            r.share,
-            r.mixed,
-            r.detection,
-            r.bias.distance,
-            r.bias.angle,
-            r.bias.color,
-            r.noise_sd,
-            r.probability,
-        ));
-    }
-    text
-}
-
-/// First line of truth/readings.csv. `echo` is the one of truth/returns.csv that was reported, empty where none was
-/// detected; a reading is that echo's range plus the five errors, rounded, unless `lost` is 1.
-const READINGS_HEADER: &str =
-    "pose,scan,beam,echo,lost,drift_m,warm_up_m,noise_m,correlated_m,interference_m,reading_m\n";
-
-fn reading_rows(
-    laboratory: &Laboratory,
-    pose: usize,
-    recorded: &Recorded<'_>,
-    tell: Tell<'_>,
-) -> Result<(), CliError> {
-    let errors = &laboratory.scene().errors;
-    let dropout = match errors.model {
-        ErrorModel::None => 0.0,
-        _ => errors.dropout,
-    };
-    let scans = recorded.stretch.ranges.chunks(beam::COUNT);
-    for (scan, (readings, chances)) in scans.zip(laboratory.chances(pose)).enumerate() {
-        let returns = recorded.returns(scan);
-        let mut text = String::new();
-        let beams = returns.iter().zip(&chances).zip(readings).enumerate();
-        for (beam, ((found, chance), reading)) in beams {
-            let mut echoes = found.iter().flat_map(Return::echoes).zip(chance.detection);
-            let detected = echoes.position(|(echo, chance)| chance < echo.probability);
-            let noise_sd = found.as_ref().zip(detected).and_then(|(r, k)| r.echoes().nth(k));
-            let noise = noise_sd.map_or(0.0, |echo| echo.noise_sd * chance.noise);
-            let echo = detected.map_or(String::new(), |k| k.to_string());
-            let lost = u8::from(detected.is_some() && chance.dropout < dropout);
-            text.push_str(&format!(
-                "{pose},{scan},{beam},{echo},{lost},{},{},{noise},{},{},{reading}\n",
-                chance.drift, chance.warm_up, chance.correlated, chance.interference,
-            ));
-        }
-        tell(&text)?;
-    }
-    Ok(())
-}
-
-fn sub_ray_rows(
-    laboratory: &Laboratory,
-    pose: usize,
-    recorded: &Recorded<'_>,
-    tell: Tell<'_>,
-) -> Result<(), CliError> {
-    sub_rays::rows(laboratory, pose, &recorded.sight, tell)
 }

@@ -1,7 +1,7 @@
 //! The table of the truth about every sub-ray: `truth/sub_rays.csv`.
 
 use super::error::CliError;
-use super::simulate::{Tell, field, mirror_names, role_name, way};
+use super::truth_tables::{Tell, field, mirror_names, role_name, way};
 use catoptric::model::beam;
 use catoptric::sim::Laboratory;
 use catoptric::sim::laboratory::Sight;

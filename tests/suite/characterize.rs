@@ -174,7 +174,11 @@ fn a_recorded_dataset_gives_the_same_with_and_without_its_truth() {
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
         stdout(&output)
     };
-    from(&["simulate", "scene.toml", "--out", "data", quick[0], quick[1]]);
+    let simulated = from(&["simulate", "scene.toml", "--out", "data", quick[0], quick[1]]);
+    assert!(
+        simulated.ends_with("next: catoptric characterize data --out characterization.json\n"),
+        "{simulated}"
+    );
     let shown = from(&["characterize", "data", "--out", "known.json"]);
     for word in [
         "Table 1",

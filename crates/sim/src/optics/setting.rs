@@ -1,0 +1,376 @@
+//! Everything that light can meet, and how it is listed.
+//!
+//! Rays are cast in the sensor frame. While nothing moves, all surfaces are in it. In a flight the structure is, which
+//! moves with the sensor, and the room is in the sensor frame of the flight's start: every leg is cast into both, each
+//! time from where the sensor is then, and the nearer surface counts.
+
+use super::MAX_BOUNCES;
+use crate::cast::{Hit, Shape, World};
+use crate::color::{self, Paint};
+use crate::error::SimError;
+use crate::footprint::Ray;
+use crate::scene::Scene;
+use crate::stage::Stage;
+use crate::structure::{Back, BuiltFacet, Part, Structure};
+use catoptric_model::Pose;
+use nalgebra::{Unit, Vector3};
+use std::borrow::Cow;
+use std::sync::Arc;
+
+/// What a surface is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Role {
+    /// A mirror, by its index: first those of the structure, then those of the room.
+    Facet(usize),
+    /// A post, the housing or a bare backing.
+    Structure,
+    /// The target board.
+    Board,
+    /// A wall, floor or ceiling.
+    Wall,
+    /// Another surface in the room.
+    Object,
+}
+
+/// Everything that light can meet during one stretch, as the sensor sees it from where it is.
+pub struct Setting<'a> {
+    pub(super) contents: Arc<Contents<'a>>,
+    /// Where the sensor is in the frame that the room is kept in; `None` where it started.
+    start_from_sensor: Option<Pose>,
+}
+
+/// What a setting holds, wherever the sensor is.
+pub(super) struct Contents<'a> {
+    /// What moves with the sensor, in its frame; all there is while nothing moves.
+    world: World,
+    /// What the sensor moves past.
+    room: Option<World>,
+    surfaces: Vec<Surface>,
+    /// Index of the first surface of the room.
+    first_of_room: usize,
+    pub(super) facets: Vec<Cow<'a, BuiltFacet>>,
+    pub(super) max_bounces: usize,
+    diffuse_reflectivity: f64,
+}
+
+/// Where a leg of a ray ends, in the frame that the surface is kept in.
+pub(super) struct Leg<'p> {
+    pub(super) hit: Hit,
+    /// Direction of the ray.
+    pub(super) incoming: Unit<Vector3<f64>>,
+    /// From the sensor frame to that frame, unless it is the same.
+    pub(super) kept_from_sensor: Option<&'p Pose>,
+}
+
+#[derive(Debug, Clone)]
+struct Surface {
+    name: String,
+    role: Role,
+    side: Side,
+    paint: Paint,
+}
+
+/// Which side of a surface reflects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Side {
+    /// Neither.
+    None,
+    /// The front, a mirror's face.
+    Face,
+    /// Both: a two-sided mirror without thickness.
+    Both,
+    /// The front, which is the back of a mirror's body.
+    Back,
+}
+
+/// Whether the mirrors are in place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mirrors {
+    /// They are.
+    Attached,
+    /// Step 3: the bare structure behind them is seen.
+    Removed,
+}
+
+/// A painted surface in the sensor frame: a board or a wall.
+pub struct Target {
+    /// Its name.
+    pub name: String,
+    /// Its shape.
+    pub shape: Shape,
+    /// What it is.
+    pub role: Role,
+    /// Its color.
+    pub paint: Paint,
+}
+
+impl<'a> Setting<'a> {
+    /// The structure, with or without its mirrors, and the targets around it.
+    ///
+    /// # Errors
+    /// [`SimError::UnknownColor`] for a part whose color nobody defined.
+    pub fn new(
+        scene: &Scene,
+        structure: &'a Structure,
+        mirrors: Mirrors,
+        targets: Vec<Target>,
+    ) -> Result<Self, SimError> {
+        Self::in_room(scene, structure, mirrors, None, targets)
+    }
+
+    /// The same, and what stands in the room.
+    ///
+    /// # Errors
+    /// As [`Setting::new`].
+    pub fn in_room(
+        scene: &Scene,
+        structure: &'a Structure,
+        mirrors: Mirrors,
+        stage: Option<&'a Stage>,
+        targets: Vec<Target>,
+    ) -> Result<Self, SimError> {
+        let (mut list, mut facets) = structure_list(scene, structure, mirrors)?;
+        let first_of_room = list.shapes.len();
+        let mirrors = stage.map_or([].as_slice(), |s| s.mirrors.as_slice());
+        let parts = stage.map_or([].as_slice(), |s| s.surfaces.as_slice());
+        list.room(
+            scene,
+            &mut facets,
+            targets,
+            mirrors.iter().map(Cow::Borrowed),
+            parts,
+        )?;
+        Ok(Self::of(
+            scene,
+            (list.shapes, None),
+            list.surfaces,
+            first_of_room,
+            facets,
+        ))
+    }
+
+    /// The structure with its mirrors, flying past the targets and what stands in the room, all of it in the sensor
+    /// frame of the flight's start; seen from there.
+    ///
+    /// # Errors
+    /// As [`Setting::new`].
+    pub fn in_flight(
+        scene: &Scene,
+        structure: &'a Structure,
+        stage: Stage,
+        targets: Vec<Target>,
+    ) -> Result<Self, SimError> {
+        let (mut list, mut facets) = structure_list(scene, structure, Mirrors::Attached)?;
+        let first_of_room = list.shapes.len();
+        let mirrors = stage.mirrors.into_iter().map(Cow::Owned);
+        list.room(scene, &mut facets, targets, mirrors, &stage.surfaces)?;
+        let room = list.shapes.split_off(first_of_room);
+        Ok(Self::of(
+            scene,
+            (list.shapes, Some(room)),
+            list.surfaces,
+            first_of_room,
+            facets,
+        ))
+    }
+
+    fn of(
+        scene: &Scene,
+        (shapes, room): (Vec<Shape>, Option<Vec<Shape>>),
+        surfaces: Vec<Surface>,
+        first_of_room: usize,
+        facets: Vec<Cow<'a, BuiltFacet>>,
+    ) -> Self {
+        let contents = Contents {
+            world: World::new(shapes),
+            room: room.map(World::new),
+            surfaces,
+            first_of_room,
+            facets,
+            max_bounces: (scene.superstructure.max_bounces as usize).min(MAX_BOUNCES),
+            diffuse_reflectivity: scene.superstructure.mirror.diffuse_reflectivity,
+        };
+        Self {
+            contents: Arc::new(contents),
+            start_from_sensor: None,
+        }
+    }
+
+    /// The same from another place of the sensor; exactly the same where it has not moved, and where nothing can.
+    #[must_use]
+    pub fn seen_from(&self, start_from_sensor: &Pose) -> Self {
+        let moved = self.contents.room.is_some() && *start_from_sensor != Pose::identity();
+        Self {
+            contents: Arc::clone(&self.contents),
+            start_from_sensor: moved.then_some(*start_from_sensor),
+        }
+    }
+
+    /// What a surface is.
+    pub fn role(&self, surface: usize) -> Role {
+        self.contents.surfaces[surface].role
+    }
+
+    /// How a surface scatters.
+    pub fn paint(&self, surface: usize) -> &Paint {
+        &self.contents.surfaces[surface].paint
+    }
+
+    /// Names of all surfaces, by their index.
+    pub fn names(&self) -> Vec<&str> {
+        self.contents.surfaces.iter().map(|s| s.name.as_str()).collect()
+    }
+
+    /// Share of the light that the mirrors themselves scatter.
+    pub fn diffuse_reflectivity(&self) -> f64 {
+        self.contents.diffuse_reflectivity
+    }
+
+    /// The mirror that a hit is on, and whether it is the body's back.
+    pub(super) fn reflecting(&self, hit: &Hit) -> Option<(usize, bool)> {
+        let surface = &self.contents.surfaces[hit.surface];
+        let Role::Facet(facet) = surface.role else {
+            return None;
+        };
+        match (surface.side, hit.front) {
+            (Side::Face | Side::Both, true) => Some((facet, false)),
+            (Side::Both, false) | (Side::Back, true) => Some((facet, true)),
+            _ => None,
+        }
+    }
+
+    /// The nearest surface along a ray of the sensor frame, `left` (the one it just left) aside.
+    pub(super) fn cast(&self, ray: &Ray, left: Option<usize>) -> Option<Leg<'_>> {
+        let contents = &*self.contents;
+        let unmoved = |hit| Leg {
+            hit,
+            incoming: ray.direction,
+            kept_from_sensor: None,
+        };
+        let Some(room) = &contents.room else {
+            return contents.world.cast(ray, left).map(unmoved);
+        };
+        let first = contents.first_of_room;
+        let own = contents.world.cast(ray, left.filter(|l| *l < first));
+        let moved = self.start_from_sensor.as_ref();
+        let ray_in_room = moved.map_or(*ray, |pose| placed(ray, pose));
+        let past = room.cast(&ray_in_room, left.and_then(|l| l.checked_sub(first)));
+        match (own, past) {
+            (Some(own), Some(past)) if own.distance <= past.distance => Some(unmoved(own)),
+            (own, None) => own.map(unmoved),
+            (_, Some(past)) => Some(Leg {
+                hit: Hit {
+                    surface: past.surface + first,
+                    ..past
+                },
+                incoming: ray_in_room.direction,
+                kept_from_sensor: moved,
+            }),
+        }
+    }
+}
+
+impl Leg<'_> {
+    /// Where the leg ends, in the sensor frame.
+    pub(super) fn in_sensor_frame(&self) -> Hit {
+        self.kept_from_sensor.map_or(self.hit, |pose| Hit {
+            point: pose.inverse_transform_point(&self.hit.point),
+            normal: pose.inverse_transform_unit_vector(&self.hit.normal),
+            ..self.hit
+        })
+    }
+}
+
+/// A ray moved into another frame.
+pub(super) fn placed(ray: &Ray, other_from_ray: &Pose) -> Ray {
+    Ray {
+        origin: other_from_ray * ray.origin,
+        direction: other_from_ray * ray.direction,
+    }
+}
+
+/// The structure, with or without its mirrors, and the mirrors themselves.
+fn structure_list<'a>(
+    scene: &Scene,
+    structure: &'a Structure,
+    mirrors: Mirrors,
+) -> Result<(List, Vec<Cow<'a, BuiltFacet>>), SimError> {
+    let dull = color::paint(scene, "structure")?;
+    let mut list = List::default();
+    for (index, facet) in structure.facets.iter().enumerate() {
+        match mirrors {
+            Mirrors::Attached => list.mirror(facet, index, &dull),
+            Mirrors::Removed => {
+                let bare = Shape::Polygon(facet.backing.clone());
+                list.add(&facet.name, bare, Role::Structure, Side::None, dull.clone());
+            }
+        }
+    }
+    for part in &structure.parts {
+        let paint = color::paint(scene, &part.color)?;
+        list.add(&part.name, part.shape.clone(), Role::Structure, Side::None, paint);
+    }
+    Ok((list, structure.facets.iter().map(Cow::Borrowed).collect()))
+}
+
+/// Surfaces as they are listed.
+#[derive(Default)]
+struct List {
+    shapes: Vec<Shape>,
+    surfaces: Vec<Surface>,
+}
+
+impl List {
+    fn add(&mut self, name: &str, shape: Shape, role: Role, side: Side, paint: Paint) {
+        self.shapes.push(shape);
+        self.surfaces.push(Surface {
+            name: name.to_owned(),
+            role,
+            side,
+            paint,
+        });
+    }
+
+    /// What is in the room: targets, then mirrors and surfaces.
+    fn room<'a>(
+        &mut self,
+        scene: &Scene,
+        facets: &mut Vec<Cow<'a, BuiltFacet>>,
+        targets: Vec<Target>,
+        mirrors: impl Iterator<Item = Cow<'a, BuiltFacet>>,
+        parts: &[Part],
+    ) -> Result<(), SimError> {
+        let dull = color::paint(scene, "structure")?;
+        for target in targets {
+            self.add(&target.name, target.shape, target.role, Side::None, target.paint);
+        }
+        for mirror in mirrors {
+            self.mirror(&mirror, facets.len(), &dull);
+            facets.push(mirror);
+        }
+        for part in parts {
+            let paint = color::paint(scene, &part.color)?;
+            self.add(&part.name, part.shape.clone(), Role::Object, Side::None, paint);
+        }
+        Ok(())
+    }
+
+    /// A mirror's face, and its back and rim if it has two sides.
+    fn mirror(&mut self, mirror: &BuiltFacet, index: usize, dull: &Paint) {
+        let role = Role::Facet(index);
+        let side = match mirror.back {
+            Some(Back::Face) => Side::Both,
+            _ => Side::Face,
+        };
+        let face = Shape::Polygon(mirror.face.clone());
+        self.add(&mirror.name, face, role, side, dull.clone());
+        if let Some(Back::Body { face, rim }) = &mirror.back {
+            let back = Shape::Polygon(face.clone());
+            self.add(&mirror.name, back, role, Side::Back, dull.clone());
+            for strip in rim {
+                let strip = Shape::Polygon(strip.clone());
+                self.add(&mirror.name, strip, Role::Structure, Side::None, dull.clone());
+            }
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! The tables of the truth: what every beam met, and every error of every reading.
+
+use super::error::CliError;
+use super::simulate::Recorded;
+use super::sub_rays;
+use catoptric::model::beam;
+use catoptric::sim::laboratory::Returns;
+use catoptric::sim::optics::Role;
+use catoptric::sim::reading::Return;
+use catoptric::sim::scene::ErrorModel;
+use catoptric::sim::{Laboratory, Scene};
+
+/// Tells the rows of one stretch in a table of the truth, as many at a time as fit in memory well.
+pub(super) type Rows = fn(&Laboratory, usize, &Recorded<'_>, Tell<'_>) -> Result<(), CliError>;
+
+/// Takes rows on.
+pub(crate) type Tell<'a> = &'a mut dyn FnMut(&str) -> Result<(), CliError>;
+
+/// First line of truth/returns.csv. A reading is geometric + mixed + detection + the three biases, then what
+/// truth/readings.csv lists, rounded; a beam without an echo has no row, one with several has one for each. `scan` is
+/// empty where nothing moves and the row holds for every scan; the incidence on the facets is joined as they are.
+pub(super) const RETURNS_HEADER: &str = "pose,beam,surface,facets,geometric_m,cos_incidence,power_w,share,mixed_m,detection_m,\
+                              distance_bias_m,angle_bias_m,color_bias_m,noise_sd_m,echo,detection_probability,\
+                              facet_cos_incidence,scan\n";
+
+/// The names of all mirrors, by their index.
+pub(crate) fn mirror_names(scene: &Scene) -> Vec<&str> {
+    let facets = scene.superstructure.facet.iter().map(|f| f.name.as_str());
+    let mirrors = scene.room.mirror.iter().map(|m| m.name.as_str());
+    facets.chain(mirrors).collect()
+}
+
+/// What a surface is, as the tables of the truth say it.
+pub(crate) fn role_name(role: Role) -> &'static str {
+    match role {
+        Role::Facet(_) => "facet",
+        Role::Structure => "structure",
+        Role::Board => "board",
+        Role::Wall => "wall",
+        Role::Object => "object",
+    }
+}
+
+/// A field of free text: a comma or a quote in a name must not end it.
+pub(crate) fn field(text: &str) -> String {
+    format!("\"{}\"", text.replace('"', "\"\""))
+}
+
+/// Names of the mirrors of a way, as one field.
+pub(crate) fn way(names: &[&str], facets: &[usize]) -> String {
+    let facets: Vec<&str> = facets.iter().map(|f| names[*f]).collect();
+    field(&facets.join(">"))
+}
+
+pub(super) fn return_rows(
+    laboratory: &Laboratory,
+    pose: usize,
+    recorded: &Recorded<'_>,
+    tell: Tell<'_>,
+) -> Result<(), CliError> {
+    if !recorded.sight.moves() {
+        return tell(&rows_of_returns(laboratory, pose, &recorded.first, ""));
+    }
+    for scan in 0..laboratory.scans_of(pose) {
+        let returns = recorded.returns(scan);
+        tell(&rows_of_returns(laboratory, pose, &returns, &scan.to_string()))?;
+    }
+    Ok(())
+}
+
+fn rows_of_returns(laboratory: &Laboratory, pose: usize, returns: &Returns, scan: &str) -> String {
+    let names = mirror_names(laboratory.scene());
+    let mut text = String::new();
+    let echoes = returns.iter().enumerate().flat_map(|(beam, found)| {
+        let echoes = found.iter().flat_map(Return::echoes).enumerate();
+        echoes.map(move |(echo, r)| (beam, echo, r))
+    });
+    for (beam, echo, r) in echoes {
+        let (surface, facets) = (role_name(r.role), way(&names, &r.facets));
+        let cosines: Vec<String> = r.facet_cos_incidence.iter().map(f64::to_string).collect();
+        let cosines = cosines.join(">");
+        text.push_str(&format!(
+            "{pose},{beam},{surface},{facets},{},{},{},{},{},{},{},{},{},{},{echo},{},{cosines},{scan}\n",
+            r.geometric,
+            r.cos_incidence,
+            r.power,
+            r.share,
+            r.mixed,
+            r.detection,
+            r.bias.distance,
+            r.bias.angle,
+            r.bias.color,
+            r.noise_sd,
+            r.probability,
+        ));
+    }
+    text
+}
+
+/// First line of truth/readings.csv. `echo` is the one of truth/returns.csv that was reported, empty where none was
+/// detected; a reading is that echo's range plus the five errors, rounded, unless `lost` is 1.
+pub(super) const READINGS_HEADER: &str =
+    "pose,scan,beam,echo,lost,drift_m,warm_up_m,noise_m,correlated_m,interference_m,reading_m\n";
+
+pub(super) fn reading_rows(
+    laboratory: &Laboratory,
+    pose: usize,
+    recorded: &Recorded<'_>,
+    tell: Tell<'_>,
+) -> Result<(), CliError> {
+    let errors = &laboratory.scene().errors;
+    let dropout = match errors.model {
+        ErrorModel::None => 0.0,
+        _ => errors.dropout,
+    };
+    let scans = recorded.stretch.ranges.chunks(beam::COUNT);
+    for (scan, (readings, chances)) in scans.zip(laboratory.chances(pose)).enumerate() {
+        let returns = recorded.returns(scan);
+        let mut text = String::new();
+        let beams = returns.iter().zip(&chances).zip(readings).enumerate();
+        for (beam, ((found, chance), reading)) in beams {
+            let mut echoes = found.iter().flat_map(Return::echoes).zip(chance.detection);
+            let detected = echoes.position(|(echo, chance)| chance < echo.probability);
+            let noise_sd = found.as_ref().zip(detected).and_then(|(r, k)| r.echoes().nth(k));
+            let noise = noise_sd.map_or(0.0, |echo| echo.noise_sd * chance.noise);
+            let echo = detected.map_or(String::new(), |k| k.to_string());
+            let lost = u8::from(detected.is_some() && chance.dropout < dropout);
+            text.push_str(&format!(
+                "{pose},{scan},{beam},{echo},{lost},{},{},{noise},{},{},{reading}\n",
+                chance.drift, chance.warm_up, chance.correlated, chance.interference,
+            ));
+        }
+        tell(&text)?;
+    }
+    Ok(())
+}
+
+pub(super) fn sub_ray_rows(
+    laboratory: &Laboratory,
+    pose: usize,
+    recorded: &Recorded<'_>,
+    tell: Tell<'_>,
+) -> Result<(), CliError> {
+    sub_rays::rows(laboratory, pose, &recorded.sight, tell)
+}
