@@ -5,11 +5,13 @@ use super::error::CliError;
 use super::files::read_truth;
 use super::interrupt;
 use super::output::{print, quoted};
+use super::progress::Progress;
 use catoptric::io::{self, scene};
-use catoptric::model::{Characterization, Dataset, RangeBias};
+use catoptric::model::{Characterization, Dataset, PoseRecord, RangeBias};
 use catoptric::sim::{Laboratory, Truth};
 use catoptric::{calib, report, tables};
 use clap::Args;
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `characterize`.
@@ -79,17 +81,25 @@ fn page_path(out: &Path) -> Result<PathBuf, CliError> {
     Ok(page)
 }
 
+/// Simulates a scene's experiment in memory, a few stretches at a time.
 fn simulate(arguments: &Arguments, context: &Context) -> Result<(Dataset, Option<RangeBias>), CliError> {
     let mut scene = scene::load(&arguments.input, &arguments.set)?;
     scene.seed = arguments.seed.unwrap_or(scene.seed);
     let laboratory = Laboratory::new(&scene, scene.seed)?;
-    context.say(&format!(
-        "simulating {} scans of scene {:?}, seed {}",
-        laboratory.scans(),
-        scene.name,
-        scene.seed
-    ));
-    Ok((laboratory.dataset()?, injected(laboratory.truth()?)))
+    let mut progress = Progress::new(context, "simulating", laboratory.stretches());
+    let all: Vec<usize> = (0..laboratory.stretches()).collect();
+    let mut poses = Vec::with_capacity(all.len());
+    for window in all.chunks(rayon::current_num_threads()) {
+        interrupt::check()?;
+        let recorded: Vec<PoseRecord> = window
+            .par_iter()
+            .map(|number| laboratory.pose_record(*number))
+            .collect::<Result<_, _>>()?;
+        poses.extend(recorded);
+        progress.advance(window.len());
+    }
+    let session = laboratory.session()?;
+    Ok((Dataset { session, poses }, injected(laboratory.truth()?)))
 }
 
 /// The biases of Eqs. 3 to 5 that a simulation put in; none where the errors came from the detector alone.

@@ -1,10 +1,10 @@
 //! The page beside `characterization.json`: a picture and a table for each of Tables 1 to 4, and the fitted numbers.
 
-use super::figure::{Axes, GRID, Mark, Stroke, color, css, laws};
+use super::figure::{Axes, Mark, Stroke, color, css, laws};
 use super::page::{escape, figure, page};
-use crate::tables::{Table, paper, tables};
+use crate::tables::{Subject, Table, tables};
 use catoptric_model::characterization::Characterization;
-use catoptric_model::{RangeBias, TestKind};
+use catoptric_model::{RangeBias, TestKind, paper};
 use plotters::style::{BLACK, RGBColor};
 use std::ops::Range;
 
@@ -17,14 +17,14 @@ pub fn characterization(found: &Characterization, injected: Option<&RangeBias>) 
         escape(&found.name)
     );
     for table in tables(found, injected) {
-        let pictures = match table.title.split(':').next() {
-            Some("Table 1") => spots(found),
-            Some("Table 2") => distances(found),
-            Some("Table 3") => angles(found),
-            Some("Table 4") => noise(found),
-            _ => Picture::default(),
+        let picture = match table.subject {
+            Subject::Spot => spots(found),
+            Subject::Distance => distances(found),
+            Subject::Angle => angles(found),
+            Subject::Color => noise(found),
+            Subject::Numbers => Picture::default(),
         };
-        html += &section(&table, &pictures);
+        html += &section(&table, &picture);
     }
     if !found.not_observed.is_empty() {
         html += "<h2>What the boards do not tell</h2>\n<ul>\n";
@@ -262,12 +262,6 @@ fn noise(found: &Characterization) -> Picture {
         }
         names.push((own, *name));
     }
-    strokes.push(Stroke {
-        points: vec![(0.0, 0.0)],
-        color: GRID,
-        width: 1,
-        opacity: 0.0,
-    });
     Picture {
         svg: draw(
             "Standard deviation of a reading over the distance, by color",

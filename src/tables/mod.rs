@@ -1,13 +1,28 @@
 //! Tables 1 to 4 as measured, beside the paper's, and the numbers of Eqs. 3 to 5.
 
-pub mod paper;
-
 use catoptric_model::characterization::{Characterization, Parameter, StretchRow};
-use catoptric_model::{RangeBias, TestKind};
+use catoptric_model::{RangeBias, TestKind, paper};
+
+/// What a table is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Subject {
+    /// Table 1.
+    Spot,
+    /// Table 2.
+    Distance,
+    /// Table 3.
+    Angle,
+    /// Table 4.
+    Color,
+    /// The numbers of Eqs. 3 to 5.
+    Numbers,
+}
 
 /// A table of words and numbers, for a terminal or a page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
+    /// What it is about.
+    pub subject: Subject,
     /// What it shows.
     pub title: &'static str,
     /// Headings of the columns, with units.
@@ -74,6 +89,7 @@ fn spots(found: &Characterization) -> Table {
         )
     });
     Table {
+        subject: Subject::Spot,
         title: "Table 1: spot of neighbouring beams",
         headings: vec![
             "distance (m)",
@@ -160,6 +176,7 @@ fn distances(found: &Characterization) -> Table {
         )
     });
     Table {
+        subject: Subject::Distance,
         title: "Table 2: mean error and standard deviation over the distance",
         headings: vec![
             "distance (m)",
@@ -219,6 +236,7 @@ fn angles(found: &Characterization) -> Table {
         )
     });
     Table {
+        subject: Subject::Angle,
         title: "Table 3: mean error over the incidence",
         headings: vec![
             "incidence (°)",
@@ -246,6 +264,7 @@ fn noise(found: &Characterization) -> Table {
         ]
     };
     Table {
+        subject: Subject::Color,
         title: "Table 4: standard deviation by color",
         headings: vec!["color", "distance (m)", "STD (mm)", "paper", "difference (%)"],
         rows: found.noise.iter().filter(|n| tested(&n.color)).map(row).collect(),
@@ -314,6 +333,7 @@ fn numbers(found: &Characterization, injected: Option<&RangeBias>) -> Table {
         "fits"
     };
     Table {
+        subject: Subject::Numbers,
         title: "Equations 3 to 5",
         headings,
         rows: found.parameters.iter().map(row).collect(),
@@ -367,6 +387,7 @@ mod tests {
     #[test]
     fn columns_are_in_line() {
         let table = Table {
+            subject: Subject::Numbers,
             title: "T",
             headings: vec!["a", "wide"],
             rows: vec![

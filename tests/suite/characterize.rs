@@ -8,13 +8,13 @@
 use crate::common::{catoptric, run, stderr, stdout};
 use crate::scenes::{BARE, scene, set_board_ahead};
 use catoptric::model::characterization::{Characterization, Parameter};
-use catoptric::model::{ColorBias, RangeBias};
+use catoptric::model::{ColorBias, RangeBias, paper};
 use catoptric::sim::{Laboratory, Scene};
-use catoptric::tables::paper;
 use catoptric::{calib, score};
 use rayon::prelude::*;
 
 const COOPER: &str = include_str!("../../scenes/ust-20lx-cooper.toml");
+const GUIDE: &str = include_str!("../../docs/guide/7-characterizing.md");
 const TABLE_3: &str = include_str!("../../scenes/table-3.toml");
 
 fn characterized(scene: &Scene, seed: u64) -> (Characterization, RangeBias) {
@@ -39,6 +39,17 @@ fn tables_1_to_4_come_back_beside_the_papers() {
         } else {
             assert!(within(row.spot.width_mm, width), "{row:?}");
         }
+    }
+    let width = |i: usize| format!("{:.1}", found.spots[i].spot.width_mm);
+    let widths = [0, 1, 3, 4].map(width).join(", ");
+    let shown = [
+        format!("| width of the spot | 0.5, 1, 3, 4 m | {widths} | 15.9, 33.3, 98.4, 136.5 |"),
+        format!("| | 2 m | {} | 55.6 |", width(2)),
+    ];
+    let fitted = found.parameters.iter().filter(|p| p.symbol == "E_r");
+    let fitted = fitted.map(|p| format!("m | {:.1} ± {:.1} |", p.value, p.sd).replace('-', "−"));
+    for row in shown.into_iter().chain(fitted) {
+        assert!(GUIDE.contains(&row), "the guide does not show {row:?}");
     }
     // Table 2: means within 1 mm, spreads within 10 %.
     for (distance, means, sds) in paper::TABLE_2 {

@@ -2,7 +2,7 @@
 //!
 //! Tables 1 to 4 of the paper as measured, and the numbers of Eqs. 3 to 5 fitted to them. Errors are *measured − true*.
 
-use crate::bias::{DistanceBias, RangeBias};
+use crate::bias::RangeBias;
 use crate::calibration::MountEstimate;
 use crate::dataset::{SpotNote, TestKind};
 use serde::{Deserialize, Serialize};
@@ -249,11 +249,6 @@ impl Characterization {
             .map(|p| p.sd * p.sd);
         let (sum, count) = squares.fold((0.0, 0.0), |(sum, count), s| (sum + s, count + 1.0));
         if count > 0.0 { f64::sqrt(sum / count) } else { 0.0 }
-    }
-
-    /// E_r as it was fitted.
-    pub fn distance(&self) -> &DistanceBias {
-        &self.bias.distance
     }
 }
 

@@ -38,6 +38,7 @@ pub mod error;
 pub mod frame;
 pub mod mirror;
 pub mod motion;
+pub mod paper;
 pub mod range;
 pub mod session;
 

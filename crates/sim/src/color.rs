@@ -2,6 +2,7 @@
 
 use crate::error::SimError;
 use crate::scene::{Color, NoiseTable, Scene};
+use catoptric_model::paper;
 
 /// A color with everything the simulation needs of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,30 +25,26 @@ pub const BUILT_IN: [&str; 6] = [
     "structure",
 ];
 
-/// Distances of Table 4, in metres.
-const TABLE_4_RANGE_M: [f64; 4] = [0.493, 1.011, 1.600, 2.007];
-
 /// Reflectivity (assumed) and Table 4's noise of a built-in color, in the order of [`BUILT_IN`].
 ///
 /// `white` and `structure` have no table of their own and take `errors.noise`, by default Table 2; the other four are
 /// the columns of Table 4.
 fn built_in(name: &str) -> Option<Color> {
-    let (reflectivity, sd_mm) = match name {
-        "white" => (0.9, None),
-        "pure_white" => (0.9, Some([4.39, 4.64, 3.52, 3.71])),
-        "antique_white" => (0.8, Some([3.96, 4.69, 3.43, 3.55])),
-        "pencil_grey" => (0.4, Some([3.85, 4.71, 3.96, 4.18])),
-        "jet_black" => (0.05, Some([5.37, 6.06, 5.29, 5.00])),
-        "structure" => (0.3, None),
+    let reflectivity = match name {
+        "white" | "pure_white" => 0.9,
+        "antique_white" => 0.8,
+        "pencil_grey" => 0.4,
+        "jet_black" => 0.05,
+        "structure" => 0.3,
         _ => return None,
     };
-    let table = |sd: [f64; 4]| NoiseTable {
-        range_m: TABLE_4_RANGE_M.to_vec(),
-        sd_mm: sd.to_vec(),
-    };
+    let column = paper::TABLE_4.iter().find(|(color, _)| *color == name);
     Some(Color {
         reflectivity,
-        noise: sd_mm.map(table),
+        noise: column.map(|(_, sd_mm)| NoiseTable {
+            range_m: paper::TABLE_4_RANGE_M.to_vec(),
+            sd_mm: sd_mm.to_vec(),
+        }),
     })
 }
 

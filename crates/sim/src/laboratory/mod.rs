@@ -27,7 +27,9 @@ use crate::stage::Stage;
 use crate::structure::Structure;
 use crate::trajectory::Trajectory;
 use catoptric_model::dataset::RIG_SUBJECT;
-use catoptric_model::{Dataset, Pose, PoseLabel, RangeBias, SpotNote, Stretch, TestKind, TestNote};
+use catoptric_model::{
+    Dataset, Pose, PoseLabel, PoseRecord, RangeBias, SpotNote, Stretch, TestKind, TestNote,
+};
 use nalgebra::{Point3, Translation3, UnitQuaternion};
 use rayon::prelude::*;
 
@@ -314,21 +316,26 @@ impl Laboratory {
         tracks
     }
 
+    /// What a calibration needs of a stretch.
+    ///
+    /// # Errors
+    /// As [`Laboratory::stretch`], and [`SimError::Markers`] if motion capture never saw the rig during it, which only a
+    /// dropout of nearly 1 brings about.
+    pub fn pose_record(&self, number: usize) -> Result<PoseRecord, SimError> {
+        let record = self.stretch(number)?.into_record();
+        record.map_err(|_| SimError::Markers {
+            body: RIG_SUBJECT.to_owned(),
+        })
+    }
+
     /// The whole experiment in memory.
     ///
     /// # Errors
-    /// As [`Laboratory::stretch`], and [`SimError::Markers`] if motion capture never saw the rig during a stretch, which
-    /// only a dropout of nearly 1 brings about.
+    /// As [`Laboratory::pose_record`].
     pub fn dataset(&self) -> Result<Dataset, SimError> {
-        let poses = (0..self.stretches())
-            .into_par_iter()
-            .map(|number| {
-                self.stretch(number)?
-                    .into_record()
-                    .map_err(|_| SimError::Markers {
-                        body: RIG_SUBJECT.to_owned(),
-                    })
-            })
+        let numbers = (0..self.stretches()).into_par_iter();
+        let poses = numbers
+            .map(|number| self.pose_record(number))
             .collect::<Result<_, _>>()?;
         Ok(Dataset {
             session: self.session()?,

@@ -23,7 +23,7 @@ pub const TABLE_3: [(f64, [f64; 3]); 3] = [
     (-44.7, [35.4, 35.7, 33.0]),
 ];
 
-/// The law that the paper fits to Table 3: A_a and B_a (calibration from its three means).
+/// A_a and B_a of the least-squares line through Table 3's means over cos θ_N, which is the paper's Eq. 4.
 pub const EQUATION_4: [f64; 2] = [-70.3, 86.1];
 
 /// Distances of Table 4, in metres.
