@@ -265,6 +265,30 @@ fn what_the_boards_do_not_tell_is_said() {
     assert!(error.contains("no board is read"), "{error}");
 }
 
+/// Boards that were set up to find the mounting tell E_r and E_a together, and no less honestly: their distances and
+/// incidences go together in no way that the fit does not allow for.
+#[test]
+fn boards_without_a_note_tell_distance_and_angle_apart() {
+    let mut scene = scene(crate::scenes::TWO_MIRROR);
+    scene.scanner.sub_rays = 1;
+    scene.scanner.mount.shift_tolerance_mm = 0.0;
+    scene.experiment.scans_per_pose = 20;
+    scene.experiment.poses_per_group = 1;
+    let seeds = 60_u32;
+    let squares: Vec<f64> = (1..=seeds)
+        .into_par_iter()
+        .map(|seed| {
+            let (found, bias) = characterized(&scene, seed.into());
+            assert_eq!(found.parameters.len(), 3, "{:?}", found.parameters);
+            let gain = found.parameter("A_a", None).unwrap();
+            ((gain.value - bias.angle.gain_mm) / gain.sd).powi(2)
+        })
+        .collect();
+    let n = f64::from(seeds);
+    let mean = squares.iter().sum::<f64>() / n;
+    assert!((bound(n, -3.29)..bound(n, 3.29)).contains(&mean), "{mean}");
+}
+
 #[test]
 fn a_law_that_does_not_hold_gets_a_table() {
     let mut scene = quick(COOPER);

@@ -15,6 +15,9 @@ const LEAST_COSINE_SPREAD: f64 = 0.02;
 /// Least spread of a color's distances, in parts of the largest, that tells A_c.
 const LEAST_DISTANCE_SPREAD: f64 = 0.2;
 
+/// How much nearer and farther than its center a board is read by the fan across it.
+const FAN_ROOM: f64 = 1.25;
+
 /// A number to be fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Term {
@@ -84,7 +87,8 @@ impl Design {
             design.omit(
                 "E_r",
                 None,
-                "no test of the distance was recorded: the constant is in B_a or B_c",
+                "no test of the distance was recorded: the constant is in B_a or B_c, and what changes with the distance is taken for \
+                 something else",
             );
         }
         design.add_angle(rows, session, reference.is_some());
@@ -223,8 +227,24 @@ fn reference_color(rows: &[StretchRow]) -> Option<String> {
 }
 
 /// Mean distances of the settings at which the distance was tested, in the reference color.
+///
+/// Boards none of which was set up for a test stand at all distances and incidences, and what changes with the one must
+/// not be taken for what changes with the other: E_r is then a line over the distances at which they were read.
 fn distance_nodes(rows: &[StretchRow]) -> Vec<f64> {
     let reference = reference_color(rows);
+    if rows.iter().all(|r| r.test.is_none()) {
+        let distances = || rows.iter().map(|r| r.distance_m);
+        let (near, far) = (
+            distances().fold(f64::INFINITY, f64::min) / FAN_ROOM,
+            distances().fold(0.0, f64::max) * FAN_ROOM,
+        );
+        let spread = far / FAN_ROOM - near * FAN_ROOM;
+        return if spread >= LEAST_DISTANCE_SPREAD * far {
+            vec![near, far]
+        } else {
+            Vec::new()
+        };
+    }
     let mut distances: Vec<f64> = rows
         .iter()
         .filter(|r| r.test == Some(TestKind::Distance) && Some(&r.color) == reference.as_ref())

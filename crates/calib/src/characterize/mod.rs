@@ -11,9 +11,9 @@
 //! the readings of one board share, its drift and its markers', are in the weights; what comes out with a standard
 //! deviation is off by as much. What the boards cannot tell apart is not solved for, and said.
 //!
-//! Two numbers that no data tell apart are settled by convention: with a test of the distance, E_r holds the error at
-//! normal incidence and B_a = −A_a; without one, E_r is 0 and B_a is free. E_c is counted from the color in which the
-//! distance was tested.
+//! Two numbers that no data tell apart are settled by convention: with a test of the distance, or without any test at all,
+//! E_r holds the error at normal incidence and B_a = −A_a; with a test of the angle alone, E_r is 0 and B_a is free. E_c is
+//! counted from the color in which the distance was tested.
 
 mod adjust;
 mod angle;
