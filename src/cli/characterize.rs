@@ -8,7 +8,7 @@ use super::output::{print, quoted};
 use super::progress::Progress;
 use catoptric::io::{self, scene};
 use catoptric::model::{Characterization, Dataset, PoseRecord, RangeBias};
-use catoptric::sim::{Laboratory, Truth};
+use catoptric::sim::Laboratory;
 use catoptric::{calib, report, tables};
 use clap::Args;
 use rayon::prelude::*;
@@ -44,7 +44,10 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
             });
         }
         let truth = read_truth(&arguments.input)?;
-        (io::read_dataset(&arguments.input)?, truth.and_then(injected))
+        (
+            io::read_dataset(&arguments.input)?,
+            truth.and_then(|t| injected(t.bias)),
+        )
     } else {
         simulate(arguments, context)?
     };
@@ -99,12 +102,13 @@ fn simulate(arguments: &Arguments, context: &Context) -> Result<(Dataset, Option
         progress.advance(window.len());
     }
     let session = laboratory.session()?;
-    Ok((Dataset { session, poses }, injected(laboratory.truth()?)))
+    let bias = laboratory.sensor().bias().clone();
+    Ok((Dataset { session, poses }, injected(bias)))
 }
 
 /// The biases of Eqs. 3 to 5 that a simulation put in; none where the errors came from the detector alone.
-fn injected(truth: Truth) -> Option<RangeBias> {
-    Some(truth.bias).filter(|bias| *bias != RangeBias::default())
+fn injected(bias: RangeBias) -> Option<RangeBias> {
+    Some(bias).filter(|bias| *bias != RangeBias::default())
 }
 
 fn text(found: &Characterization, injected: Option<&RangeBias>, out: &Path, page: &Path) -> String {

@@ -1,5 +1,7 @@
 //! The pieces of an HTML page: escaping, tables, figures, numbers, the style sheet.
 
+use crate::tables::fixed;
+
 /// Text as HTML.
 pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;")
@@ -11,14 +13,9 @@ pub(super) fn escape(text: &str) -> String {
 /// A number with some decimals; a dash where there is none. The minus sign is a true one.
 pub(super) fn number(value: f64, decimals: usize) -> String {
     if value.is_finite() {
-        let text = format!("{value:.decimals$}");
-        // Rounded to zero, a negative number is zero.
-        let is_zero = text.chars().all(|c| matches!(c, '-' | '0' | '.'));
-        match text.strip_prefix('-') {
-            Some(rest) if !is_zero => format!("−{rest}"),
-            Some(rest) => rest.to_owned(),
-            None => text,
-        }
+        let text = fixed(value, decimals);
+        text.strip_prefix('-')
+            .map_or(text.clone(), |rest| format!("−{rest}"))
     } else if value.is_nan() {
         "–".to_owned()
     } else {

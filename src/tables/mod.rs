@@ -48,7 +48,7 @@ pub fn tables(found: &Characterization, injected: Option<&RangeBias>) -> Vec<Tab
 }
 
 /// A number with some decimals.
-fn fixed(value: f64, decimals: usize) -> String {
+pub(crate) fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     // Rounded to zero, a negative number is zero.
     if text

@@ -5,7 +5,7 @@
 //! placement. What a real sensor is like it does not prove. The consistency test proves that the stated uncertainties are
 //! the errors'.
 
-use crate::common::{catoptric, run, stderr, stdout};
+use crate::common::{run, stderr, stdout};
 use crate::scenes::{BARE, scene, set_board_ahead};
 use catoptric::model::characterization::{Characterization, Parameter};
 use catoptric::model::{ColorBias, RangeBias, paper};
@@ -350,11 +350,7 @@ fn a_bad_request_is_refused_before_anything_is_written() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("scene.toml"), COOPER).unwrap();
     let refused = |arguments: &[&str], said: &[&str]| {
-        let output = catoptric()
-            .args(arguments)
-            .current_dir(folder.path())
-            .output()
-            .unwrap();
+        let output = run(folder.path(), arguments);
         assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
         let text = stderr(&output);
         for word in said {
@@ -366,50 +362,22 @@ fn a_bad_request_is_refused_before_anything_is_written() {
         &["characterize", "scene.toml", "--out", "page.html"],
         &["page.json"],
     );
-    refused(
-        &[
-            "characterize",
-            "scene.toml",
-            "--out",
-            "c.json",
-            "--set",
+    let changed: [(&str, &[&str]); 4] = [
+        (
             "experiment.test.0.board=[\"whit\"]",
-        ],
-        &["experiment.test[0].board[0]", "did you mean `white`?"],
-    );
-    refused(
-        &[
-            "characterize",
-            "scene.toml",
-            "--out",
-            "c.json",
-            "--set",
+            &["experiment.test[0].board[0]", "did you mean `white`?"],
+        ),
+        (
             "experiment.test.1.range_m=[9.0]",
-        ],
-        &["experiment.test[1].range_m[0]", "wall"],
-    );
-    refused(
-        &[
-            "characterize",
-            "scene.toml",
-            "--out",
-            "c.json",
-            "--set",
-            "experiment.test.1.kind=distanc",
-        ],
-        &["distance"],
-    );
-    refused(
-        &[
-            "characterize",
-            "scene.toml",
-            "--out",
-            "c.json",
-            "--set",
-            "experiment.test.2.incidence_deg=[85]",
-        ],
-        &["85", "80"],
-    );
+            &["experiment.test[1].range_m[0]", "wall"],
+        ),
+        ("experiment.test.1.kind=distanc", &["distance"]),
+        ("experiment.test.2.incidence_deg=[85]", &["85", "80"]),
+    ];
+    for (set, said) in changed {
+        let arguments = ["characterize", "scene.toml", "--out", "c.json", "--set", set];
+        refused(&arguments, said);
+    }
     std::fs::remove_file(folder.path().join("scene.toml")).unwrap();
     std::fs::create_dir(folder.path().join("data")).unwrap();
     refused(

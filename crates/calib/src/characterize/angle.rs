@@ -4,7 +4,7 @@
 //! as χ² with (incidences − 2) degrees of freedom does by chance.
 
 use super::adjust::Adjustment;
-use super::design::{Design, Term};
+use super::design::{Design, Term, grouped, mean};
 use crate::error::CalibError;
 use catoptric_model::TestKind;
 use catoptric_model::characterization::{Fit, MisfitRow, StretchRow};
@@ -68,18 +68,11 @@ pub(super) fn tabulate(
 /// are nearly face on count as 0.
 fn incidences(stretches: &[StretchRow]) -> Vec<(f64, usize)> {
     let tested = stretches.iter().filter(|s| s.test == Some(TestKind::Angle));
-    let mut all: Vec<f64> = tested.map(|s| s.incidence_deg.abs()).collect();
-    all.sort_by(f64::total_cmp);
-    let mut groups: Vec<Vec<f64>> = Vec::new();
-    for at in all {
-        match groups.last_mut() {
-            Some(group) if at - group[0] < SAME_INCIDENCE => group.push(at),
-            _ => groups.push(vec![at]),
-        }
-    }
+    let all = tested.map(|s| s.incidence_deg.abs()).collect();
+    let groups = grouped(all, |_| SAME_INCIDENCE);
     let node = |group: Vec<f64>| {
-        let mean = group.iter().sum::<f64>() / group.len() as f64;
-        (if mean < SAME_INCIDENCE { 0.0 } else { mean }, group.len())
+        let at = mean(&group);
+        (if at < SAME_INCIDENCE { 0.0 } else { at }, group.len())
     };
     groups.into_iter().map(node).collect()
 }

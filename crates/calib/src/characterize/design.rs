@@ -245,23 +245,30 @@ fn distance_nodes(rows: &[StretchRow]) -> Vec<f64> {
             Vec::new()
         };
     }
-    let mut distances: Vec<f64> = rows
+    let distances: Vec<f64> = rows
         .iter()
         .filter(|r| r.test == Some(TestKind::Distance) && Some(&r.color) == reference.as_ref())
         .map(|r| r.distance_m)
         .collect();
-    distances.sort_by(f64::total_cmp);
+    let groups = grouped(distances, same_distance);
+    groups.iter().map(|g| mean(g)).collect()
+}
+
+/// Numbers in order, those together that are nearer to the least of them than `within` says.
+pub(super) fn grouped(mut numbers: Vec<f64>, within: impl Fn(f64) -> f64) -> Vec<Vec<f64>> {
+    numbers.sort_by(f64::total_cmp);
     let mut groups: Vec<Vec<f64>> = Vec::new();
-    for d in distances {
+    for x in numbers {
         match groups.last_mut() {
-            Some(group) if d - group[0] < same_distance(d) => group.push(d),
-            _ => groups.push(vec![d]),
+            Some(group) if x - group[0] < within(x) => group.push(x),
+            _ => groups.push(vec![x]),
         }
     }
     groups
-        .iter()
-        .map(|g| g.iter().sum::<f64>() / g.len() as f64)
-        .collect()
+}
+
+pub(super) fn mean(numbers: &[f64]) -> f64 {
+    numbers.iter().sum::<f64>() / numbers.len() as f64
 }
 
 /// What passes for one distance: trials are set up anew each time, so it grows with the distance a little.

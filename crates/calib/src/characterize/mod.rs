@@ -24,7 +24,7 @@ mod spot;
 
 use crate::calibrate::check_session;
 use crate::error::CalibError;
-use crate::mount_data::{Selection, Selector};
+use crate::mount_data::{DirectBoard, Selection, Selector};
 use crate::pose;
 use adjust::{Adjustment, Prior, adjust};
 use catoptric_model::characterization::{
@@ -75,27 +75,22 @@ pub fn characterize(dataset: &Dataset) -> Result<Characterization, CalibError> {
         }
         boards
     };
+    let read = |chosen: &[DirectBoard], mount: &Pose| rows::of(dataset, &summaries, &selector, chosen, mount);
     let mut chosen = select(&mount, &stage);
-    let mut design = Design::of(
-        &rows::of(dataset, &summaries, &selector, &chosen, &mount),
-        session,
-    );
+    let mut design = Design::of(&read(&chosen, &mount), session);
     for _ in 0..MAX_ROUNDS {
         mount = adjust(&selector, &chosen, &design, &prior, &mount)?.rig_from_sensor;
         stage = stage.narrower();
         let next = select(&mount, &stage);
         let settled = stage.is_narrowest() && pose::same_beams(&next, &chosen);
         chosen = next;
-        design = Design::of(
-            &rows::of(dataset, &summaries, &selector, &chosen, &mount),
-            session,
-        );
+        design = Design::of(&read(&chosen, &mount), session);
         if settled {
             break;
         }
     }
     let law = adjust(&selector, &chosen, &design, &prior, &mount)?;
-    let stretches = rows::of(dataset, &summaries, &selector, &chosen, &law.rig_from_sensor);
+    let stretches = read(&chosen, &law.rig_from_sensor);
     let table = angle::tabulate(&design, &law, &stretches, |tabulated| {
         adjust(&selector, &chosen, tabulated, &prior, &law.rig_from_sensor)
     })?;
