@@ -48,6 +48,7 @@ pub(crate) fn perfect(truth: &Truth) -> Calibration {
             covariance: None,
         }),
         bias: None,
+        warnings: Vec::new(),
     }
 }
 

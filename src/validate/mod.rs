@@ -34,6 +34,7 @@ pub const ANGLE_SD_RAD: [f64; 2] = [1e-10, PI];
 ///     facets: Vec::new(),
 ///     rig_from_sensor: None,
 ///     bias: None,
+///     warnings: Vec::new(),
 /// };
 /// let problems = catoptric::validate(&calibration);
 /// assert_eq!(problems[0].key, "frame");

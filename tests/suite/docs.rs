@@ -412,6 +412,7 @@ fn every_key() -> Calibration {
         facets: vec![facet],
         rig_from_sensor: Some(mount),
         bias: Some(RangeBias::default()),
+        warnings: vec!["the board moved".to_owned()],
     }
 }
 

@@ -79,6 +79,7 @@ pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result
         facets: Vec::new(),
         rig_from_sensor: Some(mount.to_file()),
         bias: None,
+        warnings: Vec::new(),
     })
 }
 

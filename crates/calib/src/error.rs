@@ -32,6 +32,14 @@ pub enum CalibError {
         /// What is missing.
         what: String,
     },
+    /// A calibrator that is not ours and gave no calibration.
+    #[error("{name}: {what}")]
+    Foreign {
+        /// Its name.
+        name: String,
+        /// What happened.
+        what: String,
+    },
     /// A name that is no method's.
     #[error("no method is called {name:?}; there are beam and recursive")]
     UnknownMethod {

@@ -15,6 +15,7 @@
 
 mod ahead;
 mod calibrate;
+mod calibrator;
 mod characterize;
 mod choose;
 pub mod common;
@@ -36,6 +37,7 @@ pub mod solve;
 pub mod spread;
 
 pub use calibrate::calibrate;
+pub use calibrator::Calibrator;
 pub use characterize::characterize;
 pub use covariance::{Budget, MountUncertainty};
 pub use element::LEAST_BOARDS;

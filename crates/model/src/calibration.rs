@@ -145,6 +145,9 @@ pub struct Calibration {
     /// Range biases, for methods that estimate them.
     #[serde(default)]
     pub bias: Option<RangeBias>,
+    /// What the method noticed about the dataset that its user should know, in words.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
 }
 
 impl BeamEstimate {

@@ -95,6 +95,7 @@ fn undeflected(rig_from_sensor: Pose) -> Calibration {
             covariance: None,
         }),
         bias: None,
+        warnings: Vec::new(),
     }
 }
 

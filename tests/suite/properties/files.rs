@@ -51,6 +51,7 @@ proptest! {
             facets: Vec::new(),
             rig_from_sensor: None,
             bias: None,
+            warnings: Vec::new(),
         };
         let text = serde_json::to_string(&calibration).expect("all is finite");
         let back: Calibration = serde_json::from_str(&text).expect("our own");
