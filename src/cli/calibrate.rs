@@ -18,7 +18,7 @@ pub(crate) struct Arguments {
     /// The dataset.
     dataset: PathBuf,
     /// How the angles of an element are estimated.
-    #[arg(long, value_enum, default_value_t = MethodName::Beam)]
+    #[arg(long, value_enum, default_value_t = MethodName::Joint)]
     method: MethodName,
     /// The calibration to write.
     #[arg(long, value_name = "calibration.json")]
@@ -33,10 +33,34 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum MethodName {
-    /// All readings of an element at once, Eqs. 7 and 8
+    /// Facets, mounting, boards, drifts and biases at once, beams free to depart from their facet's plane
+    Joint,
+    /// One plane per facet, each facet by itself
+    Facet,
+    /// Each element by itself, weighted by the covariance of all errors
+    BeamGls,
+    /// Each element by itself, all readings alike, Eqs. 7 and 8
     Beam,
-    /// One reading after the other, recursive least squares
+    /// The same, one reading after the other: recursive least squares
     Recursive,
+    /// Each element by itself, without iteration
+    ClosedForm,
+    /// The drawing
+    Prior,
+}
+
+impl From<MethodName> for Method {
+    fn from(name: MethodName) -> Self {
+        match name {
+            MethodName::Joint => Self::Joint,
+            MethodName::Facet => Self::Facet,
+            MethodName::BeamGls => Self::BeamGls,
+            MethodName::Beam => Self::Beam,
+            MethodName::Recursive => Self::Recursive,
+            MethodName::ClosedForm => Self::ClosedForm,
+            MethodName::Prior => Self::Prior,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -54,10 +78,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         let found = read_characterization(path)?;
         dataset.session.believed = dataset.session.believed.after(&found);
     }
-    let method = match arguments.method {
-        MethodName::Beam => Method::Beam,
-        MethodName::Recursive => Method::Recursive,
-    };
+    let method = Method::from(arguments.method);
     let options = Options {
         jacobian: match arguments.jacobian {
             JacobianName::Analytic => JacobianForm::Analytic,

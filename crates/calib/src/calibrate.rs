@@ -3,9 +3,11 @@
 use crate::element::Workspace;
 use crate::error::CalibError;
 use crate::observations::{BoardInSensor, azimuth};
+use crate::joint::{self, Assigned};
 use crate::options::{Method, Options};
-use crate::pose;
+use crate::pose::{self, Mount};
 use crate::screen::{Candidate, Screen};
+use crate::solve::BareDistance;
 use catoptric_model::session::{NominalFacet, Session};
 use catoptric_model::{
     BeamEstimate, Calibration, Dataset, MirrorPlane, PoseRecord, Status, Summary, beam, calibration, mirror,
@@ -71,16 +73,114 @@ pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result
         .zip(&drawn)
         .map(|(facet, drawn)| plane_as_built(session, facet, &first).unwrap_or(*drawn))
         .collect();
-    Ok(Calibration {
+    let mut calibration = Calibration {
         schema_version: calibration::SCHEMA_VERSION,
         method: method.name().to_owned(),
         frame: "sensor".to_owned(),
-        beams: estimates(&work, &candidates, &built),
+        beams: Vec::new(),
         facets: Vec::new(),
         rig_from_sensor: Some(mount.to_file()),
         bias: None,
         warnings: Vec::new(),
-    })
+    };
+    match method {
+        Method::Prior => calibration.beams = as_drawn(session, &candidates, &drawn),
+        Method::Joint | Method::Facet => {
+            // An element by itself decides whether its readings are of use, and which boards it hits.
+            let alone = Workspace {
+                method: Method::BeamGls,
+                ..work
+            };
+            calibration.beams = estimates(&alone, &candidates, &built);
+            let assigned = assigned(&alone, &candidates, &built, &calibration.beams);
+            together(&work, &mount, &built, assigned, &mut calibration);
+        }
+        Method::Beam | Method::Recursive | Method::BeamGls | Method::ClosedForm => {
+            calibration.beams = estimates(&work, &candidates, &built);
+        }
+    }
+    Ok(calibration)
+}
+
+/// Elements with boards to be solved together: those solved by themselves, and those that only lacked boards.
+fn assigned(
+    work: &Workspace,
+    candidates: &[Candidate],
+    mirrors: &[MirrorPlane],
+    alone: &[BeamEstimate],
+) -> Vec<Assigned> {
+    let facets = &work.dataset.session.facets;
+    let of_one = |(candidate, estimate): (&Candidate, &BeamEstimate)| {
+        let Candidate::Deflected(near) = candidate else {
+            return None;
+        };
+        let facet = match estimate.status {
+            Status::Solved => facets.iter().position(|f| Some(&f.name) == estimate.facet.as_ref()),
+            Status::TooFewPoses | Status::Unobservable => near.first().copied(),
+            Status::Direct | Status::NotConverged | Status::Rejected => None,
+        }?;
+        let poses = work.boards_hit(estimate, &facets[facet], &mirrors[facet])?;
+        (!poses.is_empty()).then_some(Assigned {
+            beam: estimate.beam,
+            facet,
+            poses,
+        })
+    };
+    candidates.iter().zip(alone).filter_map(of_one).collect()
+}
+
+/// Replaces what elements found by themselves with what they find together.
+fn together(
+    work: &Workspace,
+    mount: &Mount,
+    mirrors: &[MirrorPlane],
+    assigned: Vec<Assigned>,
+    calibration: &mut Calibration,
+) {
+    match joint::calibrate(work, mount, mirrors, assigned) {
+        Ok(outcome) => {
+            for (beam, estimate) in outcome.beams {
+                calibration.beams[beam] = estimate;
+            }
+            calibration.facets = outcome.facets;
+            calibration.rig_from_sensor = outcome.mount.or(calibration.rig_from_sensor);
+            calibration.bias = outcome.bias;
+        }
+        Err(problem) => calibration.warnings.push(format!(
+            "the elements could not be solved together ({problem}); each was solved by itself"
+        )),
+    }
+}
+
+/// What the drawing says of every element that a mirror may deflect; nobody knows how far it is off.
+fn as_drawn(session: &Session, candidates: &[Candidate], drawn: &[MirrorPlane]) -> Vec<BeamEstimate> {
+    let of_one = |(beam, candidate): (usize, &Candidate)| match candidate {
+        Candidate::Direct(reason) => BeamEstimate::without_angles(beam, Status::Direct, Some(reason.clone())),
+        Candidate::Rejected(reason) => {
+            BeamEstimate::without_angles(beam, Status::Rejected, Some(reason.clone()))
+        }
+        Candidate::Deflected(near) => {
+            let found = near
+                .iter()
+                .find_map(|f| Some((f, drawn[*f].deflect(beam::direction(azimuth(session, beam)))?)));
+            let Some((facet, deflection)) = found else {
+                let reason = Some("the drawing has no mirror that faces it".to_owned());
+                return BeamEstimate::without_angles(beam, Status::Rejected, reason);
+            };
+            BeamEstimate {
+                facet: Some(session.facets[*facet].name.clone()),
+                azimuth_rad: Some(deflection.azimuth),
+                elevation_rad: Some(deflection.elevation),
+                distance_m: Some(session.bare_structure.distance(beam).map_or(deflection.distance, |bare| {
+                    let thickness = session.bare_structure.mirror_thickness_mm * 1e-3;
+                    let exit = deflection.exit_direction(azimuth(session, beam));
+                    BareDistance { distance: bare, thickness }.to_mirror(azimuth(session, beam), &exit)
+                })),
+                ..BeamEstimate::without_angles(beam, Status::Solved, None)
+            }
+        }
+    };
+    candidates.iter().enumerate().map(of_one).collect()
 }
 
 pub(crate) fn check_session(session: &Session) -> Result<(), CalibError> {

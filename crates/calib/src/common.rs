@@ -1,6 +1,6 @@
 //! Errors of the believed biases, which all boards and the mounting share.
 
-use catoptric_model::Session;
+use catoptric_model::{RangeBias, Session};
 use nalgebra::RowDVector;
 
 /// The uncertain numbers behind E_r, E_a and E_c, each with its standard deviation: the nodes of the distance table,
@@ -47,6 +47,27 @@ impl<'a> CommonErrors<'a> {
             row[nodes + 1 + place] = beliefs.color_bias_sd_mm * 1e-3;
         }
         row
+    }
+
+    /// The believed biases changed by so many standard deviations of each number.
+    pub fn applied(&self, deviations: &[f64]) -> RangeBias {
+        let beliefs = &self.session.believed;
+        let mut bias = beliefs.bias.clone();
+        let nodes = bias.distance.range_m.len();
+        for (node, deviation) in bias.distance.error_mm.iter_mut().zip(deviations) {
+            *node += beliefs.distance_bias_sd_mm * deviation;
+        }
+        if let Some(deviation) = deviations.get(nodes) {
+            bias.angle.gain_mm += beliefs.angle_gain_sd_mm * deviation;
+            bias.angle.offset_mm -= beliefs.angle_gain_sd_mm * deviation;
+        }
+        for (color, deviation) in self.colors.iter().zip(deviations.iter().skip(nodes + 1)) {
+            let change = beliefs.color_bias_sd_mm * deviation;
+            if change != 0.0 {
+                bias.color.entry((*color).to_owned()).or_default().offset_mm += change;
+            }
+        }
+        bias
     }
 
     /// Variance of E_c for a color that no board of the session has, in square metres; zero for a listed one.

@@ -89,6 +89,22 @@ impl Workspace<'_> {
     }
 }
 
+impl Workspace<'_> {
+    /// The stretches whose boards an element hits, where its estimate or else its facet's plane puts it.
+    pub(crate) fn boards_hit(
+        &self,
+        estimate: &BeamEstimate,
+        facet: &NominalFacet,
+        mirror: &MirrorPlane,
+    ) -> Option<Vec<usize>> {
+        let session = &self.dataset.session;
+        let nominal = mirror.deflect(beam::direction(azimuth(session, estimate.beam)))?;
+        let at = estimate.deflection().unwrap_or(nominal);
+        let attempt = Attempt::new(self, session, estimate.beam, facet, &nominal);
+        Some(attempt.choose(&at, 0.0))
+    }
+}
+
 impl Attempt<'_> {
     /// Chooses boards and solves, ever more strictly, until the choice no longer changes.
     fn fit(&self, nominal: &Deflection) -> Result<Fit, Failure> {
@@ -130,7 +146,8 @@ impl Attempt<'_> {
         let element = self.element(&observations);
         let options = self.work.options;
         let run = |from: &Deflection| match self.work.method {
-            Method::Beam => solve::batch(&element, from, options),
+            Method::BeamGls => self.generalized(&element, from),
+            Method::ClosedForm => self.without_iteration(&element, at),
             Method::Recursive => {
                 let readings: Vec<Vec<f64>> = poses
                     .iter()
@@ -142,6 +159,9 @@ impl Attempt<'_> {
                 // Where the readings leave a direction open there is nothing to recurse on; the batch says which.
                 recursive(&element, &readings, from, options)
                     .or_else(|| solve::batch(&element, from, options))
+            }
+            Method::Beam | Method::Facet | Method::Joint | Method::Prior => {
+                solve::batch(&element, from, options)
             }
         };
         let near = |s: &Solution| {
@@ -157,6 +177,13 @@ impl Attempt<'_> {
             solution,
             start: *start,
         })
+    }
+
+    /// The closed form as the answer, its mirror and biases placed by the estimate that the boards were chosen with.
+    fn without_iteration(&self, element: &Element, at: &Deflection) -> Option<Solution> {
+        let found = initial::closed_form(at, self.azimuth, element.observations, element.bias)?;
+        let at = Deflection::from_exit(self.azimuth, &found.direction, at.distance);
+        element.finish(&element.place(at.azimuth, at.elevation), 0, true)
     }
 
     fn start(&self, element: &Element, nominal: &Deflection) -> Deflection {

@@ -41,7 +41,7 @@ pub enum CalibError {
         what: String,
     },
     /// A name that is no method's.
-    #[error("no method is called {name:?}; there are beam and recursive")]
+    #[error("no method is called {name:?}; there are {}", crate::options::Method::ALL.map(crate::options::Method::name).join(", "))]
     UnknownMethod {
         /// The name asked for.
         name: String,

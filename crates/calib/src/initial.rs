@@ -1,8 +1,10 @@
 //! A start without a guess: 1/s_k = (n_k/(n_k·(c_k − P_L1)))·v is linear in the exit direction v.
 
+use crate::covariance::Budget;
 use crate::observations::Observation;
-use catoptric_model::{Deflection, RangeBias};
-use nalgebra::{Matrix3, SymmetricEigen, Unit, Vector3};
+use crate::solve::libm_cos;
+use catoptric_model::{Deflection, RangeBias, frame};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3xX, SymmetricEigen, Unit, Vector3};
 
 /// Smallest ratio of singular values at which the linear system counts as of rank three.
 const LEAST_CONDITION: f64 = 1e-2;
@@ -46,6 +48,36 @@ pub fn closed_form(
         direction: Unit::try_new(found, f64::MIN_POSITIVE)?,
         excess: found.norm() - 1.0,
     })
+}
+
+/// Covariance of (θ_a, φ) in closed form, from the covariance Σ of the ranges, in rad².
+///
+/// An error δz of a range changes its row's s·q·v by δz/s, so v by −(Σqqᵀ)⁻¹q·δz/s with q as in [`closed_form`], of
+/// which the part across v remains when v is normalized.
+pub(crate) fn covariance(
+    at: &Deflection,
+    beam_azimuth: f64,
+    observations: &[Observation],
+    budget: &Budget,
+) -> Option<Matrix2<f64>> {
+    let (from, v) = (at.deflection_point(beam_azimuth), at.exit_direction(beam_azimuth));
+    let mut normal = Matrix3::zeros();
+    let mut gain = Matrix3xX::zeros(observations.len());
+    for (mut column, o) in gain.column_iter_mut().zip(observations) {
+        let plane = &o.board.plane;
+        let s = plane.distance_along(&from, &v)?;
+        let row = plane.normal.into_inner() * (s / plane.normal.dot(&(plane.point - from)));
+        normal += row * row.transpose();
+        column.copy_from(&(row / s));
+    }
+    let (across, up) = frame::tangent_basis(&v);
+    let cos_elevation = libm_cos(at.elevation);
+    let onto = Matrix2x3::from_rows(&[
+        across.transpose() / cos_elevation,
+        up.transpose(),
+    ]);
+    let gain = onto * normal.try_inverse()? * gain;
+    Some(&gain * &budget.covariance * gain.transpose())
 }
 
 #[cfg(test)]

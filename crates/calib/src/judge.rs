@@ -3,7 +3,9 @@
 use crate::ahead::{AGREEMENT_FLOOR, ahead};
 use crate::choose::{Attempt, GATE_FLOOR, GATE_SIGMAS};
 use crate::element::{Failure, Fit, lost, rejected};
+use crate::initial;
 use crate::observations::{BoardView, Observation};
+use crate::options::Method;
 use crate::spread;
 use catoptric_model::{BeamEstimate, Deflection, PoseKind, RawRange, Status};
 use nalgebra::Matrix2;
@@ -19,9 +21,13 @@ impl Attempt<'_> {
     /// Largest credible rms residual of a fit, and the expected one, in metres.
     fn residual_limit(&self, fit: &Fit) -> Option<(f64, f64)> {
         let observations = self.observations(&fit.poses);
-        let residuals = self
-            .budget(&fit.solution.deflection, &observations)?
-            .residual_covariance()?;
+        let budget = self.budget(&fit.solution.deflection, &observations)?;
+        let residuals = match self.work.method {
+            Method::BeamGls => budget
+                .residual_covariance_at_bound()
+                .or_else(|| budget.residual_covariance()),
+            _ => budget.residual_covariance(),
+        }?;
         let expected = (residuals.trace().max(0.0) / fit.poses.len() as f64).sqrt();
         Some((RESIDUAL_FACTOR * expected + RESIDUAL_FLOOR, expected))
     }
@@ -71,7 +77,12 @@ impl Attempt<'_> {
                 1e3 * expected
             )));
         }
-        let covariance = budget.sandwich().ok_or_else(lost)?;
+        let covariance = match self.work.method {
+            Method::BeamGls => budget.bound().or_else(|| budget.sandwich()),
+            Method::ClosedForm => initial::covariance(&solution.deflection, self.azimuth, &observations, &budget),
+            _ => budget.sandwich(),
+        }
+        .ok_or_else(lost)?;
         self.check_room(&solution.deflection, &covariance)?;
         // One number for all readings, as the paper has it: their pooled noise.
         let pooled: f64 = observations

@@ -24,6 +24,8 @@ mod element;
 pub mod error;
 pub mod initial;
 pub mod jacobian;
+mod joint;
+mod gls;
 mod judge;
 pub mod least_squares;
 mod mount_data;

@@ -33,10 +33,10 @@ const GATE_FLOOR: f64 = 0.02;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Ray {
     pub(crate) beam: usize,
-    azimuth: f64,
-    mean: f64,
+    pub(crate) azimuth: f64,
+    pub(crate) mean: f64,
     /// Variance of the mean by noise, in square metres.
-    variance: f64,
+    pub(crate) variance: f64,
 }
 
 /// A pose of a board and the beams that read it.

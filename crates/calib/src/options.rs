@@ -4,17 +4,36 @@ use crate::error::CalibError;
 use std::str::FromStr;
 
 /// How the angles of an element are estimated from its ranges.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Method {
+    /// Everything at once: facets, mounting, boards, drifts and biases, beams free to depart from their facet's plane.
+    #[default]
+    Joint,
+    /// One plane per facet, each facet by itself.
+    Facet,
+    /// Per element, weighted by the covariance of all errors believed in.
+    BeamGls,
     /// Batch Gauss–Newton per element, Eqs. (7)–(8): what the paper prints and calls RLS.
     Beam,
     /// Recursive least squares per element, reading after reading: what the paper names.
     Recursive,
+    /// Per element without iteration: linear in the exit direction.
+    ClosedForm,
+    /// The drawing, with nothing measured but d: what calibrating has to improve on.
+    Prior,
 }
 
 impl Method {
     /// All of them.
-    pub const ALL: [Self; 2] = [Self::Beam, Self::Recursive];
+    pub const ALL: [Self; 7] = [
+        Self::Joint,
+        Self::Facet,
+        Self::BeamGls,
+        Self::Beam,
+        Self::Recursive,
+        Self::ClosedForm,
+        Self::Prior,
+    ];
 
     /// The word that files and commands use.
     ///
@@ -25,8 +44,13 @@ impl Method {
     /// ```
     pub fn name(self) -> &'static str {
         match self {
+            Self::Joint => "joint",
+            Self::Facet => "facet",
+            Self::BeamGls => "beam-gls",
             Self::Beam => "beam",
             Self::Recursive => "recursive",
+            Self::ClosedForm => "closed-form",
+            Self::Prior => "prior",
         }
     }
 }

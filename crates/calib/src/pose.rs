@@ -28,6 +28,9 @@ const MAX_ROUNDS: usize = 12;
 /// Smallest tolerance taken as a prior, in radians and metres: a drawing is never better than 0.1° and 1 mm.
 const LEAST_TOLERANCE: [f64; 2] = [1.745e-3, 1e-3];
 
+/// Tolerance, in radians and metres, that stands for none: a mounting that was measured and is known.
+const NO_TOLERANCE: f64 = 1e-9;
+
 /// The mounting of the sensor as estimated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mount {
@@ -41,6 +44,8 @@ pub struct Mount {
     pub sightings: usize,
     /// Motions, of six, that the boards did not determine to better than the mount tolerance, which then stands in.
     pub undetermined: usize,
+    /// The boards and the beams on them.
+    pub(crate) selection: Vec<DirectBoard>,
 }
 
 /// Sums of the weighted least squares at one mounting.
@@ -52,10 +57,10 @@ struct NormalEquations {
 }
 
 /// The drawing's word on the mounting, used only along motions that the boards leave open.
-struct Prior {
-    nominal: Pose,
+pub(crate) struct Prior {
+    pub(crate) nominal: Pose,
     /// 1σ of each motion: shifts, then turns.
-    sd: Vector6<f64>,
+    pub(crate) sd: Vector6<f64>,
 }
 
 /// Estimates the mounting from the poses recorded for it; `summaries` holds every pose's statistics by beam.
@@ -94,6 +99,7 @@ pub fn estimate(dataset: &Dataset, summaries: &[Vec<Summary>]) -> Mount {
         boards: selection.len(),
         sightings: selection.iter().map(|b| b.rays.len()).sum(),
         undetermined,
+        selection,
     }
 }
 
@@ -193,13 +199,15 @@ fn normal_equations(
 }
 
 impl Prior {
-    fn of(nominal: &Pose, tolerance: &MountTolerance) -> Self {
+    pub(crate) fn of(nominal: &Pose, tolerance: &MountTolerance) -> Self {
+        // None at all says that the mounting is known, not that it was drawn with care.
+        let least = |sd: f64, least: f64| if sd == 0.0 { NO_TOLERANCE } else { sd.max(least) };
         let shift = tolerance
             .translation_sd_mm
-            .map(|mm| (mm * 1e-3).max(LEAST_TOLERANCE[1]));
+            .map(|mm| least(mm * 1e-3, LEAST_TOLERANCE[1]));
         let turn = tolerance
             .rotation_sd_deg
-            .map(|deg| deg.to_radians().max(LEAST_TOLERANCE[0]));
+            .map(|deg| least(deg.to_radians(), LEAST_TOLERANCE[0]));
         Self {
             nominal: *nominal,
             sd: Vector6::new(shift[0], shift[1], shift[2], turn[0], turn[1], turn[2]),

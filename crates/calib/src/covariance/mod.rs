@@ -11,10 +11,13 @@ use crate::common::CommonErrors;
 use crate::jacobian;
 use crate::observations::BoardView;
 use catoptric_model::{Deflection, Session, range};
-use nalgebra::{DMatrix, DVector, Dyn, Matrix2, Matrix6, OMatrix, U2, U6};
+use nalgebra::{DMatrix, DVector, Dyn, Matrix2, Matrix6, OMatrix, U2, U6, Vector2};
 
 pub(crate) use plane::PlaneFit;
 use plane::plane_variance;
+
+/// Error that keeps Σ invertible where none is believed in, in metres.
+const LEAST_ERROR: f64 = 1e-6;
 
 /// How well the mounting of the sensor is known: small motions of the sensor about its own axes, three shifts in
 /// metres, three turns in radians.
@@ -145,6 +148,23 @@ impl Budget {
     pub fn bound(&self) -> Option<Matrix2<f64>> {
         let solved = self.covariance.clone().cholesky()?.solve(&self.jacobian);
         to_2(&(self.jacobian.transpose() * solved)).try_inverse()
+    }
+
+    /// Covariance of the residuals that the estimate of least variance leaves, Σ − H(HᵀΣ⁻¹H)⁻¹Hᵀ, in square metres.
+    pub fn residual_covariance_at_bound(&self) -> Option<DMatrix<f64>> {
+        Some(&self.covariance - &self.jacobian * self.bound()? * self.jacobian.transpose())
+    }
+
+    /// HᵀΣ⁻¹H and HᵀΣ⁻¹e: what generalized least squares makes of residuals e, in metres.
+    ///
+    /// Where all errors are believed to be absent, Σ has a micrometre added: data without errors satisfy any weights.
+    pub fn weighted(&self, residuals: &DVector<f64>) -> Option<(Matrix2<f64>, Vector2<f64>)> {
+        let k = residuals.len();
+        let floor = DMatrix::identity(k, k) * LEAST_ERROR.powi(2);
+        let factor = (&self.covariance + floor).cholesky()?;
+        let weighted = factor.solve(&self.jacobian).transpose();
+        let right = &weighted * residuals;
+        Some((to_2(&(weighted * &self.jacobian)), Vector2::new(right[0], right[1])))
     }
 
     /// The paper's covariance of (θ_a, φ), σ²(HᵀH)⁻¹ over all readings with noise alone, in rad².

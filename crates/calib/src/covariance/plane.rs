@@ -60,6 +60,16 @@ impl PlaneFit {
         fit
     }
 
+    /// Middle of the markers.
+    pub(crate) fn centroid(&self) -> Vector3<f64> {
+        self.centroid
+    }
+
+    /// Directions of x and y in the plane.
+    pub(crate) fn axes(&self) -> [Vector3<f64>; 2] {
+        self.axes
+    }
+
     /// a = (1, x, y) of a point.
     pub(crate) fn coordinates(&self, at: &Point3<f64>) -> Vector3<f64> {
         let p = at.coords - self.centroid;

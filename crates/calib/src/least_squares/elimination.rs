@@ -148,6 +148,16 @@ impl Elimination {
         &self.scale
     }
 
+    /// ln det(JᵀJ) over the independent columns.
+    pub(super) fn log_determinant(&self) -> f64 {
+        let triangles = self.groups.iter().map(|g| &g.own).chain([&self.shared]);
+        let diagonal: f64 = triangles
+            .map(|t| (0..t.rank).map(|i| libm::log(t.r[(i, i)].abs())).sum::<f64>())
+            .sum();
+        let scale: f64 = self.scale.iter().map(|s| libm::log(*s)).sum();
+        2.0 * (diagonal + scale)
+    }
+
     /// p of the least ‖J·p − b‖, with 0 for dependent columns.
     pub(super) fn solve(&self) -> DVector<f64> {
         let x = self.shared.solve(&self.shared_right);

@@ -44,6 +44,11 @@ impl Information {
         self.linear.rank()
     }
 
+    /// ln det(JᵀJ) over the independent columns, what a likelihood of variances needs.
+    pub fn log_determinant(&self) -> f64 {
+        self.linear.log_determinant()
+    }
+
     /// Orthonormal basis of the directions in which no residual changes, n × (n − rank).
     ///
     /// Each vector's largest component is positive.

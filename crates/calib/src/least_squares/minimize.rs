@@ -121,7 +121,7 @@ pub fn minimize<P: GroupedProblem>(
     assert!(start.own.len() <= problem.groups(), "own parameters need a group");
     let mut search = Search::begin(problem, start)?;
     let stop = search.run(options)?;
-    let rows = linearize(problem, &search.state, &search.residuals)?;
+    let rows = rows(problem, &search.state, &search.residuals)?;
     let slope = Slope::of(&rows, search.state.shared.dimension(), search.norm);
     let linear = Elimination::new(rows, search.state.shared.dimension(), options.rank_threshold);
     Ok(Solution {
@@ -132,6 +132,39 @@ pub fn minimize<P: GroupedProblem>(
         stop,
         iterations: search.iterations,
         evaluations: search.evaluations,
+        information: Information::new(linear),
+    })
+}
+
+/// A problem linearized at a state.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Linearized {
+    /// The step to the linear problem's minimum: Gauss and Newton's.
+    pub step: DVector<f64>,
+    /// ‖f + J·step‖².
+    pub least_sum_of_squares: f64,
+    /// JᵀJ at the state.
+    pub information: Information,
+}
+
+/// Linearizes at a state, without moving.
+///
+/// # Errors
+///
+/// As [`minimize`], of the state.
+pub fn linearize<P: GroupedProblem>(problem: &P, state: &State) -> Result<Linearized, ProblemError> {
+    let residuals = evaluate(problem, state).map_err(|group| ProblemError::Undefined {
+        group,
+        place: "point reached",
+    })?;
+    let rows = rows(problem, state, &residuals)?;
+    let linear = Elimination::new(rows, state.shared.dimension(), Options::default().rank_threshold);
+    let step = linear.solve();
+    // Perpendicular to what the step explains.
+    let least_sum_of_squares = (norm(&residuals).powi(2) - linear.image_norm(&step).powi(2)).max(0.0);
+    Ok(Linearized {
+        step,
+        least_sum_of_squares,
         information: Information::new(linear),
     })
 }
@@ -169,7 +202,7 @@ impl<'a, P: GroupedProblem> Search<'a, P> {
         let mut d = DVector::zeros(0);
         let (mut radius, mut size, mut damping) = (0.0, 0.0, 0.0);
         loop {
-            let rows = linearize(self.problem, &self.state, &self.residuals)?;
+            let rows = rows(self.problem, &self.state, &self.residuals)?;
             self.iterations += 1;
             let slope = Slope::of(&rows, width, self.norm);
             let linear = Elimination::new(rows, width, STEP_THRESHOLD);
@@ -296,7 +329,7 @@ fn evaluate<P: GroupedProblem>(problem: &P, state: &State) -> Result<Vec<DVector
 }
 
 /// Rows of all groups, with −f on the right.
-fn linearize<P: GroupedProblem>(
+fn rows<P: GroupedProblem>(
     problem: &P,
     state: &State,
     residuals: &[DVector<f64>],

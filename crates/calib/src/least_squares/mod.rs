@@ -50,7 +50,7 @@ mod trust_region;
 pub use information::Information;
 pub use loss::{Loss, gate};
 pub use manifold::{Block, Point};
-pub use minimize::{Options, Solution, Stop, minimize};
+pub use minimize::{Linearized, Options, Solution, Stop, linearize, minimize};
 pub use prior::{Prior, WithPriors};
 pub use problem::{Flat, GroupJacobian, GroupedProblem, Problem, ProblemError, State};
 pub use qr::PivotedQr;
