@@ -1,19 +1,32 @@
-//! The bound an element's error is measured by, at the true angles.
+//! What the boards can tell of an element at all: the bound its error is measured by, and directions left open, both
+//! at the true angles.
 
-use catoptric_calib::covariance::budget;
+use catoptric_calib::covariance::{MountUncertainty, budget};
+use catoptric_calib::observability::weakness;
 use catoptric_calib::observations::BoardInSensor;
 use catoptric_calib::{observations, pose};
 use catoptric_model::{Dataset, Pose, PoseKind, PoseRecord};
 use catoptric_sim::Truth;
+use catoptric_sim::truth::BeamClass;
 use nalgebra::{Matrix2, Point3};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-/// The least covariance of (θ_a, φ), in rad², that an unbiased per-element estimate from these boards can have, for
-/// every beam that is deflected once.
+/// What the boards tell of the elements.
+#[derive(Debug, Default)]
+pub(super) struct Knowable {
+    /// The least covariance of (θ_a, φ), in rad², that an unbiased per-element estimate from these boards can have,
+    /// for every beam that is deflected once.
+    pub(super) bounds: BTreeMap<usize, Matrix2<f64>>,
+    /// Elements, deflected and unsplit, that their own boards leave open: fewer than two boards are hit, or a direction
+    /// is known to no better than [`WEAKEST_SD`](catoptric_calib::observability::WEAKEST_SD).
+    pub(super) open: BTreeSet<usize>,
+}
+
+/// What the boards of a dataset tell of every beam that is deflected once.
 ///
 /// The boards are those that the true ray meets farther from the edge than its spot; the mounting is as uncertain as
 /// this dataset leaves it. A method that ties elements together, by their facet, may do better.
-pub(super) fn at_truth(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize, Matrix2<f64>> {
+pub(super) fn at_truth(dataset: &Dataset, truth: &Truth) -> Knowable {
     let session = &dataset.session;
     let summaries: Vec<_> = dataset.poses.iter().map(PoseRecord::summarize).collect();
     let mount = pose::estimate(dataset, &summaries).uncertainty;
@@ -29,7 +42,7 @@ pub(super) fn at_truth(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize, Matr
         .collect();
     let cone = observations::cone_half_angle(session);
     let noise_sd = session.believed.range_noise_sd_mm * 1e-3;
-    let mut bounds = BTreeMap::new();
+    let mut knowable = Knowable::default();
     for beam in &truth.beams {
         let Some(deflection) = beam.deflection() else {
             continue;
@@ -47,8 +60,15 @@ pub(super) fn at_truth(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize, Matr
             })
             .collect();
         if let Some(bound) = budget(session, &mount, azimuth, &deflection, &views).and_then(|b| b.bound()) {
-            bounds.insert(beam.beam, bound);
+            knowable.bounds.insert(beam.beam, bound);
+        }
+        // What is not known of the mounting turns all beams alike, whatever the boards.
+        let boards_alone = budget(session, &MountUncertainty::none(), azimuth, &deflection, &views);
+        let is_open =
+            views.len() < 2 || boards_alone.is_some_and(|b| weakness(&b, deflection.elevation).is_some());
+        if beam.status == BeamClass::Deflected && is_open {
+            knowable.open.insert(beam.beam);
         }
     }
-    bounds
+    knowable
 }

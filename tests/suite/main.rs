@@ -7,6 +7,7 @@ mod characterize;
 mod cli;
 mod closure;
 mod common;
+mod compare;
 mod consistency;
 mod detection;
 mod determinism;
