@@ -21,5 +21,6 @@ mod pipeline;
 mod properties;
 mod scenes;
 mod sub_rays;
+mod tiers;
 mod tracing;
 mod traps;
