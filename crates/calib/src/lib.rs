@@ -44,4 +44,5 @@ pub use characterize::characterize;
 pub use covariance::{Budget, MountUncertainty};
 pub use element::LEAST_BOARDS;
 pub use error::CalibError;
+pub use joint::{TrueDirection, limit};
 pub use options::{JacobianForm, Method, Options};

@@ -30,6 +30,7 @@
 pub mod beam;
 pub mod bias;
 pub mod board;
+pub mod assessment;
 pub mod calibration;
 pub mod characterization;
 pub mod cloud;
@@ -45,6 +46,7 @@ pub mod session;
 pub use beam::Deflection;
 pub use bias::{AngleBias, AngleTable, BiasTerms, ColorBias, DistanceBias, RangeBias};
 pub use board::{BoardPlane, Rectangle};
+pub use assessment::Assessment;
 pub use calibration::{BeamEstimate, Calibration, Status};
 pub use characterization::Characterization;
 pub use dataset::{
