@@ -2,15 +2,16 @@
 
 use crate::element::Workspace;
 use crate::error::CalibError;
-use crate::observations::{BoardInSensor, azimuth};
 use crate::joint::{self, Assigned};
+use crate::observations::{BoardInSensor, azimuth};
 use crate::options::{Method, Options};
 use crate::pose::{self, Mount};
 use crate::screen::{Candidate, Screen};
 use crate::solve::BareDistance;
 use catoptric_model::session::{NominalFacet, Session};
 use catoptric_model::{
-    BeamEstimate, Calibration, Dataset, Deflection, MirrorPlane, PoseRecord, Status, Summary, beam, calibration, mirror,
+    BeamEstimate, Calibration, Dataset, Deflection, MirrorPlane, PoseRecord, Status, Summary, beam,
+    calibration, mirror,
 };
 use nalgebra::{Unit, Vector3};
 
@@ -117,7 +118,12 @@ pub(crate) fn prepare(dataset: &Dataset) -> Result<Prepared, CalibError> {
 }
 
 impl Prepared {
-    pub(crate) fn workspace<'a>(&'a self, dataset: &'a Dataset, method: Method, options: &'a Options) -> Workspace<'a> {
+    pub(crate) fn workspace<'a>(
+        &'a self,
+        dataset: &'a Dataset,
+        method: Method,
+        options: &'a Options,
+    ) -> Workspace<'a> {
         Workspace {
             dataset,
             summaries: &self.summaries,
@@ -143,7 +149,9 @@ fn assigned(
             return None;
         };
         let facet = match estimate.status {
-            Status::Solved => facets.iter().position(|f| Some(&f.name) == estimate.facet.as_ref()),
+            Status::Solved => facets
+                .iter()
+                .position(|f| Some(&f.name) == estimate.facet.as_ref()),
             Status::TooFewPoses | Status::Unobservable => near.first().copied(),
             Status::Direct | Status::NotConverged | Status::Rejected => None,
         }?;
@@ -200,11 +208,20 @@ fn as_drawn(session: &Session, candidates: &[Candidate], drawn: &[MirrorPlane]) 
                 facet: Some(session.facets[*facet].name.clone()),
                 azimuth_rad: Some(deflection.azimuth),
                 elevation_rad: Some(deflection.elevation),
-                distance_m: Some(session.bare_structure.distance(beam).map_or(deflection.distance, |bare| {
-                    let thickness = session.bare_structure.mirror_thickness_mm * 1e-3;
-                    let exit = deflection.exit_direction(azimuth(session, beam));
-                    BareDistance { distance: bare, thickness }.to_mirror(azimuth(session, beam), &exit)
-                })),
+                distance_m: Some(
+                    session
+                        .bare_structure
+                        .distance(beam)
+                        .map_or(deflection.distance, |bare| {
+                            let thickness = session.bare_structure.mirror_thickness_mm * 1e-3;
+                            let exit = deflection.exit_direction(azimuth(session, beam));
+                            BareDistance {
+                                distance: bare,
+                                thickness,
+                            }
+                            .to_mirror(azimuth(session, beam), &exit)
+                        }),
+                ),
                 ..BeamEstimate::without_angles(beam, Status::Solved, None)
             }
         }

@@ -99,7 +99,12 @@ impl Workspace<'_> {
     ) -> Option<Vec<usize>> {
         let session = &self.dataset.session;
         let by_plane = mirror.deflect(beam::direction(azimuth(session, estimate.beam)))?;
-        self.boards_at(estimate.beam, facet, mirror, &estimate.deflection().unwrap_or(by_plane))
+        self.boards_at(
+            estimate.beam,
+            facet,
+            mirror,
+            &estimate.deflection().unwrap_or(by_plane),
+        )
     }
 
     /// The stretches whose boards an element of a facet hits with a known deflection.

@@ -27,10 +27,10 @@
 //! assert!((r - 2.07).abs() < 1e-12);
 //! ```
 
+pub mod assessment;
 pub mod beam;
 pub mod bias;
 pub mod board;
-pub mod assessment;
 pub mod calibration;
 pub mod characterization;
 pub mod cloud;
@@ -43,10 +43,10 @@ pub mod paper;
 pub mod range;
 pub mod session;
 
+pub use assessment::Assessment;
 pub use beam::Deflection;
 pub use bias::{AngleBias, AngleTable, BiasTerms, ColorBias, DistanceBias, RangeBias};
 pub use board::{BoardPlane, Rectangle};
-pub use assessment::Assessment;
 pub use calibration::{BeamEstimate, Calibration, Status};
 pub use characterization::Characterization;
 pub use dataset::{

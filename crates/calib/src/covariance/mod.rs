@@ -164,7 +164,10 @@ impl Budget {
         let factor = (&self.covariance + floor).cholesky()?;
         let weighted = factor.solve(&self.jacobian).transpose();
         let right = &weighted * residuals;
-        Some((to_2(&(weighted * &self.jacobian)), Vector2::new(right[0], right[1])))
+        Some((
+            to_2(&(weighted * &self.jacobian)),
+            Vector2::new(right[0], right[1]),
+        ))
     }
 
     /// The paper's covariance of (θ_a, φ), σ²(HᵀH)⁻¹ over all readings with noise alone, in rad².

@@ -53,7 +53,10 @@ impl Joint<'_> {
     }
 
     /// Every deflected element at a state, linearized, with its group and its facet.
-    fn linearized<'g>(&'g self, state: &'g State) -> impl Iterator<Item = (usize, usize, &'g Element, Fan, Linear)> + 'g {
+    fn linearized<'g>(
+        &'g self,
+        state: &'g State,
+    ) -> impl Iterator<Item = (usize, usize, &'g Element, Fan, Linear)> + 'g {
         self.groups.iter().enumerate().flat_map(move |(number, group)| {
             let own = state.own(number);
             let boards = self.boards(group, &state.shared, own);
@@ -86,7 +89,11 @@ impl Joint<'_> {
                     let left: f64 = 1.0 - v;
                     if left > LEAST_LEFT { r / left.sqrt() } else { 0.0 }
                 });
-                let poses: Vec<usize> = element.sights.iter().map(|s| group.boards[s.board].pose).collect();
+                let poses: Vec<usize> = element
+                    .sights
+                    .iter()
+                    .map(|s| group.boards[s.board].pose)
+                    .collect();
                 Answer {
                     beam: element.beam,
                     facet: group.facets[facet].facet,
@@ -97,7 +104,11 @@ impl Joint<'_> {
                     taken: fitted.iter().sum(),
                     residuals: rest.iter().copied().collect(),
                     readings: element.sights.iter().map(|s| s.count).sum(),
-                    numbers: element.sights.iter().map(|s| group.boards[s.board].number).collect(),
+                    numbers: element
+                        .sights
+                        .iter()
+                        .map(|s| group.boards[s.board].number)
+                        .collect(),
                     covariance: spread.map(|s| s.direction),
                     poses,
                 }
@@ -221,7 +232,11 @@ impl Joint<'_> {
 }
 
 /// Motion matrix of a mounting that is known as its uncertainty says: independent errors first, then the common ones.
-pub(super) fn motion_of(independent: &Matrix6<f64>, common: &OMatrix<f64, U6, Dyn>, count: usize) -> OMatrix<f64, U6, Dyn> {
+pub(super) fn motion_of(
+    independent: &Matrix6<f64>,
+    common: &OMatrix<f64, U6, Dyn>,
+    count: usize,
+) -> OMatrix<f64, U6, Dyn> {
     let eigen = independent.symmetric_eigen();
     let root = eigen.eigenvectors * Matrix6::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0).sqrt()));
     let mut motion = OMatrix::<f64, U6, Dyn>::zeros(6 + count);

@@ -101,7 +101,11 @@ impl Joint<'_> {
                 continue;
             };
             for (i, value) in errors.iter().enumerate() {
-                let of = if i % BOARD_ERRORS == 0 { &mut drifts } else { &mut markers };
+                let of = if i % BOARD_ERRORS == 0 {
+                    &mut drifts
+                } else {
+                    &mut markers
+                };
                 of.push((first + i, *value));
             }
         }
@@ -124,10 +128,7 @@ impl Joint<'_> {
         ]
     }
 
-    fn shared_parameters(
-        &self,
-        solution: &Solution,
-    ) -> (Vec<SharedParameter>, Vec<Vec<f64>>) {
+    fn shared_parameters(&self, solution: &Solution) -> (Vec<SharedParameter>, Vec<Vec<f64>>) {
         let Some(w) = solution.state.shared.numbers(0) else {
             return (Vec::new(), Vec::new());
         };
@@ -151,7 +152,7 @@ impl Joint<'_> {
         let Some(c) = solution.information.covariance_among(&told) else {
             return (Vec::new(), Vec::new());
         };
-                let parameters = told
+        let parameters = told
             .iter()
             .enumerate()
             .map(|(place, i)| SharedParameter {
@@ -170,7 +171,11 @@ impl Joint<'_> {
         for (number, group) in self.groups.iter().enumerate() {
             for (i, facet) in group.facets.iter().enumerate() {
                 let first = self.offset(number) + i * FACET_PARAMETERS;
-                if solution.information.covariance_among(&[first, first + 1]).is_none() {
+                if solution
+                    .information
+                    .covariance_among(&[first, first + 1])
+                    .is_none()
+                {
                     let name = &session.facets[facet.facet].name;
                     let boards = group.boards.len();
                     all.push(format!(
@@ -231,7 +236,9 @@ fn verdict(a: &Assessment) -> String {
              the covariances are too small"
         )
     } else if test.p_value > 1.0 - DOUBTFUL {
-        format!("residuals are {ratio:.2} times what the errors believed in make them: the beliefs are too pessimistic")
+        format!(
+            "residuals are {ratio:.2} times what the errors believed in make them: the beliefs are too pessimistic"
+        )
     } else {
         "residuals are as large as the errors believed in make them".to_owned()
     };

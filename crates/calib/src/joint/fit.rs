@@ -47,7 +47,8 @@ impl Joint<'_> {
             Prior::independent(block, Block::Vector(mean), &sd)
         };
         let of_group = |group: &Group| {
-            let figures = (0..group.facets.len()).map(|f| standard(FACET_BLOCKS * f + 2, DVector::zeros(FIGURE)));
+            let figures =
+                (0..group.facets.len()).map(|f| standard(FACET_BLOCKS * f + 2, DVector::zeros(FIGURE)));
             let boards = DVector::zeros(group.boards.len() * BOARD_ERRORS);
             figures
                 .chain([standard(FACET_BLOCKS * group.facets.len(), boards)])
@@ -148,8 +149,14 @@ fn search(
     // L is smooth in ln σ: parabolas through the three lowest points find its minimum as closely as it matters.
     for _ in 0..REFINEMENTS {
         seen.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let best = (0..seen.len()).min_by(|a, b| seen[*a].1.total_cmp(&seen[*b].1)).unwrap_or(0);
-        let next = match (best.checked_sub(1).map(|i| seen[i]), seen[best], seen.get(best + 1)) {
+        let best = (0..seen.len())
+            .min_by(|a, b| seen[*a].1.total_cmp(&seen[*b].1))
+            .unwrap_or(0);
+        let next = match (
+            best.checked_sub(1).map(|i| seen[i]),
+            seen[best],
+            seen.get(best + 1),
+        ) {
             (Some(low), middle, Some(high)) => vertex(low, middle, *high),
             (None, middle, _) => middle.0 - FURTHER,
             (_, middle, None) => middle.0 + FURTHER,

@@ -52,7 +52,10 @@ pub fn limit(
             .collect();
         let Some(mean) = mean(&built) else { continue };
         planes[index] = mean;
-        let places = of_facet.iter().map(|t| along(facet.beams, t.beam)).collect::<Vec<_>>();
+        let places = of_facet
+            .iter()
+            .map(|t| along(facet.beams, t.beam))
+            .collect::<Vec<_>>();
         flat.push(flatness(&mean, &built, &places));
         for t in of_facet {
             if let Some(poses) = work.boards_at(t.beam, facet, &mean, &t.deflection)
@@ -71,7 +74,13 @@ pub fn limit(
         let some: Vec<&Assigned> = assigned.iter().filter(|a| facets.contains(&a.facet)).collect();
         groups.push(group(&work, &facets, &some));
     }
-    groups.extend(prepared.mount.selection.iter().filter_map(|b| direct_group(&work, b)));
+    groups.extend(
+        prepared
+            .mount
+            .selection
+            .iter()
+            .filter_map(|b| direct_group(&work, b)),
+    );
     let (mounting, prior) = mounting_as_drawn(&work, &prepared.mount);
     let (mut joint, state) = begin(&work, groups, mounting, &prior, &planes);
     let of_all = |part: fn(&Flatness) -> f64| {
@@ -81,12 +90,11 @@ pub fn limit(
         figure: of_all(|f| f.figure),
         tau: of_all(|f| f.tau),
     };
-    let linear = least_squares::linearize(&joint.with_priors(), &state).map_err(|problem| {
-        CalibError::Foreign {
+    let linear =
+        least_squares::linearize(&joint.with_priors(), &state).map_err(|problem| CalibError::Foreign {
             name: "limit".to_owned(),
             what: problem.to_string(),
-        }
-    })?;
+        })?;
     Ok(joint
         .covariances(&state, &linear.information)
         .into_iter()
@@ -110,7 +118,9 @@ fn mean(planes: &[MirrorPlane]) -> Option<MirrorPlane> {
 /// How far normals are from their mean: along a polynomial, and from that.
 fn flatness(mean: &MirrorPlane, planes: &[MirrorPlane], places: &[f64]) -> Flatness {
     let (a, b) = frame::tangent_basis(&mean.normal);
-    let tilts = |axis: &Unit<Vector3<f64>>| DVector::from_iterator(planes.len(), planes.iter().map(|p| axis.dot(&p.normal)));
+    let tilts = |axis: &Unit<Vector3<f64>>| {
+        DVector::from_iterator(planes.len(), planes.iter().map(|p| axis.dot(&p.normal)))
+    };
     let count = planes.len().max(1) as f64;
     let mut figure = 0.0;
     let mut rest = 0.0;
@@ -135,4 +145,3 @@ fn flatness(mean: &MirrorPlane, planes: &[MirrorPlane], places: &[f64]) -> Flatn
         tau: 2.0 * (0.5 * rest).sqrt(),
     }
 }
-

@@ -20,9 +20,9 @@ use crate::pose::{self, Mount, Prior};
 use crate::solve::libm_cos;
 use crate::spread;
 use answer::Answer;
-use fit::Fit;
 use catoptric_model::calibration::{FacetEstimate, MountEstimate};
 use catoptric_model::{Assessment, BeamEstimate, MirrorPlane, Pose, RangeBias, Status, beam};
+use fit::Fit;
 use nalgebra::{DVector, Dyn, Matrix2, OMatrix, U6, Vector2};
 use problem::{BareFacet, Board, Element, Facet, Flatness, Group, Joint, Mounting, Sight};
 use std::collections::BTreeMap;
@@ -87,7 +87,12 @@ pub(crate) fn calibrate(
         let some: Vec<&Assigned> = assigned.iter().filter(|a| facets.contains(&a.facet)).collect();
         groups.push(group(work, &facets, &some));
     }
-    groups.extend(mount.selection.iter().filter_map(|board| direct_group(work, board)));
+    groups.extend(
+        mount
+            .selection
+            .iter()
+            .filter_map(|board| direct_group(work, board)),
+    );
     let (mounting, mean) = mounting_as_drawn(work, mount);
     solve(work, groups, mounting, &mean, planes, true)
 }
@@ -146,7 +151,13 @@ fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) -> Group {
         }
     };
     let mut group = Group {
-        facets: facets.iter().map(|f| Facet { facet: *f, bare: bare(*f) }).collect(),
+        facets: facets
+            .iter()
+            .map(|f| Facet {
+                facet: *f,
+                bare: bare(*f),
+            })
+            .collect(),
         ..Group::default()
     };
     for element in assigned {
@@ -223,7 +234,10 @@ fn mounting_as_found(work: &Workspace, mount: &Mount) -> (Mounting, DVector<f64>
 fn mounting_as_drawn(work: &Workspace, mount: &Mount) -> (Mounting, DVector<f64>) {
     let session = &work.dataset.session;
     let count = CommonErrors::of(session).len();
-    let drawn = Prior::of(&Pose::from(&session.nominal_rig_from_sensor), &session.mount_tolerance);
+    let drawn = Prior::of(
+        &Pose::from(&session.nominal_rig_from_sensor),
+        &session.mount_tolerance,
+    );
     let mut motion = OMatrix::<f64, U6, Dyn>::zeros(6 + count);
     for axis in 0..6 {
         motion[(axis, axis)] = drawn.sd[axis];
@@ -277,11 +291,19 @@ fn solve(
             departure_statistic: 0.0,
         })
     };
-    let mut fit = if departing { joint.fit(start)? } else { rigid(&joint, start)? };
+    let mut fit = if departing {
+        joint.fit(start)?
+    } else {
+        rigid(&joint, start)?
+    };
     let mut answers = joint.answers(&fit.solution);
     let mut left_out = false;
     for _ in 0..ROUNDS {
-        let strange: Vec<usize> = answers.iter().filter(|a| a.is_strange()).map(|a| a.beam).collect();
+        let strange: Vec<usize> = answers
+            .iter()
+            .filter(|a| a.is_strange())
+            .map(|a| a.beam)
+            .collect();
         if strange.is_empty() || strange.len() as f64 > LARGEST_SHARE * answers.len() as f64 {
             break;
         }
@@ -308,7 +330,11 @@ fn solve(
             .collect(),
         facets: joint.facets(solution, &names),
         mount: if departing { joint.mount(solution) } else { None },
-        bias: if departing { joint.corrected_bias(solution) } else { None },
+        bias: if departing {
+            joint.corrected_bias(solution)
+        } else {
+            None
+        },
         assessment: departing.then(|| joint.assess(session, &fit, &answers)),
     })
 }
@@ -348,10 +374,17 @@ impl Answer {
         if sd > WEAKEST_SD {
             let along = eigen.eigenvectors.column(weakest);
             let direction = Vector2::new(along[0] / cos, along[1]).normalize();
-            let direction = if direction[direction.iamax()] < 0.0 { -direction } else { direction };
+            let direction = if direction[direction.iamax()] < 0.0 {
+                -direction
+            } else {
+                direction
+            };
             return open(
                 direction,
-                format!("the boards of its facet leave a direction open, known to {:.1}° at best", sd.to_degrees()),
+                format!(
+                    "the boards of its facet leave a direction open, known to {:.1}° at best",
+                    sd.to_degrees()
+                ),
             );
         }
         let scale = Matrix2::from_diagonal(&Vector2::new(1.0 / cos, 1.0));

@@ -329,9 +329,7 @@ impl Joint<'_> {
         let w = shared.numbers(0)?;
         let b = self.board_errors(group, own)?;
         let fan = match element.facet {
-            Some(facet) => {
-                Fan::of(element, &Self::shape(own, facet)?, &self.flatness)?
-            }
+            Some(facet) => Fan::of(element, &Self::shape(own, facet)?, &self.flatness)?,
             None => Fan {
                 v: element.u,
                 distance: 0.0,
@@ -524,10 +522,8 @@ pub(super) fn whiten(h: &OMatrix<f64, Dyn, U2>, tau: f64, m: &mut DMatrix<f64>) 
         let root = (1.0 + x.max(0.0)).sqrt();
         -1.0 / (root * (1.0 + root))
     });
-    let inner = eigen.eigenvectors
-        * Matrix2::from_diagonal(&gain)
-        * eigen.eigenvectors.transpose()
-        * (tau * tau);
+    let inner =
+        eigen.eigenvectors * Matrix2::from_diagonal(&gain) * eigen.eigenvectors.transpose() * (tau * tau);
     let part = h * (inner * (h.transpose() * &*m));
     *m += part;
 }
@@ -558,7 +554,11 @@ impl GroupedProblem for Joint<'_> {
     fn jacobian(&self, group: usize, shared: &Point, own: &Point) -> Option<GroupJacobian> {
         let group = &self.groups[group];
         let boards = self.boards(group, shared, own)?;
-        let bare = group.facets.iter().filter(|f| !f.bare.distances.is_empty()).count();
+        let bare = group
+            .facets
+            .iter()
+            .filter(|f| !f.bare.distances.is_empty())
+            .count();
         let rows = group.elements.iter().map(|e| e.sights.len()).sum::<usize>() + bare;
         let mut jacobian = GroupJacobian {
             shared: DMatrix::zeros(rows, self.shared_dimension()),
