@@ -1,12 +1,42 @@
-//! The bound an element's error is measured by, at the true angles.
+//! The bounds an element's error is measured by, at the true angles: the limit of the whole experiment, and that of the
+//! element by itself.
 
 use catoptric_calib::covariance::budget;
 use catoptric_calib::observations::BoardInSensor;
+use catoptric_calib::{TrueDirection, limit};
 use catoptric_calib::{observations, pose};
 use catoptric_model::{Dataset, Pose, PoseKind, PoseRecord};
 use catoptric_sim::Truth;
+use catoptric_sim::truth::BeamClass;
 use nalgebra::{Matrix2, Point3};
 use std::collections::BTreeMap;
+
+/// The least covariance of (θ_a, φ), in rad², that any estimate from this dataset can have, for every beam that is
+/// deflected once and unsplit: facets, boards, mounting and biases are common to all of them.
+pub(super) fn of_experiment(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize, Matrix2<f64>> {
+    let believed = &dataset.session.believed;
+    if believed.range_noise_sd_mm == 0.0 {
+        // Nothing is believed to be in the way.
+        return BTreeMap::new();
+    }
+    let directions: Vec<TrueDirection> = truth
+        .beams
+        .iter()
+        .filter(|b| b.status == BeamClass::Deflected)
+        .filter_map(|b| {
+            Some(TrueDirection {
+                beam: b.beam,
+                facet: b.facets.first()?.clone(),
+                deflection: b.deflection()?,
+            })
+        })
+        .collect();
+    let limits = limit(dataset, &directions).unwrap_or_default();
+    limits
+        .into_iter()
+        .filter_map(|(beam, c)| Some((beam, c?)))
+        .collect()
+}
 
 /// The least covariance of (θ_a, φ), in rad², that an unbiased per-element estimate from these boards can have, for
 /// every beam that is deflected once.

@@ -30,13 +30,18 @@ pub struct ElementError {
     pub sigma: Option<[f64; 2]>,
     /// eᵀP⁻¹e; `None` without a covariance.
     pub mahalanobis_squared: Option<f64>,
-    /// Bound on the covariance of (`across`, `up`).
+    /// Bound on the covariance of (`across`, `up`) for any estimate from the dataset.
     pub bound: Option<Matrix2<f64>>,
+    /// The same for an estimate of this element by itself.
+    pub alone_bound: Option<Matrix2<f64>>,
 }
 
 /// The errors of every solved element that the truth deflects once.
 pub(super) fn compare(dataset: &Dataset, calibration: &Calibration, truth: &Truth) -> Vec<ElementError> {
-    let bounds = bound::at_truth(dataset, truth);
+    let (limits, alone) = (
+        bound::of_experiment(dataset, truth),
+        bound::at_truth(dataset, truth),
+    );
     let mut elements = Vec::new();
     for true_beam in &truth.beams {
         let (Some(actual), Some(estimate)) = (true_beam.deflection(), calibration.beam(true_beam.beam))
@@ -69,7 +74,8 @@ pub(super) fn compare(dataset: &Dataset, calibration: &Calibration, truth: &Trut
             up: error.y,
             sigma: covariance.map(|c| [cos * c[(0, 0)].sqrt(), c[(1, 1)].sqrt()]),
             mahalanobis_squared: covariance.map(|c| mahalanobis_squared(&error, &c)),
-            bound: bounds.get(&true_beam.beam).map(|b| to_tangent * b * to_tangent),
+            bound: limits.get(&true_beam.beam).map(|b| to_tangent * b * to_tangent),
+            alone_bound: alone.get(&true_beam.beam).map(|b| to_tangent * b * to_tangent),
         });
     }
     elements
