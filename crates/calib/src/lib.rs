@@ -22,6 +22,7 @@ pub mod common;
 pub mod covariance;
 mod element;
 pub mod error;
+pub mod gauge;
 mod gls;
 pub mod initial;
 pub mod jacobian;
