@@ -243,6 +243,7 @@ pub(crate) fn check_session(session: &Session) -> Result<(), CalibError> {
         ),
         ("believed.range_noise_sd_mm", believed.range_noise_sd_mm),
         ("believed.drift_sd_mm", believed.drift_sd_mm),
+        ("believed.element_sd_mm", believed.element_sd_mm),
         ("believed.marker_sd_mm", believed.marker_sd_mm),
         ("believed.distance_bias_sd_mm", believed.distance_bias_sd_mm),
         ("believed.angle_gain_sd_mm", believed.angle_gain_sd_mm),

@@ -108,6 +108,7 @@ pub fn budget(
         moved.set_row(row, &mount_row);
         sigma[(row, row)] = board.noise_sd.powi(2) / board.count.max(1) as f64
             + (beliefs.drift_sd_mm * 1e-3).powi(2)
+            + (beliefs.element_sd_mm * 1e-3).powi(2)
             + plane_variance(board.markers, &hit, board, beliefs.marker_sd_mm * 1e-3) / cos_incidence.powi(2)
             + common.unlisted_variance(board.color);
         let mut biases = common.row(r, cos_incidence, board.color);

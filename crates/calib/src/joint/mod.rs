@@ -169,7 +169,8 @@ fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) -> Group {
             });
             let summary = &work.summaries[*pose][element.beam];
             if let Some(place) = place {
-                let sd = spread::noise_sd(summary, noise) / (summary.count.max(1) as f64).sqrt();
+                let of_mean = spread::noise_sd(summary, noise) / (summary.count.max(1) as f64).sqrt();
+                let sd = libm::hypot(of_mean, session.believed.element_sd_mm * 1e-3);
                 sights.push(Sight {
                     board: place,
                     mean: summary.mean,

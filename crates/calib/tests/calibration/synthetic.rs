@@ -328,6 +328,7 @@ impl World {
             believed: Beliefs {
                 range_noise_sd_mm: self.noise_mm,
                 drift_sd_mm: self.drift_mm,
+                element_sd_mm: 0.0,
                 marker_sd_mm: self.marker_mm,
                 bias,
                 distance_bias_sd_mm: self.distance_bias_sd_mm,
