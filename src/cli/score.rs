@@ -97,7 +97,8 @@ fn words(score: &Score) -> String {
 /// The figures that take a truth.
 fn against_truth(score: &Score, line: &mut impl FnMut(&str, String)) {
     line("direction, per axis", degrees(score.per_axis_rms_deg));
-    line("  bound per element", degrees(score.crlb_per_axis_deg));
+    line("  bound", degrees(score.crlb_per_axis_deg));
+    line("  bound by itself", degrees(score.alone_crlb_per_axis_deg));
     line("  common to all", degrees(score.common_mode_deg));
     line("  in the room", degrees(score.per_axis_rms_room_deg));
     line(

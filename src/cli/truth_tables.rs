@@ -98,9 +98,9 @@ fn rows_of_returns(laboratory: &Laboratory, pose: usize, returns: &Returns, scan
 }
 
 /// First line of truth/readings.csv. `echo` is the one of truth/returns.csv that was reported, empty where none was
-/// detected; a reading is that echo's range plus the five errors, rounded, unless `lost` is 1.
+/// detected; a reading is that echo's range plus the six errors, rounded, unless `lost` is 1.
 pub(super) const READINGS_HEADER: &str =
-    "pose,scan,beam,echo,lost,drift_m,warm_up_m,noise_m,correlated_m,interference_m,reading_m\n";
+    "pose,scan,beam,echo,lost,drift_m,warm_up_m,noise_m,correlated_m,interference_m,reading_m,element_m\n";
 
 pub(super) fn reading_rows(
     laboratory: &Laboratory,
@@ -126,8 +126,8 @@ pub(super) fn reading_rows(
             let echo = detected.map_or(String::new(), |k| k.to_string());
             let lost = u8::from(detected.is_some() && chance.dropout < dropout);
             text.push_str(&format!(
-                "{pose},{scan},{beam},{echo},{lost},{},{},{noise},{},{},{reading}\n",
-                chance.drift, chance.warm_up, chance.correlated, chance.interference,
+                "{pose},{scan},{beam},{echo},{lost},{},{},{noise},{},{},{reading},{}\n",
+                chance.drift, chance.warm_up, chance.correlated, chance.interference, chance.element,
             ));
         }
         tell(&text)?;

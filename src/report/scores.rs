@@ -39,7 +39,10 @@ pub(super) fn scores(results: &[(Calibration, Score)]) -> String {
     row("– missed", &|s| count(s.beams.missed));
     row("False: solved but not deflected", &|s| count(s.beams.wrong));
     row("Per-axis error (°)", &|s| number(s.per_axis_rms_deg, 4));
-    row("– bound on it, per element (°)", &|s| {
+    row("– bound on it for each element by itself (°)", &|s| {
+        number(s.alone_crlb_per_axis_deg, 4)
+    });
+    row("– bound on it for any method (°)", &|s| {
         number(s.crlb_per_axis_deg, 4)
     });
     row("– efficiency, 1 is best", &|s| number(s.efficiency, 2));

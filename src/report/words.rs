@@ -167,13 +167,14 @@ fn honesty(score: &Score) -> String {
     let mut text = String::new();
     if score.efficiency.is_finite() {
         let bound = number(score.crlb_per_axis_deg, 3);
+        let alone = number(score.alone_crlb_per_axis_deg, 3);
         text += &if score.efficiency > 1.2 {
             format!(
-                "A method that treats every element by itself is expected to reach {bound}° per axis with these boards. This is better: the method ties elements together, or the errors that all elements share happened to be small."
+                "With these boards no method can be expected to do better than {bound}° per axis. This run is better by luck: the errors that all elements share happened to be small."
             )
         } else {
             format!(
-                "With these boards, no method that treats every element by itself can be expected to do better than {bound}° per axis; counted in squares, this one reaches {} % of that.",
+                "With these boards no method can be expected to do better than {bound}° per axis, and none that treats every element by itself better than {alone}°; counted in squares, this one reaches {} % of the first.",
                 number(score.efficiency * 100.0, 0)
             )
         };

@@ -36,6 +36,7 @@ pub(super) fn session(mirrors: &[Mirror]) -> Session {
         }),
         believed: Beliefs {
             range_noise_sd_mm: 2.0,
+            element_sd_mm: 0.0,
             drift_sd_mm: 0.9,
             marker_sd_mm: 0.2,
             bias: RangeBias::default(),

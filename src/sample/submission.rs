@@ -49,6 +49,7 @@ pub(crate) fn perfect(truth: &Truth) -> Calibration {
         }),
         bias: None,
         warnings: Vec::new(),
+        assessment: None,
     }
 }
 

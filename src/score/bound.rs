@@ -1,9 +1,10 @@
-//! What the boards can tell of an element at all: the bound its error is measured by, and directions left open, both
-//! at the true angles.
+//! What the boards can tell, at the true angles: the bounds an element's error is measured by (that of the whole
+//! experiment, and that of the element by itself), and which elements their own boards leave open.
 
 use catoptric_calib::covariance::{MountUncertainty, budget};
 use catoptric_calib::observability::weakness;
 use catoptric_calib::observations::BoardInSensor;
+use catoptric_calib::{TrueDirection, limit};
 use catoptric_calib::{observations, pose};
 use catoptric_model::{Dataset, Pose, PoseKind, PoseRecord};
 use catoptric_sim::Truth;
@@ -20,6 +21,33 @@ pub(super) struct Knowable {
     /// Elements, deflected and unsplit, that their own boards leave open: fewer than two boards are hit, or a direction
     /// is known to no better than [`WEAKEST_SD`](catoptric_calib::observability::WEAKEST_SD).
     pub(super) open: BTreeSet<usize>,
+}
+
+/// The least covariance of (θ_a, φ), in rad², that any estimate from this dataset can have, for every beam that is
+/// deflected once and unsplit: facets, boards, mounting and biases are common to all of them.
+pub(super) fn of_experiment(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize, Matrix2<f64>> {
+    let believed = &dataset.session.believed;
+    if believed.range_noise_sd_mm == 0.0 {
+        // Nothing is believed to be in the way.
+        return BTreeMap::new();
+    }
+    let directions: Vec<TrueDirection> = truth
+        .beams
+        .iter()
+        .filter(|b| b.status == BeamClass::Deflected)
+        .filter_map(|b| {
+            Some(TrueDirection {
+                beam: b.beam,
+                facet: b.facets.first()?.clone(),
+                deflection: b.deflection()?,
+            })
+        })
+        .collect();
+    let limits = limit(dataset, &directions).unwrap_or_default();
+    limits
+        .into_iter()
+        .filter_map(|(beam, c)| Some((beam, c?)))
+        .collect()
 }
 
 /// What the boards of a dataset tell of every beam that is deflected once.

@@ -1,8 +1,8 @@
 //! The errors of each element, and the elements among which something is counted.
 
-use super::bound::Knowable;
+use super::bound::{self, Knowable};
 use super::statistics::mahalanobis_squared;
-use catoptric_model::{BeamEstimate, Calibration, Deflection};
+use catoptric_model::{BeamEstimate, Calibration, Dataset, Deflection};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
 use nalgebra::{Matrix2, Vector2};
@@ -30,12 +30,20 @@ pub struct ElementError {
     pub sigma: Option<[f64; 2]>,
     /// eᵀP⁻¹e; `None` without a covariance.
     pub mahalanobis_squared: Option<f64>,
-    /// Bound on the covariance of (`across`, `up`).
+    /// Bound on the covariance of (`across`, `up`) for any estimate from the dataset.
     pub bound: Option<Matrix2<f64>>,
+    /// The same for an estimate of this element by itself.
+    pub alone_bound: Option<Matrix2<f64>>,
 }
 
 /// The errors of every solved element that the truth deflects once.
-pub(super) fn compare(calibration: &Calibration, truth: &Truth, knowable: &Knowable) -> Vec<ElementError> {
+pub(super) fn compare(
+    dataset: &Dataset,
+    calibration: &Calibration,
+    truth: &Truth,
+    knowable: &Knowable,
+) -> Vec<ElementError> {
+    let limits = bound::of_experiment(dataset, truth);
     let mut elements = Vec::new();
     for true_beam in &truth.beams {
         let (Some(actual), Some(estimate)) = (true_beam.deflection(), calibration.beam(true_beam.beam))
@@ -68,7 +76,8 @@ pub(super) fn compare(calibration: &Calibration, truth: &Truth, knowable: &Knowa
             up: error.y,
             sigma: covariance.map(|c| [cos * c[(0, 0)].sqrt(), c[(1, 1)].sqrt()]),
             mahalanobis_squared: covariance.map(|c| mahalanobis_squared(&error, &c)),
-            bound: knowable
+            bound: limits.get(&true_beam.beam).map(|b| to_tangent * b * to_tangent),
+            alone_bound: knowable
                 .bounds
                 .get(&true_beam.beam)
                 .map(|b| to_tangent * b * to_tangent),

@@ -144,9 +144,12 @@ pub struct Score {
     pub nees_mean: f64,
     /// Share of elements whose error is inside its own 95 % ellipse.
     pub coverage_95: f64,
-    /// Per-axis bound: what the best unbiased estimator of the same kind could reach with these data.
+    /// Per-axis bound: what the best of all estimates could reach with these data.
     #[doc(alias = "CRLB")]
     pub crlb_per_axis_deg: f64,
+    /// Per-axis bound on a method that treats every element by itself.
+    #[doc(alias = "CRLB")]
+    pub alone_crlb_per_axis_deg: f64,
     /// Bound over error, as mean squares; 1 is the best that can be expected, and one run scatters about it.
     pub efficiency: f64,
     /// Elements that are split in truth.

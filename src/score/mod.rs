@@ -2,7 +2,7 @@
 //!
 //! Accuracy is counted over the *scored* elements: solved, and deflected without being split in truth. With
 //! φ, θ the true angles of an element, δφ, δθ the errors of its estimate, e = (δθ, δφ), P the covariance stated for
-//! it and C the bound on that covariance at the true angles:
+//! it and C the bound on that covariance at the true angles, for any estimate from the dataset:
 //!
 //! ```text
 //! per-axis error    √(mean((cos φ·δθ)² + δφ²) / 2)
@@ -73,7 +73,7 @@ pub fn score(dataset: &Dataset, calibration: &Calibration, truth: Option<&Truth>
     let elements = truth
         .zip(knowable.as_ref())
         .map_or_else(Vec::new, |(truth, knowable)| {
-            compare(calibration, truth, knowable)
+            compare(dataset, calibration, truth, knowable)
         });
     let scored: Vec<&ElementError> = elements
         .iter()
@@ -129,6 +129,9 @@ pub fn score(dataset: &Dataset, calibration: &Calibration, truth: Option<&Truth>
                 .map(|&m| f64::from(u8::from(m <= CHI_SQUARED_95))),
         ),
         crlb_per_axis_deg: (0.5 * bound_trace).sqrt().to_degrees(),
+        alone_crlb_per_axis_deg: (0.5 * mean(scored.iter().filter_map(|e| e.alone_bound).map(|b| b.trace())))
+            .sqrt()
+            .to_degrees(),
         efficiency: bound_trace / mean(bounded.iter().map(squares)),
         split: apart(calibration, truth, &elements, BeamClass::Split),
         multi_bounce: apart(calibration, truth, &elements, BeamClass::MultiBounce),

@@ -69,6 +69,11 @@ pub(super) fn nulls(
         ("nees_mean", score.nees_mean, because(covariance)),
         ("coverage_95", score.coverage_95, because(covariance)),
         ("crlb_per_axis_deg", score.crlb_per_axis_deg, because(no_bound)),
+        (
+            "alone_crlb_per_axis_deg",
+            score.alone_crlb_per_axis_deg,
+            because(no_bound),
+        ),
         ("efficiency", score.efficiency, because(efficiency)),
         (
             "split.per_axis_rms_deg",

@@ -35,6 +35,7 @@ pub const ANGLE_SD_RAD: [f64; 2] = [1e-10, PI];
 ///     rig_from_sensor: None,
 ///     bias: None,
 ///     warnings: Vec::new(),
+///     assessment: None,
 /// };
 /// let problems = catoptric::validate(&calibration);
 /// assert_eq!(problems[0].key, "frame");

@@ -5,6 +5,7 @@
 
 use crate::common::{run, stdout};
 use catoptric::io::scene::{self, Layout};
+use catoptric::model::assessment::{Assessment, HeldOut, SharedParameter, VarianceComponent};
 use catoptric::model::calibration::{FacetEstimate, MountEstimate};
 use catoptric::model::{AngleTable, BeamEstimate, Calibration, RangeBias, Status};
 use catoptric::{calib, score, sim};
@@ -413,6 +414,34 @@ fn every_key() -> Calibration {
         rig_from_sensor: Some(mount),
         bias: Some(RangeBias::default()),
         warnings: vec!["the board moved".to_owned()],
+        assessment: Some(assessment()),
+    }
+}
+
+fn assessment() -> Assessment {
+    Assessment {
+        variance_components: vec![VarianceComponent {
+            name: "drift of a pose".to_owned(),
+            believed_mm: 0.9,
+            found_mm: Some(1.0),
+            found_sd_mm: Some(0.1),
+        }],
+        parameters: vec![SharedParameter {
+            name: "A_a (mm)".to_owned(),
+            change: 1.0,
+            believed_sd: 3.0,
+            sd: 1.0,
+        }],
+        correlations: vec![vec![1.0]],
+        open: vec!["port".to_owned()],
+        held_out: Some(HeldOut {
+            boards: 1,
+            means: 1,
+            rms_mm: 1.0,
+            expected_mm: 1.0,
+            mean_mm: 0.0,
+        }),
+        ..Assessment::default()
     }
 }
 

@@ -2,15 +2,16 @@
 
 use crate::element::Workspace;
 use crate::error::CalibError;
-use crate::observations::{BoardInSensor, azimuth};
 use crate::joint::{self, Assigned};
+use crate::observations::{BoardInSensor, azimuth};
 use crate::options::{Method, Options};
 use crate::pose::{self, Mount};
 use crate::screen::{Candidate, Screen};
 use crate::solve::BareDistance;
 use catoptric_model::session::{NominalFacet, Session};
 use catoptric_model::{
-    BeamEstimate, Calibration, Dataset, MirrorPlane, PoseRecord, Status, Summary, beam, calibration, mirror,
+    BeamEstimate, Calibration, Dataset, Deflection, MirrorPlane, PoseRecord, Status, Summary, beam,
+    calibration, mirror,
 };
 use nalgebra::{Unit, Vector3};
 
@@ -35,42 +36,22 @@ const LEAST_ELEMENTS: usize = 5;
 /// }
 /// ```
 pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result<Calibration, CalibError> {
-    dataset.check()?;
     let session = &dataset.session;
-    check_session(session)?;
-    let drawn: Vec<MirrorPlane> = session
-        .facets
-        .iter()
-        .map(plane_as_drawn)
-        .collect::<Result<_, _>>()?;
-    let summaries: Vec<Vec<Summary>> = dataset.poses.iter().map(PoseRecord::summarize).collect();
-    let mount = pose::estimate(dataset, &summaries);
-    let boards: Vec<Option<BoardInSensor>> = dataset
-        .poses
-        .iter()
-        .map(|p| BoardInSensor::of(p, session, &mount.rig_from_sensor))
-        .collect();
-    let screen = Screen::new(dataset, &summaries, &mount, &boards);
+    let prepared = prepare(dataset)?;
+    let (mount, drawn) = (&prepared.mount, &prepared.drawn);
+    let screen = Screen::new(dataset, &prepared.summaries, mount, &prepared.boards);
     let candidates: Vec<Candidate> = (0..session.scanner.beams).map(|b| screen.classify(b)).collect();
-    let work = Workspace {
-        dataset,
-        summaries: &summaries,
-        boards: &boards,
-        rig_from_sensor: mount.rig_from_sensor,
-        mount: &mount.uncertainty,
-        method,
-        options,
-    };
+    let work = prepared.workspace(dataset, method, options);
     // The drawing decides which boards an element can hit only until its neighbors tell how the facet was built.
     let by_batch = Workspace {
         method: Method::Beam,
         ..work
     };
-    let first = estimates(&by_batch, &candidates, &drawn);
+    let first = estimates(&by_batch, &candidates, drawn);
     let built: Vec<MirrorPlane> = session
         .facets
         .iter()
-        .zip(&drawn)
+        .zip(drawn)
         .map(|(facet, drawn)| plane_as_built(session, facet, &first).unwrap_or(*drawn))
         .collect();
     let mut calibration = Calibration {
@@ -82,9 +63,10 @@ pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result
         rig_from_sensor: Some(mount.to_file()),
         bias: None,
         warnings: Vec::new(),
+        assessment: None,
     };
     match method {
-        Method::Prior => calibration.beams = as_drawn(session, &candidates, &drawn),
+        Method::Prior => calibration.beams = as_drawn(session, &candidates, drawn),
         Method::Joint | Method::Facet => {
             // An element by itself decides whether its readings are of use, and which boards it hits.
             let alone = Workspace {
@@ -93,13 +75,65 @@ pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result
             };
             calibration.beams = estimates(&alone, &candidates, &built);
             let assigned = assigned(&alone, &candidates, &built, &calibration.beams);
-            together(&work, &mount, &built, assigned, &mut calibration);
+            together(&work, mount, &built, assigned, &mut calibration);
         }
         Method::Beam | Method::Recursive | Method::BeamGls | Method::ClosedForm => {
             calibration.beams = estimates(&work, &candidates, &built);
         }
     }
     Ok(calibration)
+}
+
+/// What everything else rests on: mounting and boards in the sensor frame.
+pub(crate) struct Prepared {
+    pub(crate) drawn: Vec<MirrorPlane>,
+    summaries: Vec<Vec<Summary>>,
+    pub(crate) mount: Mount,
+    boards: Vec<Option<BoardInSensor>>,
+}
+
+/// Checks a dataset and places the sensor in the rig (steps 5 and 6).
+pub(crate) fn prepare(dataset: &Dataset) -> Result<Prepared, CalibError> {
+    dataset.check()?;
+    let session = &dataset.session;
+    check_session(session)?;
+    let drawn = session
+        .facets
+        .iter()
+        .map(plane_as_drawn)
+        .collect::<Result<_, _>>()?;
+    let summaries: Vec<Vec<Summary>> = dataset.poses.iter().map(PoseRecord::summarize).collect();
+    let mount = pose::estimate(dataset, &summaries);
+    let boards = dataset
+        .poses
+        .iter()
+        .map(|p| BoardInSensor::of(p, session, &mount.rig_from_sensor))
+        .collect();
+    Ok(Prepared {
+        drawn,
+        summaries,
+        mount,
+        boards,
+    })
+}
+
+impl Prepared {
+    pub(crate) fn workspace<'a>(
+        &'a self,
+        dataset: &'a Dataset,
+        method: Method,
+        options: &'a Options,
+    ) -> Workspace<'a> {
+        Workspace {
+            dataset,
+            summaries: &self.summaries,
+            boards: &self.boards,
+            rig_from_sensor: self.mount.rig_from_sensor,
+            mount: &self.mount.uncertainty,
+            method,
+            options,
+        }
+    }
 }
 
 /// Elements with boards to be solved together: those solved by themselves, and those that only lacked boards.
@@ -115,7 +149,9 @@ fn assigned(
             return None;
         };
         let facet = match estimate.status {
-            Status::Solved => facets.iter().position(|f| Some(&f.name) == estimate.facet.as_ref()),
+            Status::Solved => facets
+                .iter()
+                .position(|f| Some(&f.name) == estimate.facet.as_ref()),
             Status::TooFewPoses | Status::Unobservable => near.first().copied(),
             Status::Direct | Status::NotConverged | Status::Rejected => None,
         }?;
@@ -145,6 +181,7 @@ fn together(
             calibration.facets = outcome.facets;
             calibration.rig_from_sensor = outcome.mount.or(calibration.rig_from_sensor);
             calibration.bias = outcome.bias;
+            calibration.assessment = outcome.assessment;
         }
         Err(problem) => calibration.warnings.push(format!(
             "the elements could not be solved together ({problem}); each was solved by itself"
@@ -171,11 +208,20 @@ fn as_drawn(session: &Session, candidates: &[Candidate], drawn: &[MirrorPlane]) 
                 facet: Some(session.facets[*facet].name.clone()),
                 azimuth_rad: Some(deflection.azimuth),
                 elevation_rad: Some(deflection.elevation),
-                distance_m: Some(session.bare_structure.distance(beam).map_or(deflection.distance, |bare| {
-                    let thickness = session.bare_structure.mirror_thickness_mm * 1e-3;
-                    let exit = deflection.exit_direction(azimuth(session, beam));
-                    BareDistance { distance: bare, thickness }.to_mirror(azimuth(session, beam), &exit)
-                })),
+                distance_m: Some(
+                    session
+                        .bare_structure
+                        .distance(beam)
+                        .map_or(deflection.distance, |bare| {
+                            let thickness = session.bare_structure.mirror_thickness_mm * 1e-3;
+                            let exit = deflection.exit_direction(azimuth(session, beam));
+                            BareDistance {
+                                distance: bare,
+                                thickness,
+                            }
+                            .to_mirror(azimuth(session, beam), &exit)
+                        }),
+                ),
                 ..BeamEstimate::without_angles(beam, Status::Solved, None)
             }
         }
@@ -197,6 +243,7 @@ pub(crate) fn check_session(session: &Session) -> Result<(), CalibError> {
         ),
         ("believed.range_noise_sd_mm", believed.range_noise_sd_mm),
         ("believed.drift_sd_mm", believed.drift_sd_mm),
+        ("believed.element_sd_mm", believed.element_sd_mm),
         ("believed.marker_sd_mm", believed.marker_sd_mm),
         ("believed.distance_bias_sd_mm", believed.distance_bias_sd_mm),
         ("believed.angle_gain_sd_mm", believed.angle_gain_sd_mm),
@@ -241,11 +288,7 @@ fn plane_as_built(session: &Session, facet: &NominalFacet, solved: &[BeamEstimat
         let Some(deflection) = estimate.deflection() else {
             continue;
         };
-        let azimuth = azimuth(session, estimate.beam);
-        let exit = deflection.exit_direction(azimuth);
-        if let Some(normal) = mirror::normal_between(&beam::direction(azimuth), &exit) {
-            planes.push(MirrorPlane::through(deflection.deflection_point(azimuth), normal));
-        }
+        planes.extend(plane_between(azimuth(session, estimate.beam), &deflection));
     }
     let median = |value: &dyn Fn(&MirrorPlane) -> f64| {
         let mut values: Vec<f64> = planes.iter().map(value).collect();
@@ -262,6 +305,13 @@ fn plane_as_built(session: &Session, facet: &NominalFacet, solved: &[BeamEstimat
         offset: median(&|p| p.offset)?,
     };
     (planes.len() >= LEAST_ELEMENTS).then_some(plane)
+}
+
+/// The plane of a mirror that deflects a beam so.
+pub(crate) fn plane_between(azimuth: f64, deflection: &Deflection) -> Option<MirrorPlane> {
+    let exit = deflection.exit_direction(azimuth);
+    let normal = mirror::normal_between(&beam::direction(azimuth), &exit)?;
+    Some(MirrorPlane::through(deflection.deflection_point(azimuth), normal))
 }
 
 /// The estimate of every element, with facets at the given planes.

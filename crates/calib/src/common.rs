@@ -49,6 +49,17 @@ impl<'a> CommonErrors<'a> {
         row
     }
 
+    /// What each number is called, and its standard deviation in the unit of that name.
+    pub(crate) fn named(&self) -> Vec<(String, f64)> {
+        let beliefs = &self.session.believed;
+        let nodes = beliefs.bias.distance.range_m.iter();
+        let nodes = nodes.map(|range| (format!("E_r at {range} m (mm)"), beliefs.distance_bias_sd_mm));
+        let gain = ("A_a (mm)".to_owned(), beliefs.angle_gain_sd_mm);
+        let colors = self.colors.iter();
+        let colors = colors.map(|color| (format!("E_c of {color} (mm)"), beliefs.color_bias_sd_mm));
+        nodes.chain([gain]).chain(colors).collect()
+    }
+
     /// The believed biases changed by so many standard deviations of each number.
     pub fn applied(&self, deviations: &[f64]) -> RangeBias {
         let beliefs = &self.session.believed;

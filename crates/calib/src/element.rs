@@ -98,10 +98,26 @@ impl Workspace<'_> {
         mirror: &MirrorPlane,
     ) -> Option<Vec<usize>> {
         let session = &self.dataset.session;
-        let nominal = mirror.deflect(beam::direction(azimuth(session, estimate.beam)))?;
-        let at = estimate.deflection().unwrap_or(nominal);
-        let attempt = Attempt::new(self, session, estimate.beam, facet, &nominal);
-        Some(attempt.choose(&at, 0.0))
+        let by_plane = mirror.deflect(beam::direction(azimuth(session, estimate.beam)))?;
+        self.boards_at(
+            estimate.beam,
+            facet,
+            mirror,
+            &estimate.deflection().unwrap_or(by_plane),
+        )
+    }
+
+    /// The stretches whose boards an element of a facet hits with a known deflection.
+    pub(crate) fn boards_at(
+        &self,
+        beam: usize,
+        facet: &NominalFacet,
+        mirror: &MirrorPlane,
+        at: &Deflection,
+    ) -> Option<Vec<usize>> {
+        let session = &self.dataset.session;
+        let by_plane = mirror.deflect(beam::direction(azimuth(session, beam)))?;
+        Some(Attempt::new(self, session, beam, facet, &by_plane).choose(at, 0.0))
     }
 }
 

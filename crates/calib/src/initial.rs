@@ -9,6 +9,10 @@ use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3xX, SymmetricEigen, Unit, Vec
 /// Smallest ratio of singular values at which the linear system counts as of rank three.
 const LEAST_CONDITION: f64 = 1e-2;
 
+/// Times that a bias is looked up at the range corrected by it: biases change by under a hundredth of the range, so each
+/// brings two digits.
+const CORRECTIONS: usize = 7;
+
 /// A direction found in closed form.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClosedForm {
@@ -32,8 +36,11 @@ pub fn closed_form(
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for o in observations {
         let plane = &o.board.plane;
-        let z = bias.correct(o.mean, o.mean.0, plane.cos_incidence(&v), o.board.color);
-        let s = z.0 - nominal.distance;
+        let cos_incidence = plane.cos_incidence(&v);
+        let range = (0..CORRECTIONS).fold(o.mean.0, |range, _| {
+            bias.correct(o.mean, range, cos_incidence, o.board.color).0
+        });
+        let s = range - nominal.distance;
         // Multiplied by s, so that every row weighs its range error alike: s·q·v = 1.
         let row = plane.normal.into_inner() * (s / plane.normal.dot(&(plane.point - from)));
         normal += row * row.transpose();
@@ -72,10 +79,7 @@ pub(crate) fn covariance(
     }
     let (across, up) = frame::tangent_basis(&v);
     let cos_elevation = libm_cos(at.elevation);
-    let onto = Matrix2x3::from_rows(&[
-        across.transpose() / cos_elevation,
-        up.transpose(),
-    ]);
+    let onto = Matrix2x3::from_rows(&[across.transpose() / cos_elevation, up.transpose()]);
     let gain = onto * normal.try_inverse()? * gain;
     Some(&gain * &budget.covariance * gain.transpose())
 }

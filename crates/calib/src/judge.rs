@@ -79,7 +79,9 @@ impl Attempt<'_> {
         }
         let covariance = match self.work.method {
             Method::BeamGls => budget.bound().or_else(|| budget.sandwich()),
-            Method::ClosedForm => initial::covariance(&solution.deflection, self.azimuth, &observations, &budget),
+            Method::ClosedForm => {
+                initial::covariance(&solution.deflection, self.azimuth, &observations, &budget)
+            }
             _ => budget.sandwich(),
         }
         .ok_or_else(lost)?;

@@ -227,8 +227,9 @@ impl<'a> Selector<'a> {
             .bias
             .correct(RawRange(summary.mean), hit.distance, cos_incidence, &board.color);
         let tan = (1.0 / (cos_incidence * cos_incidence) - 1.0).max(0.0).sqrt();
-        let variance =
-            (spread::noise_sd(summary, noise).powi(2) / summary.count as f64).max(LEAST_NOISE * LEAST_NOISE);
+        let variance = (spread::noise_sd(summary, noise).powi(2) / summary.count as f64
+            + (1e-3 * believed.element_sd_mm).powi(2))
+        .max(LEAST_NOISE * LEAST_NOISE);
         let marker = 1e-3 * believed.marker_sd_mm / cos_incidence;
         let common = self.common.row(hit.distance, cos_incidence, &board.color);
         let sd = (variance + (1e-3 * believed.drift_sd_mm).powi(2) + marker * marker + common.norm_squared())

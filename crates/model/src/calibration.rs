@@ -1,5 +1,6 @@
 //! The result: `calibration.json`, which is also what anybody's own calibrator submits.
 
+use crate::assessment::Assessment;
 use crate::beam::Deflection;
 use crate::bias::RangeBias;
 use crate::frame::PoseData;
@@ -148,6 +149,9 @@ pub struct Calibration {
     /// What the method noticed about the dataset that its user should know, in words.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
+    /// How far it is to be believed, for methods that can tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub assessment: Option<Assessment>,
 }
 
 impl BeamEstimate {

@@ -27,6 +27,7 @@
 //! assert!((r - 2.07).abs() < 1e-12);
 //! ```
 
+pub mod assessment;
 pub mod beam;
 pub mod bias;
 pub mod board;
@@ -42,6 +43,7 @@ pub mod paper;
 pub mod range;
 pub mod session;
 
+pub use assessment::Assessment;
 pub use beam::Deflection;
 pub use bias::{AngleBias, AngleTable, BiasTerms, ColorBias, DistanceBias, RangeBias};
 pub use board::{BoardPlane, Rectangle};

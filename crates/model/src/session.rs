@@ -94,6 +94,9 @@ pub struct Beliefs {
     pub range_noise_sd_mm: f64,
     /// Drift constant of one pose, in millimetres.
     pub drift_sd_mm: f64,
+    /// Constant of one beam in one pose, in millimetres: what more readings do not average out.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub element_sd_mm: f64,
     /// Constant error of one marker coordinate, in millimetres.
     pub marker_sd_mm: f64,
     /// The biases of step 1, as they were characterized.
@@ -104,6 +107,11 @@ pub struct Beliefs {
     pub angle_gain_sd_mm: f64,
     /// Uncertainty of E_c, in millimetres.
     pub color_bias_sd_mm: f64,
+}
+
+/// What is not believed in keeps out of files.
+fn is_zero(sd: &f64) -> bool {
+    *sd == 0.0
 }
 
 impl Beliefs {

@@ -2,6 +2,7 @@
 
 use crate::noise::{Draws, Purpose};
 use crate::scene::{Mocap, MocapProfile};
+use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::{Pose, Track, TrackedFrame};
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
@@ -14,24 +15,29 @@ pub struct MarkerErrors {
     pub jitter: Vector3<f64>,
 }
 
-impl MocapProfile {
-    /// The profile's errors.
-    pub fn errors(self) -> MarkerErrors {
+impl Mocap {
+    /// Errors of a marker.
+    pub fn errors(&self) -> MarkerErrors {
         let mm = |x: f64, y: f64, z: f64| Vector3::new(x, y, z) * 1e-3;
-        match self {
+        let exact = MarkerErrors {
+            constant: Vector3::zeros(),
+            jitter: Vector3::zeros(),
+        };
+        match self.profile {
             // Merriaux et al., Sensors 17(7) 1591 (2017): 0.15 mm mean error, variability below 0.025 mm.
-            Self::Modern => MarkerErrors {
+            MocapProfile::Modern => MarkerErrors {
                 constant: mm(0.15, 0.15, 0.15),
                 jitter: mm(0.025, 0.025, 0.025),
             },
-            Self::Cooper => MarkerErrors {
+            MocapProfile::Cooper => MarkerErrors {
                 constant: mm(3.4, 1.6, 6.0),
                 jitter: mm(0.025, 0.025, 0.025),
             },
-            Self::Ideal => MarkerErrors {
-                constant: Vector3::zeros(),
-                jitter: Vector3::zeros(),
-            },
+            MocapProfile::Ideal => exact,
+            MocapProfile::Custom => self.marker.map_or(exact, |own| MarkerErrors {
+                constant: Vector3::repeat(own.constant_sd_mm * 1e-3),
+                jitter: Vector3::repeat(own.jitter_sd_mm * 1e-3),
+            }),
         }
     }
 }
@@ -96,7 +102,14 @@ pub fn track(
     first_frame: u64,
     frames: u64,
 ) -> Track {
-    let errors = mocap.profile.errors();
+    let errors = if mocap.rig_exact && body.subject == RIG_SUBJECT {
+        MarkerErrors {
+            constant: Vector3::zeros(),
+            jitter: Vector3::zeros(),
+        }
+    } else {
+        mocap.errors()
+    };
     let column = |marker: usize| (body.index * MAX_MARKERS + marker) as u64;
     let mut constant = Draws::new(seed, Purpose::MarkerConstant, body.placement as u64);
     let offsets: Vec<Vector3<f64>> = (0..body.template.len())

@@ -42,6 +42,12 @@ pub enum Purpose {
     Interference = 12,
     /// How a person misreads the edges of a spot; row = pose.
     SpotReading = 13,
+    /// Constant error of a beam in a pose; row = pose, column = beam.
+    Element = 14,
+    /// Board poses that are set up at random; row = group, column = pose and attempt.
+    Design = 15,
+    /// A distance to the bare structure that was measured without the scanner; row = facet.
+    BareDistance = 16,
 }
 
 /// The draws of one row.

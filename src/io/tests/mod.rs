@@ -60,6 +60,7 @@ fn session(beams: usize) -> Session {
         believed: Beliefs {
             range_noise_sd_mm: 10.0,
             drift_sd_mm: 1.0,
+            element_sd_mm: 0.0,
             marker_sd_mm: 0.2,
             bias: RangeBias::default(),
             distance_bias_sd_mm: 1.0,

@@ -96,6 +96,7 @@ fn undeflected(rig_from_sensor: Pose) -> Calibration {
         }),
         bias: None,
         warnings: Vec::new(),
+        assessment: None,
     }
 }
 

@@ -52,6 +52,7 @@ proptest! {
             rig_from_sensor: None,
             bias: None,
             warnings: Vec::new(),
+            assessment: None,
         };
         let text = serde_json::to_string(&calibration).expect("all is finite");
         let back: Calibration = serde_json::from_str(&text).expect("our own");

@@ -108,6 +108,7 @@ pub fn budget(
         moved.set_row(row, &mount_row);
         sigma[(row, row)] = board.noise_sd.powi(2) / board.count.max(1) as f64
             + (beliefs.drift_sd_mm * 1e-3).powi(2)
+            + (beliefs.element_sd_mm * 1e-3).powi(2)
             + plane_variance(board.markers, &hit, board, beliefs.marker_sd_mm * 1e-3) / cos_incidence.powi(2)
             + common.unlisted_variance(board.color);
         let mut biases = common.row(r, cos_incidence, board.color);
@@ -164,7 +165,10 @@ impl Budget {
         let factor = (&self.covariance + floor).cholesky()?;
         let weighted = factor.solve(&self.jacobian).transpose();
         let right = &weighted * residuals;
-        Some((to_2(&(weighted * &self.jacobian)), Vector2::new(right[0], right[1])))
+        Some((
+            to_2(&(weighted * &self.jacobian)),
+            Vector2::new(right[0], right[1]),
+        ))
     }
 
     /// The paper's covariance of (θ_a, φ), σ²(HᵀH)⁻¹ over all readings with noise alone, in rad².

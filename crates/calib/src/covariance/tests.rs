@@ -34,6 +34,7 @@ fn session() -> Session {
         believed: Beliefs {
             range_noise_sd_mm: 4.0,
             drift_sd_mm: 0.0,
+            element_sd_mm: 0.0,
             marker_sd_mm: 0.0,
             bias: RangeBias::default(),
             distance_bias_sd_mm: 0.0,

@@ -3,12 +3,15 @@
 //! Given the other parameters x, an element's departure is normal about L(y − A·x) with L = τ²(I + τ²HᵀH)⁻¹Hᵀ. With C the
 //! covariance of x, that of the direction is (G − LA)·C·(G − LA)ᵀ + τ²(I + τ²HᵀH)⁻¹.
 
-use super::problem::{FACET_PARAMETERS, Fan, Joint, Linear};
-use crate::least_squares::{Information, Solution};
+use super::problem::{Element, FACET_PARAMETERS, Fan, Group, Joint, Linear};
+use crate::least_squares::{Information, Solution, State};
 use crate::pose;
 use catoptric_model::calibration::{FacetEstimate, MountEstimate};
 use catoptric_model::{Deflection, PoseData, RangeBias, frame};
 use nalgebra::{DMatrix, DVector, Dyn, Matrix2, Matrix6, OMatrix, U6, Vector6};
+
+/// Part of a residual's variance that must be left for it to say anything.
+const LEAST_LEFT: f64 = 1e-6;
 
 /// An element's direction as the joint solution has it.
 pub(super) struct Answer {
@@ -17,96 +20,161 @@ pub(super) struct Answer {
     pub(super) deflection: Deflection,
     /// Covariance along (azimuth, elevation) of the tangent plane (cos φ·δθ, δφ), in rad²; `None` where it is open.
     pub(super) covariance: Option<Matrix2<f64>>,
-    /// Standardized residuals after the departure, their number of readings and their rms in metres.
+    /// Residuals over the standard deviations of what no other reading shares, after the departure.
     pub(super) residuals: Vec<f64>,
+    /// The same over their own standard deviations, which are smaller by what the estimate has taken up.
+    pub(super) studentized: Vec<f64>,
+    /// How many of the residuals the estimate has taken up: Σ of the posterior variances of what it fits to them.
+    pub(super) taken: f64,
     pub(super) readings: usize,
+    /// Root mean square residual, in metres.
     pub(super) rms: f64,
     /// χ² of the element's rows, its departure included.
     pub(super) chi_squared: f64,
-    /// Boards, by their stretch.
+    /// Boards, by their index and by the number of their pose.
     pub(super) poses: Vec<usize>,
+    pub(super) numbers: Vec<usize>,
+}
+
+/// Covariances of one element: direction along the tangent basis, and what is fitted to its sights.
+struct Spread {
+    direction: Matrix2<f64>,
+    fitted: Vec<f64>,
 }
 
 impl Joint<'_> {
     /// Where the own parameters of a group begin among all.
-    fn offset(&self, group: usize) -> usize {
+    pub(super) fn offset(&self, group: usize) -> usize {
         self.shared_dimension()
             + self.groups[..group]
                 .iter()
-                .map(super::problem::Group::own_dimension)
+                .map(Group::own_dimension)
                 .sum::<usize>()
+    }
+
+    /// Every deflected element at a state, linearized, with its group and its facet.
+    fn linearized<'g>(
+        &'g self,
+        state: &'g State,
+    ) -> impl Iterator<Item = (usize, usize, &'g Element, Fan, Linear)> + 'g {
+        self.groups.iter().enumerate().flat_map(move |(number, group)| {
+            let own = state.own(number);
+            let boards = self.boards(group, &state.shared, own);
+            group.elements.iter().filter_map(move |element| {
+                let facet = element.facet?;
+                let linear = self.element(group, element, &state.shared, own, boards.as_ref()?, true)?;
+                let fan = Fan::of(element, &Self::shape(own, facet)?, &self.flatness)?;
+                Some((number, facet, element, fan, linear))
+            })
+        })
     }
 
     /// Every deflected element of the solution.
     pub(super) fn answers(&self, solution: &Solution) -> Vec<Answer> {
-        let mut all = Vec::new();
-        for (number, group) in self.groups.iter().enumerate() {
-            let own = solution.state.own(number);
-            let shared = &solution.state.shared;
-            let Some(boards) = self.boards(group, shared, own) else {
-                continue;
-            };
-            for element in &group.elements {
-                let Some(facet) = element.facet else { continue };
-                let linear = self.element(group, element, shared, own, &boards, true);
-                let fan = Self::shape(own, facet).and_then(|s| Fan::of(element, &s, &self.flatness));
-                let (Some(linear), Some(fan)) = (linear, fan) else {
-                    continue;
-                };
+        self.linearized(&solution.state)
+            .map(|(number, facet, element, fan, linear)| {
+                let group = &self.groups[number];
                 let tau = self.flatness.tau;
                 let rest = &linear.y - &linear.h * linear.delta;
                 let in_metres = rest.iter().zip(&element.sights).map(|(r, s)| (r * s.sd).powi(2));
                 let count = element.sights.len().max(1) as f64;
-                all.push(Answer {
+                let departure = if tau > 0.0 {
+                    linear.delta.norm_squared() / (tau * tau)
+                } else {
+                    0.0
+                };
+                let spread = self.spread(&solution.information, number, facet, &fan, &linear);
+                let fitted = spread.as_ref().map_or(&[][..], |s| &s.fitted);
+                let studentized = rest.iter().zip(fitted).map(|(r, v)| {
+                    let left: f64 = 1.0 - v;
+                    if left > LEAST_LEFT { r / left.sqrt() } else { 0.0 }
+                });
+                let poses: Vec<usize> = element
+                    .sights
+                    .iter()
+                    .map(|s| group.boards[s.board].pose)
+                    .collect();
+                Answer {
                     beam: element.beam,
                     facet: group.facets[facet].facet,
                     deflection: Deflection::from_exit(element.azimuth, &linear.v, linear.distance),
-                    covariance: self.covariance(&solution.information, number, facet, &fan, &linear),
                     rms: (in_metres.sum::<f64>() / count).sqrt(),
-                    chi_squared: rest.norm_squared()
-                        + if tau > 0.0 {
-                            linear.delta.norm_squared() / (tau * tau)
-                        } else {
-                            0.0
-                        },
+                    chi_squared: rest.norm_squared() + departure,
+                    studentized: studentized.collect(),
+                    taken: fitted.iter().sum(),
                     residuals: rest.iter().copied().collect(),
                     readings: element.sights.iter().map(|s| s.count).sum(),
-                    poses: element.sights.iter().map(|s| group.boards[s.board].pose).collect(),
-                });
-            }
-        }
-        all
+                    numbers: element
+                        .sights
+                        .iter()
+                        .map(|s| group.boards[s.board].number)
+                        .collect(),
+                    covariance: spread.map(|s| s.direction),
+                    poses,
+                }
+            })
+            .collect()
     }
 
-    fn covariance(
+    /// Beam, elevation and covariance along the tangent basis of every deflected element at a state.
+    pub(super) fn covariances(
+        &self,
+        state: &State,
+        information: &Information,
+    ) -> Vec<(usize, f64, Option<Matrix2<f64>>)> {
+        self.linearized(state)
+            .map(|(number, facet, element, fan, linear)| {
+                let at = Deflection::from_exit(element.azimuth, &linear.v, linear.distance);
+                let spread = self.spread(information, number, facet, &fan, &linear);
+                (element.beam, at.elevation, spread.map(|s| s.direction))
+            })
+            .collect()
+    }
+
+    /// `None` where the direction is open.
+    fn spread(
         &self,
         information: &Information,
         group: usize,
         facet: usize,
         fan: &Fan,
         linear: &Linear,
-    ) -> Option<Matrix2<f64>> {
+    ) -> Option<Spread> {
         let (across, up) = frame::tangent_basis(&linear.v);
         let tangent = [across, up];
         let tau2 = self.flatness.tau.powi(2);
         let inner = (Matrix2::identity() + linear.h.transpose() * &linear.h * tau2).try_inverse()? * tau2;
+        let gain = inner * linear.h.transpose();
         // From the departure's two axes to the tangent basis.
         let turn = Matrix2::from_fn(|i, j| tangent[i].dot(&linear.axes[j]));
-        let gain = turn * inner * linear.h.transpose();
-        let mut combination = DMatrix::zeros(2, information.dimension());
+        let rows = linear.y.len();
         let width = self.shared_dimension();
-        combination.columns_mut(0, width).copy_from(&-(&gain * &linear.shared));
         let first = self.offset(group);
         let own = linear.own.ncols();
-        combination.columns_mut(first, own).copy_from(&-(&gain * &linear.own));
+        let mut combination = DMatrix::zeros(2 + rows, information.dimension());
+        for (from, part) in [(0, &linear.shared), (first, &linear.own)] {
+            let columns = part.ncols();
+            let taken = &gain * part;
+            combination
+                .view_mut((0, from), (2, columns))
+                .copy_from(&-(turn * &taken));
+            combination
+                .view_mut((2, from), (rows, columns))
+                .copy_from(&(part - &linear.h * taken));
+        }
+        debug_assert!(first + own <= information.dimension() && width <= first);
         for (row, axis) in tangent.iter().enumerate() {
             for (column, turned) in fan.directions() {
                 combination[(row, first + facet * FACET_PARAMETERS + column)] += axis.dot(&turned);
             }
         }
-        let of_plane = information.covariance_of(&combination)?;
-        let total = of_plane.fixed_view::<2, 2>(0, 0) + turn * inner * turn.transpose();
-        Some((total + total.transpose()) * 0.5)
+        let c = information.covariance_of(&combination)?;
+        let direction = c.fixed_view::<2, 2>(0, 0) + turn * inner * turn.transpose();
+        let departing = &linear.h * inner * linear.h.transpose();
+        Some(Spread {
+            direction: (direction + direction.transpose()) * 0.5,
+            fitted: (0..rows).map(|i| c[(2 + i, 2 + i)] + departing[(i, i)]).collect(),
+        })
     }
 
     /// The facets' planes; one that the boards leave open has no covariance and is left out.
@@ -164,7 +232,11 @@ impl Joint<'_> {
 }
 
 /// Motion matrix of a mounting that is known as its uncertainty says: independent errors first, then the common ones.
-pub(super) fn motion_of(independent: &Matrix6<f64>, common: &OMatrix<f64, U6, Dyn>, count: usize) -> OMatrix<f64, U6, Dyn> {
+pub(super) fn motion_of(
+    independent: &Matrix6<f64>,
+    common: &OMatrix<f64, U6, Dyn>,
+    count: usize,
+) -> OMatrix<f64, U6, Dyn> {
     let eigen = independent.symmetric_eigen();
     let root = eigen.eigenvectors * Matrix6::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0).sqrt()));
     let mut motion = OMatrix::<f64, U6, Dyn>::zeros(6 + count);

@@ -5,12 +5,14 @@
 //! the choice of boards and the verdict on an element's readings that calibrating it by itself has come to.
 
 mod answer;
+mod assess;
 mod fit;
+mod limit;
 mod problem;
 
 use crate::common::CommonErrors;
 use crate::element::Workspace;
-use crate::least_squares::ProblemError;
+use crate::least_squares::{self, ProblemError, State};
 use crate::observability::WEAKEST_SD;
 use crate::observations::azimuth;
 use crate::options::Method;
@@ -19,10 +21,16 @@ use crate::solve::libm_cos;
 use crate::spread;
 use answer::Answer;
 use catoptric_model::calibration::{FacetEstimate, MountEstimate};
-use catoptric_model::{BeamEstimate, MirrorPlane, Pose, RangeBias, Status, beam};
+use catoptric_model::{Assessment, BeamEstimate, MirrorPlane, Pose, RangeBias, Status, beam};
+use fit::Fit;
 use nalgebra::{DVector, Dyn, Matrix2, OMatrix, U6, Vector2};
 use problem::{BareFacet, Board, Element, Facet, Flatness, Group, Joint, Mounting, Sight};
 use std::collections::BTreeMap;
+
+pub use limit::{TrueDirection, limit};
+
+/// Motions of the mounting, the first of the shared numbers.
+const MOTIONS: usize = 6;
 
 /// Error that stands for none, in metres, so that everything has a weight.
 const LEAST_SD: f64 = 1e-6;
@@ -51,6 +59,7 @@ pub(crate) struct Outcome {
     pub(crate) facets: Vec<FacetEstimate>,
     pub(crate) mount: Option<MountEstimate>,
     pub(crate) bias: Option<RangeBias>,
+    pub(crate) assessment: Option<Assessment>,
 }
 
 /// Calibrates the assigned elements together.
@@ -78,7 +87,12 @@ pub(crate) fn calibrate(
         let some: Vec<&Assigned> = assigned.iter().filter(|a| facets.contains(&a.facet)).collect();
         groups.push(group(work, &facets, &some));
     }
-    groups.extend(mount.selection.iter().filter_map(|board| direct_group(work, board)));
+    groups.extend(
+        mount
+            .selection
+            .iter()
+            .filter_map(|board| direct_group(work, board)),
+    );
     let (mounting, mean) = mounting_as_drawn(work, mount);
     solve(work, groups, mounting, &mean, planes, true)
 }
@@ -114,6 +128,7 @@ fn board(work: &Workspace, pose: usize) -> Option<Board> {
     let sheet = session.board(record.label.board.as_deref()?)?;
     Some(Board {
         pose,
+        number: record.label.pose,
         rig_from_board: record.room_from_rig.inverse() * record.room_from_board?,
         color: record.label.color.clone().unwrap_or_else(|| sheet.color.clone()),
         markers: sheet.markers.iter().map(|m| m.position()).collect(),
@@ -136,7 +151,13 @@ fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) -> Group {
         }
     };
     let mut group = Group {
-        facets: facets.iter().map(|f| Facet { facet: *f, bare: bare(*f) }).collect(),
+        facets: facets
+            .iter()
+            .map(|f| Facet {
+                facet: *f,
+                bare: bare(*f),
+            })
+            .collect(),
         ..Group::default()
     };
     for element in assigned {
@@ -148,7 +169,8 @@ fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) -> Group {
             });
             let summary = &work.summaries[*pose][element.beam];
             if let Some(place) = place {
-                let sd = spread::noise_sd(summary, noise) / (summary.count.max(1) as f64).sqrt();
+                let of_mean = spread::noise_sd(summary, noise) / (summary.count.max(1) as f64).sqrt();
+                let sd = libm::hypot(of_mean, session.believed.element_sd_mm * 1e-3);
                 sights.push(Sight {
                     board: place,
                     mean: summary.mean,
@@ -213,7 +235,10 @@ fn mounting_as_found(work: &Workspace, mount: &Mount) -> (Mounting, DVector<f64>
 fn mounting_as_drawn(work: &Workspace, mount: &Mount) -> (Mounting, DVector<f64>) {
     let session = &work.dataset.session;
     let count = CommonErrors::of(session).len();
-    let drawn = Prior::of(&Pose::from(&session.nominal_rig_from_sensor), &session.mount_tolerance);
+    let drawn = Prior::of(
+        &Pose::from(&session.nominal_rig_from_sensor),
+        &session.mount_tolerance,
+    );
     let mut motion = OMatrix::<f64, U6, Dyn>::zeros(6 + count);
     for axis in 0..6 {
         motion[(axis, axis)] = drawn.sd[axis];
@@ -226,6 +251,30 @@ fn mounting_as_drawn(work: &Workspace, mount: &Mount) -> (Mounting, DVector<f64>
     (mounting, answer::prior_mean(&back, &drawn.sd, count))
 }
 
+/// The problem, and the state to begin with.
+fn begin<'w>(
+    work: &Workspace<'w>,
+    groups: Vec<Group>,
+    mounting: Mounting,
+    mean: &DVector<f64>,
+    planes: &[MirrorPlane],
+) -> (Joint<'w>, State) {
+    let session = &work.dataset.session;
+    let joint = Joint {
+        groups,
+        mounting,
+        bias: &session.believed.bias,
+        common: CommonErrors::of(session),
+        first_common: MOTIONS,
+        drift_sd: session.believed.drift_sd_mm * 1e-3,
+        marker_sd: session.believed.marker_sd_mm * 1e-3,
+        flatness: Flatness::default(),
+        prior_mean: mean.clone(),
+    };
+    let start = joint.state(planes);
+    (joint, start)
+}
+
 fn solve(
     work: &Workspace,
     groups: Vec<Group>,
@@ -235,44 +284,59 @@ fn solve(
     departing: bool,
 ) -> Result<Outcome, ProblemError> {
     let session = &work.dataset.session;
-    let mut joint = Joint {
-        groups,
-        mounting,
-        bias: &session.believed.bias,
-        common: CommonErrors::of(session),
-        first_common: 6,
-        drift_sd: session.believed.drift_sd_mm * 1e-3,
-        marker_sd: session.believed.marker_sd_mm * 1e-3,
-        flatness: Flatness::default(),
+    let (mut joint, start) = begin(work, groups, mounting, mean, planes);
+    let exact = least_squares::Options::default();
+    let rigid = |joint: &Joint, from: State| {
+        joint.solve(from, &exact).map(|solution| Fit {
+            solution,
+            departure_statistic: 0.0,
+        })
     };
-    let mut start = joint.state(mean, planes);
-    // The mounting is close to its end already, however far its prior's mean lies.
-    if let Some(crate::least_squares::Block::Vector(w)) = start.shared.blocks.first_mut() {
-        w.fill(0.0);
-    }
-    let mut fit = joint.fit(start, mean, departing)?;
+    let mut fit = if departing {
+        joint.fit(start)?
+    } else {
+        rigid(&joint, start)?
+    };
     let mut answers = joint.answers(&fit.solution);
+    let mut left_out = false;
     for _ in 0..ROUNDS {
-        let strange: Vec<usize> = answers.iter().filter(|a| a.is_strange()).map(|a| a.beam).collect();
+        let strange: Vec<usize> = answers
+            .iter()
+            .filter(|a| a.is_strange())
+            .map(|a| a.beam)
+            .collect();
         if strange.is_empty() || strange.len() as f64 > LARGEST_SHARE * answers.len() as f64 {
             break;
         }
         for group in &mut joint.groups {
-            group.elements.retain(|e| e.facet.is_none() || !strange.contains(&e.beam));
+            group
+                .elements
+                .retain(|e| e.facet.is_none() || !strange.contains(&e.beam));
         }
-        fit = joint.fit(fit.solution.state, mean, departing)?;
+        left_out = true;
+        fit = rigid(&joint, fit.solution.state)?;
         answers = joint.answers(&fit.solution);
     }
-    let iterations = fit.solution.iterations;
+    if departing && left_out {
+        // They had their part in how plane the facets seemed.
+        fit = joint.fit(fit.solution.state)?;
+        answers = joint.answers(&fit.solution);
+    }
+    let solution = &fit.solution;
     let names = |facet: usize| session.facets[facet].name.clone();
     Ok(Outcome {
         beams: answers
             .iter()
-            .map(|a| (a.beam, a.estimate(names(a.facet), iterations)))
+            .map(|a| (a.beam, a.estimate(names(a.facet), solution.iterations)))
             .collect(),
-        facets: joint.facets(&fit.solution, &names),
-        mount: if departing { joint.mount(&fit.solution) } else { None },
-        bias: if departing { joint.corrected_bias(&fit.solution) } else { None },
+        facets: joint.facets(solution, &names),
+        mount: if departing { joint.mount(solution) } else { None },
+        bias: if departing {
+            joint.corrected_bias(solution)
+        } else {
+            None
+        },
+        assessment: departing.then(|| joint.assess(session, &fit, &answers)),
     })
 }
 
@@ -311,10 +375,17 @@ impl Answer {
         if sd > WEAKEST_SD {
             let along = eigen.eigenvectors.column(weakest);
             let direction = Vector2::new(along[0] / cos, along[1]).normalize();
-            let direction = if direction[direction.iamax()] < 0.0 { -direction } else { direction };
+            let direction = if direction[direction.iamax()] < 0.0 {
+                -direction
+            } else {
+                direction
+            };
             return open(
                 direction,
-                format!("the boards of its facet leave a direction open, known to {:.1}° at best", sd.to_degrees()),
+                format!(
+                    "the boards of its facet leave a direction open, known to {:.1}° at best",
+                    sd.to_degrees()
+                ),
             );
         }
         let scale = Matrix2::from_diagonal(&Vector2::new(1.0 / cos, 1.0));

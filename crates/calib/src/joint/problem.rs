@@ -24,7 +24,10 @@ use nalgebra::{
 pub(super) const BOARD_ERRORS: usize = 4;
 
 /// Orders of the polynomial along the fan by which a facet's normal departs from its mean.
-const FIGURE_ORDERS: usize = 3;
+pub(super) const FIGURE_ORDERS: usize = 3;
+
+/// Root mean square of a figure over a fan, in its 1σ: √(1 + 1/4 + 1/9).
+pub(super) const FIGURE_RMS: f64 = 1.166_666_666_666_666_7;
 
 /// Own parameters of a facet's figure: every order about two axes.
 pub(super) const FIGURE: usize = 2 * FIGURE_ORDERS;
@@ -45,8 +48,9 @@ const SETTLED: f64 = 1e-14;
 /// A board as tracked, once for each pose.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Board {
-    /// Number of the stretch in the dataset.
+    /// Index of the stretch in the dataset, and its number.
     pub(super) pose: usize,
+    pub(super) number: usize,
     /// The board's place in the rig, as tracked.
     pub(super) rig_from_board: Pose,
     pub(super) color: String,
@@ -121,6 +125,8 @@ pub(super) struct Joint<'a> {
     pub(super) marker_sd: f64,
     /// How far facets are from plane.
     pub(super) flatness: Flatness,
+    /// What w is believed to be.
+    pub(super) prior_mean: DVector<f64>,
 }
 
 /// How far facets are from plane, 1σ.
@@ -153,6 +159,8 @@ pub(super) struct Linear {
     /// Exit direction and distance.
     pub(super) v: Unit<Vector3<f64>>,
     pub(super) distance: f64,
+    /// Derivatives of each biased range with respect to the range and to the cosine of the incidence.
+    slopes: Vec<(f64, f64)>,
     /// Derivatives over the standard deviations: of w, and of the group's own parameters.
     pub(super) shared: DMatrix<f64>,
     pub(super) own: DMatrix<f64>,
@@ -179,7 +187,7 @@ pub(super) struct Shape<'p> {
 }
 
 /// Legendre polynomials P₁, P₂, P₃ of unit mean square over the fan, falling off with the order as 1/k.
-fn orders(t: f64) -> [f64; FIGURE_ORDERS] {
+pub(super) fn orders(t: f64) -> [f64; FIGURE_ORDERS] {
     [
         3.0_f64.sqrt() * t,
         5.0_f64.sqrt() * (1.5 * t * t - 0.5) / 2.0,
@@ -259,7 +267,7 @@ impl Joint<'_> {
     }
 
     /// Errors of the boards of a group.
-    fn board_errors<'p>(&self, group: &Group, own: &'p Point) -> Option<&'p DVector<f64>> {
+    pub(super) fn board_errors<'p>(&self, group: &Group, own: &'p Point) -> Option<&'p DVector<f64>> {
         own.numbers(FACET_BLOCKS * group.facets.len())
     }
 
@@ -300,14 +308,12 @@ impl Joint<'_> {
         })
     }
 
-    /// Predicted raw range of a ray without the errors that are parameters, and its derivatives with respect to the
-    /// range and the cosine.
-    fn biased(&self, range: f64, cos: f64, color: &str) -> (f64, f64, f64) {
+    /// Derivatives of the biased range with respect to the range and to the cosine of the incidence.
+    fn bias_slopes(&self, range: f64, cos: f64, color: &str) -> (f64, f64) {
         let at = |range: f64, cos: f64| self.bias.terms(range, cos, color).total();
         let slope = (at(range + BIAS_STEP, cos) - at(range - BIAS_STEP, cos)) / (2.0 * BIAS_STEP);
         let (low, high) = ((cos - BIAS_STEP).max(0.0), (cos + BIAS_STEP).min(1.0));
-        let gain = (at(range, high) - at(range, low)) / (high - low);
-        (range + at(range, cos), 1.0 + slope, gain)
+        (1.0 + slope, (at(range, high) - at(range, low)) / (high - low))
     }
 
     /// An element at a point, with the derivatives of the whole if they are wanted.
@@ -323,9 +329,7 @@ impl Joint<'_> {
         let w = shared.numbers(0)?;
         let b = self.board_errors(group, own)?;
         let fan = match element.facet {
-            Some(facet) => {
-                Fan::of(element, &Self::shape(own, facet)?, &self.flatness)?
-            }
+            Some(facet) => Fan::of(element, &Self::shape(own, facet)?, &self.flatness)?,
             None => Fan {
                 v: element.u,
                 distance: 0.0,
@@ -343,6 +347,8 @@ impl Joint<'_> {
         let mut y = DVector::zeros(rows);
         let mut h = OMatrix::<f64, Dyn, U2>::zeros(rows);
         let (mut v, mut axes) = (fan.v, base);
+        // Slopes of the biases, which a departure does not change.
+        let mut slopes = vec![(1.0, 0.0); rows];
         for round in 0..DEPARTURE_ROUNDS {
             let q: Vector3<f64> = fan.v.into_inner() + base[0] * delta.x + base[1] * delta.y;
             let length = q.norm();
@@ -354,8 +360,13 @@ impl Joint<'_> {
                 let s = board.plane.distance_along(&origin, &v)?;
                 let closing = board.plane.normal.dot(&v);
                 let range = fan.distance + s;
-                let (raw, by_range, by_cos) = self.biased(range, closing.abs().min(1.0), color);
-                let common = self.common.row(range, closing.abs().min(1.0), color);
+                let cos = closing.abs().min(1.0);
+                if round == 0 {
+                    slopes[row] = self.bias_slopes(range, cos, color);
+                }
+                let (by_range, by_cos) = slopes[row];
+                let raw = range + self.bias.terms(range, cos, color).total();
+                let common = self.common.row(range, cos, color);
                 let predicted = raw
                     + (common * w.rows(self.first_common, self.common.len()))[0]
                     + self.drift_sd * b[sight.board * BOARD_ERRORS];
@@ -385,6 +396,7 @@ impl Joint<'_> {
             axes,
             v,
             distance: fan.distance,
+            slopes,
             shared: DMatrix::zeros(0, 0),
             own: DMatrix::zeros(0, 0),
         };
@@ -416,7 +428,7 @@ impl Joint<'_> {
             let closing = n.dot(&v);
             let range = fan.distance + s;
             let cos = closing.abs().min(1.0);
-            let (_, by_range, by_cos) = self.biased(range, cos, color);
+            let (by_range, by_cos) = linear.slopes[row];
             let by_closing = by_cos * closing.signum();
             let weight = 1.0 / sight.sd;
             let hit = origin + v.into_inner() * s;
@@ -510,10 +522,8 @@ pub(super) fn whiten(h: &OMatrix<f64, Dyn, U2>, tau: f64, m: &mut DMatrix<f64>) 
         let root = (1.0 + x.max(0.0)).sqrt();
         -1.0 / (root * (1.0 + root))
     });
-    let inner = eigen.eigenvectors
-        * Matrix2::from_diagonal(&gain)
-        * eigen.eigenvectors.transpose()
-        * (tau * tau);
+    let inner =
+        eigen.eigenvectors * Matrix2::from_diagonal(&gain) * eigen.eigenvectors.transpose() * (tau * tau);
     let part = h * (inner * (h.transpose() * &*m));
     *m += part;
 }
@@ -544,7 +554,11 @@ impl GroupedProblem for Joint<'_> {
     fn jacobian(&self, group: usize, shared: &Point, own: &Point) -> Option<GroupJacobian> {
         let group = &self.groups[group];
         let boards = self.boards(group, shared, own)?;
-        let bare = group.facets.iter().filter(|f| !f.bare.distances.is_empty()).count();
+        let bare = group
+            .facets
+            .iter()
+            .filter(|f| !f.bare.distances.is_empty())
+            .count();
         let rows = group.elements.iter().map(|e| e.sights.len()).sum::<usize>() + bare;
         let mut jacobian = GroupJacobian {
             shared: DMatrix::zeros(rows, self.shared_dimension()),

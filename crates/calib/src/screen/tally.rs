@@ -121,6 +121,7 @@ impl Screen<'_> {
                 .norm_squared()
             + self.common.unlisted_variance(color)
             + (1e-3 * beliefs.drift_sd_mm).powi(2)
+            + (1e-3 * beliefs.element_sd_mm).powi(2)
             + (1e-3 * beliefs.marker_sd_mm / cos_incidence).powi(2)
             + noise * noise / summary.count as f64;
         // A beam of finite width on a sloping wall is smeared over s·tan α·width; its mean moves by a tenth of that.

@@ -1,20 +1,20 @@
-//! Without noise the truth comes back: to 1e-9 rad by either method, from a mounting and facets 1° off the drawing.
+//! Without noise the truth comes back: to 1e-9 rad by every method that measures, from a mounting and facets 1° off the drawing.
 
 use crate::synthetic::World;
 use catoptric_calib::{JacobianForm, Method, Options, calibrate, pose};
 use catoptric_model::{Status, beam};
 
 #[test]
-fn both_methods_return_every_direction_and_the_mounting() {
+fn every_method_returns_every_direction_and_the_mounting() {
     let world = World::exact();
     let made = world.make();
-    for method in Method::ALL {
+    for method in Method::ALL.into_iter().filter(|m| *m != Method::Prior) {
         let calibration = calibrate(&made.dataset, method, &Options::default()).expect("a sound dataset");
         assert_eq!(calibration.method, method.name());
         assert_eq!(calibration.beams.len(), world.beams);
         let mount = calibration.rig_from_sensor.expect("it is always estimated");
         let off = pose::motion_between(&made.rig_from_sensor, &mount.pose());
-        assert!(off.norm() < 1e-11, "{method:?}: mounting off by {off}");
+        assert!(off.norm() < 1e-9, "{method:?}: mounting off by {off}");
         for (index, estimate) in calibration.beams.iter().enumerate() {
             assert_eq!(estimate.beam, index);
             let Some(truth) = made.deflections.get(&index) else {

@@ -24,7 +24,7 @@ struct Nees {
     mount: f64,
 }
 
-fn nees(world: impl Fn(u64) -> World) -> Nees {
+fn nees(method: Method, world: impl Fn(u64) -> World) -> Nees {
     let mut sums = Nees {
         angles: [0.0; 3],
         noise_only: 0.0,
@@ -34,8 +34,7 @@ fn nees(world: impl Fn(u64) -> World) -> Nees {
     for seed in 0..SEEDS {
         let world = world(seed);
         let made = world.make();
-        let calibration =
-            calibrate(&made.dataset, Method::Beam, &Options::default()).expect("a sound dataset");
+        let calibration = calibrate(&made.dataset, method, &Options::default()).expect("a sound dataset");
         for (facet, sum) in sums.angles.iter_mut().enumerate() {
             // One beam of each facet, another in every run.
             let [first, last] = world.served[facet];
@@ -51,7 +50,9 @@ fn nees(world: impl Fn(u64) -> World) -> Nees {
                 (error.transpose() * c.try_inverse().expect("it is positive definite") * error)[0]
             };
             *sum += squared(estimate.covariance_rad2) / (2.0 * runs);
-            sums.noise_only += squared(estimate.noise_covariance_rad2) / (6.0 * runs);
+            if estimate.noise_covariance_rad2.is_some() {
+                sums.noise_only += squared(estimate.noise_covariance_rad2) / (6.0 * runs);
+            }
         }
         let mount = calibration.rig_from_sensor.expect("it is always estimated");
         let off = pose::motion_between(&mount.pose(), &made.rig_from_sensor);
@@ -77,7 +78,7 @@ fn assert_honest(found: &Nees) {
 
 #[test]
 fn angles_and_mounting_err_as_much_as_they_say() {
-    let found = nees(|seed| World::noisy(1000 + 17 * seed));
+    let found = nees(Method::Beam, |seed| World::noisy(1000 + 17 * seed));
     assert_honest(&found);
     // The paper's own covariance is far too small here, and this test would see it.
     assert!(
@@ -90,7 +91,7 @@ fn angles_and_mounting_err_as_much_as_they_say() {
 #[test]
 fn biases_that_mounting_and_elements_share_are_counted_once() {
     // The mounting errs by the very biases that the elements are then corrected with.
-    let found = nees(|seed| World {
+    let found = nees(Method::Beam, |seed| World {
         distance_bias_sd_mm: 5.0,
         angle_gain_sd_mm: 8.0,
         color_bias_sd_mm: 4.0,
@@ -100,4 +101,58 @@ fn biases_that_mounting_and_elements_share_are_counted_once() {
         ..World::noisy(9000 + 13 * seed)
     });
     assert_honest(&found);
+}
+
+#[test]
+fn every_other_method_errs_as_much_as_it_says() {
+    for method in [Method::Joint, Method::Facet, Method::BeamGls, Method::ClosedForm] {
+        let found = nees(method, |seed| World::noisy(31_000 + 11 * seed));
+        println!("{}: {:?}, mounting {}", method.name(), found.angles, found.mount);
+        assert_honest(&found);
+    }
+}
+
+/// Mean squared error along both axes, in square degrees, of every beam, over some seeds.
+fn mean_square(method: Method, departure_deg: f64) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for seed in 0..40 {
+        let world = World {
+            departure_deg,
+            ..World::noisy(70_000 + seed)
+        };
+        let made = world.make();
+        let calibration = calibrate(&made.dataset, method, &Options::default()).expect("a sound dataset");
+        for (index, truth) in &made.deflections {
+            let found = calibration.beams[*index].deflection();
+            let found =
+                found.unwrap_or_else(|| panic!("beam {index}: {:?}", calibration.beams[*index].reason));
+            let azimuth = world.azimuth(*index);
+            let off = catoptric_model::beam::angle_between(
+                &found.exit_direction(azimuth),
+                &truth.exit_direction(azimuth),
+            );
+            sum += 0.5 * off.to_degrees().powi(2);
+            count += 1.0;
+        }
+    }
+    sum / count
+}
+
+/// However far beams depart from their planes, knowing of the others never harms.
+#[test]
+fn joint_is_never_worse_than_each_element_by_itself() {
+    let mut last = 0.0;
+    for departure_deg in [0.0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.3] {
+        let (joint, alone) = (
+            mean_square(Method::Joint, departure_deg).sqrt(),
+            mean_square(Method::BeamGls, departure_deg).sqrt(),
+        );
+        let rigid = mean_square(Method::Facet, departure_deg).sqrt();
+        println!("{departure_deg}°: joint {joint:.4}°, facet {rigid:.4}°, beam-gls {alone:.4}°");
+        // A thousand errors each, of which those of one run are correlated: a hundredth is chance.
+        assert!(joint < 1.01 * alone, "{departure_deg}°: {joint} against {alone}");
+        last = joint / rigid;
+    }
+    // A plane that is none is what the rigid facet pays for.
+    assert!(last < 0.5, "{last}");
 }

@@ -5,6 +5,14 @@ use catoptric_calib::{Method, Options, calibrate};
 use catoptric_model::{Status, frame};
 use nalgebra::{Unit, Vector2, Vector3};
 
+/// The methods that look at each element by itself.
+const ALONE: [Method; 4] = [
+    Method::BeamGls,
+    Method::Beam,
+    Method::Recursive,
+    Method::ClosedForm,
+];
+
 /// Solves the middle beam of the middle facet on the given boards; its status and its null direction as an angle
 /// from "across" towards "up" in the tangent plane, in degrees.
 fn null_angle(boards: &[(f64, f64, f64)], facet_tilt_deg: f64, method: Method) -> (Status, Option<f64>) {
@@ -36,7 +44,7 @@ fn null_angle(boards: &[(f64, f64, f64)], facet_tilt_deg: f64, method: Method) -
 /// Where the boards leave a direction open, the estimate stays off along it, and the common tilt is seen from there:
 /// `tolerance_deg` is what a facet off the drawing by `facet_tilt_deg` may turn it.
 fn assert_open_across(boards: &[(f64, f64, f64)], psi_deg: f64, facet_tilt_deg: f64, tolerance_deg: f64) {
-    for method in Method::ALL {
+    for method in ALONE {
         let (status, angle) = null_angle(boards, facet_tilt_deg, method);
         assert_eq!(status, Status::Unobservable, "{method:?}");
         let angle = angle.expect("an unobservable element names its open direction");
@@ -76,7 +84,7 @@ fn a_hinge() {
 #[test]
 fn all_face_on() {
     let boards = [(1.2, 0.0, 0.0), (1.4, 0.0, 0.0), (1.6, 0.0, 0.0), (1.8, 0.0, 0.0)];
-    for method in Method::ALL {
+    for method in ALONE {
         let (status, angle) = null_angle(&boards, 1.0, method);
         assert_eq!(status, Status::Unobservable);
         assert!(angle.is_some());

@@ -6,6 +6,7 @@
 mod closure;
 mod consistency;
 mod degenerate;
+mod gauge;
 mod invariance;
 mod statuses;
 mod synthetic;

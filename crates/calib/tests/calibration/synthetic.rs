@@ -70,6 +70,8 @@ pub(crate) struct World {
     pub(crate) angle_gain_sd_mm: f64,
     pub(crate) color_bias_sd_mm: f64,
     pub(crate) distance_sd_mm: f64,
+    /// Departure of each beam from what its facet's plane gives it, 1σ along each axis, by chance.
+    pub(crate) departure_deg: f64,
 }
 
 /// A dataset and what it was made from.
@@ -125,6 +127,7 @@ impl World {
             angle_gain_sd_mm: 0.0,
             color_bias_sd_mm: 0.0,
             distance_sd_mm: 0.0,
+            departure_deg: 0.0,
         }
     }
 
@@ -178,6 +181,17 @@ impl World {
         self.mirror(facet, true).deflect(beam::direction(azimuth))
     }
 
+    fn departed(&self, azimuth: f64, deflection: &Deflection, draw: &mut Draw) -> Deflection {
+        if self.departure_deg == 0.0 {
+            return *deflection;
+        }
+        let v = deflection.exit_direction(azimuth);
+        let (across, up) = frame::tangent_basis(&v);
+        let mut by = || self.departure_deg.to_radians() * draw.normal();
+        let exit = Unit::new_normalize(v.into_inner() + across.into_inner() * by() + up.into_inner() * by());
+        Deflection::from_exit(azimuth, &exit, deflection.distance)
+    }
+
     pub(crate) fn make(&self) -> Made {
         let mut draw = Draw(self.seed);
         let believed = RangeBias {
@@ -227,7 +241,7 @@ impl World {
                 *bare = deflection.distance
                     + 1e-3 * self.thickness_mm / mirror.normal.dot(&u).abs()
                     + 1e-3 * self.distance_sd_mm * draw.normal();
-                deflections.insert(beam, deflection);
+                deflections.insert(beam, self.departed(self.azimuth(beam), &deflection, &mut draw));
             }
         }
         let session = self.session(&nominal, believed, bare);
@@ -314,6 +328,7 @@ impl World {
             believed: Beliefs {
                 range_noise_sd_mm: self.noise_mm,
                 drift_sd_mm: self.drift_mm,
+                element_sd_mm: 0.0,
                 marker_sd_mm: self.marker_mm,
                 bias,
                 distance_bias_sd_mm: self.distance_bias_sd_mm,

@@ -2,7 +2,7 @@
 
 use super::{Findings, Path, suggestion};
 use crate::color;
-use crate::scene::{Detector, EchoChoice, NoiseTable, Preset, Principle, Scene};
+use crate::scene::{Detector, EchoChoice, MocapProfile, NoiseTable, Preset, Principle, Scene};
 use catoptric_model::dataset::RIG_SUBJECT;
 
 pub(super) fn check(scene: &Scene, found: &mut Findings) {
@@ -180,6 +180,21 @@ fn detection(scene: &Scene, found: &mut Findings) {
             ),
             "use the preset \"utm-30lx-ew\", or \"custom\" with `scanner.custom.echoes`".to_owned(),
         );
+    }
+    let own_markers = scene.mocap.profile == MocapProfile::Custom;
+    if own_markers != scene.mocap.marker.is_some() {
+        let (what, remedy) = if own_markers {
+            (
+                "is \"custom\", whose errors only the scene can tell",
+                "add marker = { constant_sd_mm = …, jitter_sd_mm = … } to [mocap]",
+            )
+        } else {
+            (
+                "has errors of its own, and `mocap.marker` is given",
+                "leave `mocap.marker` out, or set the profile to \"custom\"",
+            )
+        };
+        found.add(&Path::of("mocap").key("profile"), what, remedy.to_owned());
     }
     let custom = scene.scanner.preset == Preset::Custom;
     let path = Path::of("scanner");

@@ -14,6 +14,8 @@ pub struct Chances<'a> {
     scene: &'a Scene,
     seed: u64,
     drift: f64,
+    /// Constant error of every beam; empty without any.
+    elements: Vec<f64>,
     start_s: f64,
     first_scan: usize,
     /// Scans of the stretch so far.
@@ -34,11 +36,27 @@ impl Laboratory {
             scene: &self.scene,
             seed: self.seed,
             drift: self.drift(number),
+            elements: self.elements(number),
             start_s: self.start_s(number),
             first_scan: self.first_scan(number),
             done: 0,
             correlated: start,
         }
+    }
+
+    /// Constant error of every beam in a stretch, in metres; empty where there is none.
+    fn elements(&self, number: usize) -> Vec<f64> {
+        let sd = self.scene.errors.element_sd_mm * 1e-3;
+        if sd == 0.0 || self.scene.errors.model == ErrorModel::None {
+            return Vec::new();
+        }
+        let mut draws = Draws::new(self.seed, Purpose::Element, number as u64);
+        (0..beam::COUNT)
+            .map(|beam| {
+                draws.seek(beam as u64);
+                sd * draws.normal()
+            })
+            .collect()
     }
 
     /// What the scanner is off because it is not warm yet, in metres: a·exp(−t/τ), t seconds into the recording.
@@ -102,6 +120,9 @@ impl Chances<'_> {
             chance.warm_up = warm_up;
             chance.noise = reading.normal();
             chance.dropout = reading.uniform();
+        }
+        for (chance, element) in chances.iter_mut().zip(&self.elements) {
+            chance.element = *element;
         }
         self.remember();
         if let Some(law) = &errors.correlated {

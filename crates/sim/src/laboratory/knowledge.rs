@@ -81,7 +81,8 @@ impl Laboratory {
         session::Beliefs {
             range_noise_sd_mm: unless_perfect(noise.iter().sum::<f64>() / noise.len().max(1) as f64),
             drift_sd_mm: unless_perfect(errors.drift_sd_mm),
-            marker_sd_mm: self.scene.mocap.profile.errors().constant.norm() / 3.0_f64.sqrt() * 1e3,
+            element_sd_mm: unless_perfect(errors.element_sd_mm),
+            marker_sd_mm: self.scene.mocap.errors().constant.norm() / 3.0_f64.sqrt() * 1e3,
             bias: self.believed.clone(),
             distance_bias_sd_mm: if_biased(known.distance_sd_mm),
             angle_gain_sd_mm: if_biased(known.angle_gain_sd_mm),
@@ -123,6 +124,9 @@ impl Laboratory {
         let stretch = number.map(|number| self.stretch(number)).transpose()?;
         let record = stretch.and_then(|s| s.into_record().ok());
         let summaries = record.map(|r| r.summarize()).unwrap_or_default();
+        if let Some(sd_mm) = self.scene.experiment.bare_distance_sd_mm {
+            return self.measured_bare(sd_mm, thickness);
+        }
         let mut distance_m = vec![0.0; beam::COUNT];
         let mut variance: f64 = 0.0;
         for (beam, summary) in summaries.iter().enumerate() {
@@ -139,6 +143,39 @@ impl Laboratory {
         Ok(session::BareStructure {
             mirror_thickness_mm: thickness,
             distance_sd_mm: variance.sqrt() * 1e3,
+            first_beam: 0,
+            distance_m,
+        })
+    }
+
+    /// Step 3 with another instrument: the distances of a facet's beams all share one error.
+    fn measured_bare(&self, sd_mm: f64, thickness: f64) -> Result<session::BareStructure, SimError> {
+        let served = self.nominal_facets()?;
+        let mut distance_m = vec![0.0; beam::COUNT];
+        for (index, built) in self.structure.facets.iter().enumerate() {
+            let Some(sheet) = served.iter().find(|f| f.name == built.name) else {
+                continue;
+            };
+            let mut draws = Draws::new(self.seed, Purpose::BareDistance, index as u64);
+            let error = sd_mm * 1e-3 * draws.normal();
+            let normal = built.face.normal;
+            let [first, last] = sheet.beams;
+            let last = (last + NEAR_FACET).min(beam::COUNT - 1);
+            for (beam, distance) in distance_m
+                .iter_mut()
+                .enumerate()
+                .take(last + 1)
+                .skip(first.saturating_sub(NEAR_FACET))
+            {
+                let u = beam::direction(beam::azimuth(beam));
+                let facing = normal.dot(&u).abs();
+                let to_face = normal.dot(&built.face.corners[0].coords) / normal.dot(&u);
+                *distance = to_face + thickness * 1e-3 / facing + error;
+            }
+        }
+        Ok(session::BareStructure {
+            mirror_thickness_mm: thickness,
+            distance_sd_mm: sd_mm,
             first_beam: 0,
             distance_m,
         })

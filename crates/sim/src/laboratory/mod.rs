@@ -66,7 +66,7 @@ impl Laboratory {
             return Err(SimError::NoLaboratory);
         }
         let sensor = Sensor::new(scene)?;
-        let planned = placement::plan(scene, &sensor)?;
+        let planned = placement::plan(scene, &sensor, seed)?;
         let boards = planned
             .iter()
             .enumerate()

@@ -13,15 +13,16 @@ pub(crate) use poses::stands_in;
 pub(crate) use sensor_tests::before_beam;
 
 use crate::error::SimError;
+use crate::noise::{Draws, Purpose};
 use crate::optics::{Mirrors, Path, Setting};
 use crate::reading::Sensor;
-use crate::scene::{BoardPose, Room, Scene};
+use crate::scene::{BoardPose, Design, Room, Scene};
 use crate::structure::{self, Structure};
 use catoptric_model::frame::{tangent_basis, yaw_pitch_roll};
 use catoptric_model::{Pose, PoseKind, TestNote, beam};
 use groups::{Group, direct_groups, facet_groups};
 use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
-use poses::{attitude, place};
+use poses::{attitude, place, place_at_random};
 
 /// A stretch as it is meant to be recorded.
 #[derive(Debug, Clone)]
@@ -57,8 +58,8 @@ pub fn room_from_rig(room: &Room) -> Pose {
 ///
 /// # Errors
 /// [`SimError::Placement`] where a board fits nowhere, [`SimError::UnknownName`] for a pose that refers to nothing.
-pub fn plan(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
-    let mut planned = procedure(scene, sensor)?;
+pub fn plan(scene: &Scene, sensor: &Sensor, seed: u64) -> Result<Vec<Planned>, SimError> {
+    let mut planned = procedure(scene, sensor, seed)?;
     let scan_period_s = scene.scanner.limits().scan_period_s();
     planned.extend(scene.flight.iter().enumerate().map(|(index, flight)| Planned {
         kind: PoseKind::Flight,
@@ -74,7 +75,7 @@ pub fn plan(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
 }
 
 /// Everything but flights.
-fn procedure(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
+fn procedure(scene: &Scene, sensor: &Sensor, seed: u64) -> Result<Vec<Planned>, SimError> {
     let structure = Structure::nominal(scene)?;
     let setting = Setting::new(scene, &structure, Mirrors::Attached, Vec::new())?;
     let room_from_sensor = room_from_rig(&scene.room) * structure::nominal_mount(scene);
@@ -94,7 +95,9 @@ fn procedure(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
     let mut planned = Vec::new();
     let drawn = &scene.superstructure;
     // Who only flies measures no structure that is not there.
-    if scene.flight.is_empty() || !(drawn.facet.is_empty() && drawn.post.is_empty()) {
+    let measured_otherwise = experiment.bare_distance_sd_mm.is_some();
+    if !measured_otherwise && (scene.flight.is_empty() || !(drawn.facet.is_empty() && drawn.post.is_empty()))
+    {
         planned.push(without_board(PoseKind::Bare, experiment.bare_scans));
     }
     if scene.room.has_walls() {
@@ -142,22 +145,22 @@ fn procedure(scene: &Scene, sensor: &Sensor) -> Result<Vec<Planned>, SimError> {
         let group = Group::new(Some(facet), first, last, &paths, &room_from_sensor);
         for index in 0..experiment.poses_per_group as usize {
             let board = index % scene.board.len();
-            let pose = place(
-                &scene.board[board],
-                &group,
-                experiment,
-                &scene.room,
-                index,
-                number,
-            )
+            let sheet = &scene.board[board];
+            let pose = match experiment.design {
+                Design::Even => place(sheet, &group, experiment, &scene.room, index, number),
+                Design::Random => place_at_random(sheet, &group, experiment, &scene.room, index, || {
+                    Draws::new(seed, Purpose::Design, number as u64)
+                }),
+            }
             .map_err(|reason| no_place(scene, board, &group, reason))?;
+            let exact = experiment.design == Design::Random;
             planned.push(Planned {
                 kind: PoseKind::Facet,
                 scans,
                 facet: Some(facet),
                 beams: Some([first, last]),
                 board: Some((board, pose)),
-                exact: false,
+                exact,
                 test: None,
                 flight: None,
             });

@@ -2,6 +2,7 @@
 
 use super::groups::Group;
 use crate::footprint::Ray;
+use crate::noise::Draws;
 use crate::scene::{Board, Experiment, Room};
 use catoptric_model::frame::tangent_basis;
 use catoptric_model::{Pose, Rectangle};
@@ -80,6 +81,42 @@ pub(super) fn place(
             "it would reach through a wall, floor or ceiling at every distance from {LEAST_RANGE} to {range:.2} m"
         )),
     }
+}
+
+/// Times that chance is asked for a pose that stands in the room.
+const ATTEMPTS: u64 = 1000;
+
+/// A pose by chance for a board before a group: aimed at one of its beams, with tilt, direction of tilt and distance
+/// uniform within their bounds. What does not stand in the room is drawn anew.
+pub(super) fn place_at_random(
+    board: &Board,
+    group: &Group,
+    experiment: &Experiment,
+    room: &Room,
+    index: usize,
+    draws: impl Fn() -> Draws,
+) -> Result<Pose, String> {
+    group.middle().ok_or("no beam leaves towards it")?;
+    let (first, last) = (&group.rays[0], &group.rays[group.rays.len() - 1]);
+    let fan = last.direction.into_inner() - first.direction.into_inner();
+    let mut draws = draws();
+    let within = |[low, high]: [f64; 2], share: f64| low + (high - low) * share;
+    for attempt in 0..ATTEMPTS {
+        draws.seek(index as u64 * ATTEMPTS + attempt);
+        // Below the number of rays.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let aimed = (draws.uniform() * group.rays.len() as f64) as usize;
+        let range = within(experiment.range_m, draws.uniform());
+        let tilt = within(experiment.tilt_deg, draws.uniform()).to_radians();
+        let turn = std::f64::consts::TAU * draws.uniform();
+        let pose = facing(&group.rays[aimed], fan, range, tilt, turn);
+        if stands_in(board, &pose, room) {
+            return Ok(pose);
+        }
+    }
+    Err(format!(
+        "of {ATTEMPTS} poses by chance, none stands within the room's walls, floor and ceiling"
+    ))
 }
 
 /// A board on a ray, tilted against it; its x axis lies along the fan as far as the tilt allows.

@@ -11,6 +11,8 @@ pub const MAX_ECHOES: usize = 8;
 pub struct Chance {
     /// Constant of the pose, in metres.
     pub drift: f64,
+    /// Constant of the beam in the pose, in metres.
+    pub element: f64,
     /// What the scanner is off while it gets warm, in metres.
     pub warm_up: f64,
     /// Noise shared with the readings before, in metres.
@@ -76,7 +78,7 @@ impl Sensor {
             };
         }
         let white = found.range() + chance.drift + found.noise_sd * chance.noise;
-        let range = white + (chance.warm_up + chance.correlated + chance.interference);
+        let range = white + (chance.warm_up + chance.correlated + chance.interference + chance.element);
         let step = self.errors.quantization_mm * 1e-3;
         let range = if step > 0.0 {
             (range / step).round() * step

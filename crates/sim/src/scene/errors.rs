@@ -40,6 +40,11 @@ pub struct Errors {
     /// Constant error of all readings of a pose, 1σ, in millimetres (trial scatter in Table 2).
     #[schemars(range(min = 0.0, max = 100.0))]
     pub drift_sd_mm: f64,
+    /// Constant error of each beam in each pose, 1σ, in millimetres: what more scans do not average out, as an uneven
+    /// board or speckle; none by default.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    #[serde(skip_serializing_if = "is_zero")]
+    pub element_sd_mm: f64,
     /// A scanner that is still getting warm; none by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub warm_up: Option<WarmUp>,
@@ -76,6 +81,7 @@ impl Default for Errors {
                 sd_mm: vec![4.1, 3.9, 4.6],
             },
             drift_sd_mm: 0.88,
+            element_sd_mm: 0.0,
             warm_up: None,
             correlated: None,
             interference: None,
@@ -83,6 +89,11 @@ impl Default for Errors {
             dropout: 0.0,
         }
     }
+}
+
+/// What is not there keeps out of files.
+fn is_zero(sd: &f64) -> bool {
+    *sd == 0.0
 }
 
 /// An error that dies away while the scanner gets warm: a·exp(−t/τ), t since the recording began.

@@ -19,7 +19,7 @@ pub use body::{
 pub use detection::{Detection, Detector, EchoChoice, Principle};
 pub use errors::{Characterization, Correlated, ErrorModel, Errors, Interference, NoiseTable, WarmUp};
 pub use flight::{Attitude, Flight, Waypoint};
-pub use room::{Board, BoardPose, Color, Experiment, Mocap, MocapProfile, Room};
+pub use room::{Board, BoardPose, Color, Design, Experiment, MarkerNoise, Mocap, MocapProfile, Room};
 pub use scanner::{BeamShape, HousingBox, Light, Limits, Mount, Preset, Scanner};
 pub use superstructure::{
     AsBuilt, Facet, FacetShape, Glass, Marker, Mirror, PolygonShape, Post, RectangleShape, Superstructure,

@@ -102,6 +102,21 @@ pub enum MocapProfile {
     Cooper,
     /// Exact.
     Ideal,
+    /// One's own: `mocap.marker`.
+    Custom,
+}
+
+/// Errors of a marker along each axis, 1σ.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MarkerNoise {
+    /// Constant while its body stays where it is, in millimetres.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub constant_sd_mm: f64,
+    /// New in every frame, in millimetres.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub jitter_sd_mm: f64,
 }
 
 /// Motion capture.
@@ -110,6 +125,12 @@ pub enum MocapProfile {
 pub struct Mocap {
     /// How good it is.
     pub profile: MocapProfile,
+    /// Errors of a marker, with the profile "custom".
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub marker: Option<MarkerNoise>,
+    /// Whether the rig's markers are seen without any error: its place was surveyed by better means.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub rig_exact: bool,
     /// Frames per second.
     #[schemars(range(min = 1.0, max = 1000.0))]
     pub frame_rate_hz: f64,
@@ -122,6 +143,8 @@ impl Default for Mocap {
     fn default() -> Self {
         Self {
             profile: MocapProfile::Modern,
+            marker: None,
+            rig_exact: false,
             frame_rate_hz: 100.0,
             dropout: 0.01,
         }
@@ -150,6 +173,14 @@ pub struct Experiment {
     /// Board poses before beams that no mirror deflects.
     #[schemars(range(min = 0, max = 1000))]
     pub direct_poses: u32,
+    /// How board poses before facets are chosen.
+    #[serde(skip_serializing_if = "Design::is_even")]
+    pub design: Design,
+    /// How well the distances to the bare structure are known, 1σ, in millimetres, if they are measured by other means
+    /// than the scanner: one error for all beams of a facet. The bare structure is then not scanned.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bare_distance_sd_mm: Option<f64>,
     /// Scans of the empty room.
     #[schemars(range(min = 1, max = 1000000))]
     pub room_scans: u32,
@@ -175,6 +206,24 @@ pub struct Experiment {
     #[schemars(range(min = 0.0, max = 100.0))]
     #[serde(skip_serializing_if = "is_default_spot_reading")]
     pub spot_sd_mm: f64,
+}
+
+/// How board poses before facets are chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Design {
+    /// As a careful person does: the direction of tilt goes round evenly, every board catches its whole group.
+    #[default]
+    Even,
+    /// By chance: a board is aimed at any beam of its group, with any direction of tilt, and any tilt and distance
+    /// within their bounds; it catches what it catches.
+    Random,
+}
+
+impl Design {
+    fn is_even(&self) -> bool {
+        *self == Self::Even
+    }
 }
 
 /// The default keeps out of files: a scene without tests has no use for it.
@@ -213,6 +262,8 @@ impl Default for Experiment {
             tilt_deg: [30.0, 50.0],
             range_m: [0.9, 1.5],
             direct_poses: 9,
+            design: Design::Even,
+            bare_distance_sd_mm: None,
             room_scans: 100,
             bare_scans: 100,
             placement_sd_mm: 10.0,

@@ -1,0 +1,262 @@
+//! What the residuals say of the beliefs: global test, variance components, correlations, planeness.
+//!
+//! A kind of error with prior u ~ N(0, 1) and posterior covariance C has, by restricted maximum likelihood,
+//! (σ̂/σ)² = Σû²/Σ(1 − C_uu): a parameter that the readings determine counts whole, one that they do not counts nothing.
+//! The standard deviation of σ̂ is σ̂/√(2Σ(1 − C_uu)).
+
+use super::answer::Answer;
+use super::fit::Fit;
+use super::problem::{BOARD_ERRORS, FACET_PARAMETERS, Joint};
+use crate::least_squares::Solution;
+use catoptric_model::Assessment;
+use catoptric_model::Session;
+use catoptric_model::assessment::{
+    ChiSquaredTest, LargestResidual, Planeness, SharedParameter, VarianceComponent,
+};
+use nalgebra::DMatrix;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// Chance below which beliefs are called wrong.
+const DOUBTFUL: f64 = 1e-3;
+
+/// Numbers of one kind of error that the readings must determine before its size is given.
+const LEAST_DETERMINED: f64 = 0.5;
+
+/// Chance that χ² is at least as large.
+pub(super) fn chance(chi_squared: f64, freedom: f64) -> f64 {
+    ChiSquared::new(freedom).map_or(1.0, |d| d.sf(chi_squared.max(0.0)))
+}
+
+impl Joint<'_> {
+    /// The assessment of a solution.
+    pub(super) fn assess(&self, session: &Session, fit: &Fit, answers: &[Answer]) -> Assessment {
+        let solution = &fit.solution;
+        let freedom = solution.degrees_of_freedom();
+        let global_test = ChiSquaredTest {
+            chi_squared: solution.sum_of_squares,
+            degrees_of_freedom: freedom,
+            p_value: chance(solution.sum_of_squares, freedom as f64),
+        };
+        let planeness = Planeness {
+            figure_deg: self.flatness.figure.to_degrees(),
+            departure_deg: self.flatness.tau.to_degrees(),
+            statistic: fit.departure_statistic,
+            // Both sizes lie on the edge of what they can be: half of the time the ratio is 0 for each.
+            p_value: if fit.departure_statistic > 0.0 {
+                0.5 * chance(fit.departure_statistic, 1.0) + 0.25 * chance(fit.departure_statistic, 2.0)
+            } else {
+                1.0
+            },
+        };
+        let (parameters, correlations) = self.shared_parameters(solution);
+        let mut assessment = Assessment {
+            verdict: String::new(),
+            global_test,
+            planeness,
+            variance_components: self.components(session, solution, answers),
+            parameters,
+            correlations,
+            open: self.open(session, solution),
+            largest_residual: largest(answers),
+            held_out: None,
+        };
+        assessment.verdict = verdict(&assessment);
+        assessment
+    }
+
+    fn component(
+        &self,
+        solution: &Solution,
+        name: &str,
+        believed: f64,
+        parameters: &[(usize, f64)],
+    ) -> VarianceComponent {
+        let (mut squares, mut determined) = (0.0, 0.0);
+        for (index, value) in parameters {
+            if let Some(c) = solution.information.covariance_among(&[*index]) {
+                squares += value * value;
+                determined += 1.0 - c[(0, 0)].min(1.0);
+            }
+        }
+        let found = (determined > LEAST_DETERMINED && believed > 0.0)
+            .then(|| believed * (squares / determined).sqrt());
+        VarianceComponent {
+            name: name.to_owned(),
+            believed_mm: believed,
+            found_mm: found,
+            found_sd_mm: found.map(|f| f / (2.0 * determined).sqrt()),
+        }
+    }
+
+    fn components(
+        &self,
+        session: &Session,
+        solution: &Solution,
+        answers: &[Answer],
+    ) -> Vec<VarianceComponent> {
+        let (mut drifts, mut markers) = (Vec::new(), Vec::new());
+        for (number, group) in self.groups.iter().enumerate() {
+            let first = self.offset(number) + group.board_column(0);
+            let Some(errors) = self.board_errors(group, solution.state.own(number)) else {
+                continue;
+            };
+            for (i, value) in errors.iter().enumerate() {
+                let of = if i % BOARD_ERRORS == 0 {
+                    &mut drifts
+                } else {
+                    &mut markers
+                };
+                of.push((first + i, *value));
+            }
+        }
+        let believed = &session.believed;
+        // Noise: what is left of each element's readings, by the numbers that it and its share of the rest have taken up.
+        let squares: f64 = answers.iter().flat_map(|a| &a.residuals).map(|r| r * r).sum();
+        let means: usize = answers.iter().map(|a| a.residuals.len()).sum();
+        let taken: f64 = answers.iter().map(|a| a.taken).sum();
+        let left = means as f64 - taken;
+        let noise = (left > LEAST_DETERMINED).then(|| believed.range_noise_sd_mm * (squares / left).sqrt());
+        vec![
+            VarianceComponent {
+                name: "noise of a reading".to_owned(),
+                believed_mm: believed.range_noise_sd_mm,
+                found_mm: noise,
+                found_sd_mm: noise.map(|n| n / (2.0 * left).sqrt()),
+            },
+            self.component(solution, "drift of a pose", believed.drift_sd_mm, &drifts),
+            self.component(solution, "marker of a board", believed.marker_sd_mm, &markers),
+        ]
+    }
+
+    fn shared_parameters(&self, solution: &Solution) -> (Vec<SharedParameter>, Vec<Vec<f64>>) {
+        let Some(w) = solution.state.shared.numbers(0) else {
+            return (Vec::new(), Vec::new());
+        };
+        // Motions of the mounting in degrees and millimetres about the drawn one, then the biases.
+        let axes = ["x", "y", "z"];
+        let mut names: Vec<(String, f64)> = Vec::new();
+        for axis in 0..3 {
+            names.push((
+                format!("sensor shifted along {} (mm)", axes[axis]),
+                1e3 * self.mounting.motion[(axis, axis)],
+            ));
+        }
+        for axis in 0..3 {
+            let unit = self.mounting.motion[(3 + axis, 3 + axis)].to_degrees();
+            names.push((format!("sensor turned about {} (deg)", axes[axis]), unit));
+        }
+        names.extend(self.common.named());
+        debug_assert_eq!(names.len(), w.len());
+        // A number believed to be known exactly is not estimated.
+        let told: Vec<usize> = (0..w.len()).filter(|i| names[*i].1 > 1e-6).collect();
+        let Some(c) = solution.information.covariance_among(&told) else {
+            return (Vec::new(), Vec::new());
+        };
+        let parameters = told
+            .iter()
+            .enumerate()
+            .map(|(place, i)| SharedParameter {
+                name: names[*i].0.clone(),
+                change: (w[*i] - self.prior_mean[*i]) * names[*i].1,
+                believed_sd: names[*i].1,
+                sd: c[(place, place)].max(0.0).sqrt() * names[*i].1,
+            })
+            .collect();
+        (parameters, correlation(&c))
+    }
+
+    /// Facets whose planes the boards do not determine.
+    fn open(&self, session: &Session, solution: &Solution) -> Vec<String> {
+        let mut all = Vec::new();
+        for (number, group) in self.groups.iter().enumerate() {
+            for (i, facet) in group.facets.iter().enumerate() {
+                let first = self.offset(number) + i * FACET_PARAMETERS;
+                if solution
+                    .information
+                    .covariance_among(&[first, first + 1])
+                    .is_none()
+                {
+                    let name = &session.facets[facet.facet].name;
+                    let boards = group.boards.len();
+                    all.push(format!(
+                        "facet {name:?}: its {boards} boards leave a tilt of its plane open; add a board that is tilted \
+                         across the others"
+                    ));
+                }
+            }
+        }
+        all
+    }
+}
+
+fn correlation(c: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    (0..c.nrows())
+        .map(|i| {
+            (0..c.ncols())
+                .map(|j| {
+                    if i == j {
+                        1.0
+                    } else {
+                        c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt()
+                    }
+                })
+                .collect()
+        })
+        .collect()
+}
+
+fn largest(answers: &[Answer]) -> LargestResidual {
+    let mut worst = LargestResidual::default();
+    for answer in answers {
+        for (residual, number) in answer.studentized.iter().zip(&answer.numbers) {
+            if residual.abs() > worst.studentized.abs() {
+                worst = LargestResidual {
+                    studentized: *residual,
+                    beam: answer.beam,
+                    pose: *number,
+                };
+            }
+        }
+    }
+    worst
+}
+
+fn verdict(a: &Assessment) -> String {
+    let test = &a.global_test;
+    let ratio = if test.degrees_of_freedom > 0 {
+        (test.chi_squared / test.degrees_of_freedom as f64).sqrt()
+    } else {
+        1.0
+    };
+    let mut words = if test.degrees_of_freedom == 0 {
+        "nothing is left over to test the beliefs with".to_owned()
+    } else if test.p_value < DOUBTFUL {
+        format!(
+            "residuals are {ratio:.2} times what the errors believed in explain: something acts that nobody believes in, and \
+             the covariances are too small"
+        )
+    } else if test.p_value > 1.0 - DOUBTFUL {
+        format!(
+            "residuals are {ratio:.2} times what the errors believed in make them: the beliefs are too pessimistic"
+        )
+    } else {
+        "residuals are as large as the errors believed in make them".to_owned()
+    };
+    if a.planeness.p_value < DOUBTFUL {
+        words += &format!(
+            "; the mirrors are not plane: their normals wander by {:.3}° along the fan, single beams by {:.3}°",
+            a.planeness.figure_deg, a.planeness.departure_deg
+        );
+    }
+    for component in &a.variance_components {
+        if let (Some(found), Some(sd)) = (component.found_mm, component.found_sd_mm)
+            && (found - component.believed_mm).abs() > 4.0 * sd
+        {
+            words += &format!(
+                "; {} is {found:.2} mm, {:.2} mm was believed",
+                component.name, component.believed_mm
+            );
+        }
+    }
+    words
+}
