@@ -22,6 +22,7 @@
 //! holds every file format. The [`guide`] tells it chapter by chapter.
 
 pub mod apply;
+pub mod compare;
 pub mod guide;
 pub mod io;
 pub mod report;
@@ -33,6 +34,7 @@ pub use apply::{CloudFrame, PointCloud, apply};
 pub use catoptric_calib as calib;
 pub use catoptric_model as model;
 pub use catoptric_sim as sim;
+pub use compare::{Comparison, Contestant, compare};
 pub use report::report;
 pub use score::{Score, Verdict, score};
 pub use validate::{Problem, validate};

@@ -53,6 +53,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
             command_line: format!("catoptric demo --seed {}", scene.seed),
             out: &dataset_folder,
             // Only a dataset is ever replaced; a second demo makes the same one again.
+            blind: false,
             replace: true,
             returns: false,
             readings: false,

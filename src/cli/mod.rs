@@ -4,6 +4,7 @@ mod apply;
 mod calibrate;
 mod characterize;
 mod check;
+mod compare;
 mod completions;
 mod demo;
 mod error;
@@ -75,6 +76,8 @@ enum Verb {
     Validate(validate::Arguments),
     /// Compare a calibration with the truth, or, without one, with boards and walls
     Score(score::Arguments),
+    /// Put several calibrations of one dataset side by side, ours or anybody's
+    Compare(compare::Arguments),
     /// Turn a scan into a point cloud
     Apply(apply::Arguments),
     /// Write a page to read about calibrations and their scores
@@ -143,6 +146,7 @@ fn run(cli: Cli) -> Result<(), CliError> {
         Verb::Calibrate(arguments) => calibrate::run(&arguments, &context),
         Verb::Validate(arguments) => validate::run(&arguments),
         Verb::Score(arguments) => score::run(&arguments, &context),
+        Verb::Compare(arguments) => compare::run(&arguments),
         Verb::Apply(arguments) => apply::run(&arguments, &context),
         Verb::Report(arguments) => report::run(&arguments, &context),
         Verb::New(arguments) => new::run(&arguments),

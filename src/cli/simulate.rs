@@ -42,6 +42,9 @@ pub(crate) struct Arguments {
     /// Replace a dataset that is there already.
     #[arg(long)]
     replace: bool,
+    /// Write no truth/, so that the dataset is blind; a second run without this, of the same scene and seed, has it.
+    #[arg(long, conflicts_with_all = ["returns", "readings", "sub_rays"])]
+    blind: bool,
     /// Write also what every beam met, truth/returns.csv.
     #[arg(long)]
     returns: bool,
@@ -80,6 +83,8 @@ pub(crate) struct Recording<'a> {
     pub(crate) out: &'a Path,
     /// Whether a dataset there may be replaced.
     pub(crate) replace: bool,
+    /// Whether the truth is kept back.
+    pub(crate) blind: bool,
     /// Whether the truth about every return is written as well.
     pub(crate) returns: bool,
     /// Whether the truth about every reading is written as well.
@@ -97,6 +102,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
             command_line: command_line(arguments, scene.seed),
             out: &arguments.out,
             replace: arguments.replace,
+            blind: arguments.blind,
             returns: arguments.returns,
             readings: arguments.readings,
             sub_rays: arguments.sub_rays,
@@ -128,6 +134,9 @@ fn command_line(arguments: &Arguments, seed: u64) -> String {
     let mut line = format!("catoptric simulate {} --seed {seed}", quoted(scene.as_ref()));
     for set in &arguments.set {
         line.push_str(&format!(" --set {}", quoted(set.as_ref())));
+    }
+    if arguments.blind {
+        line.push_str(" --blind");
     }
     if arguments.returns {
         line.push_str(" --returns");
@@ -162,14 +171,16 @@ pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Fig
         result
     };
     let mut writer = DatasetWriter::create(recording.out, recording.replace, &session)?;
-    let (kept, meshes) = scene::kept(recording.scene);
-    for (name, bytes) in &meshes {
-        writer.write_beside_scene(name, bytes)?;
+    if !recording.blind {
+        let (kept, meshes) = scene::kept(recording.scene);
+        for (name, bytes) in &meshes {
+            writer.write_beside_scene(name, bytes)?;
+        }
+        let resolved = scene::to_toml(&kept)
+            .map_err(|e| IoError::content(recording.out.join(dataset::SCENE), e.to_string()))?;
+        writer.write_scene(&resolved)?;
+        writer.write_truth(&truth)?;
     }
-    let resolved = scene::to_toml(&kept)
-        .map_err(|e| IoError::content(recording.out.join(dataset::SCENE), e.to_string()))?;
-    writer.write_scene(&resolved)?;
-    writer.write_truth(&truth)?;
     let mut tables = Vec::new();
     for (wanted, name, header, rows) in [
         (

@@ -1,7 +1,7 @@
 //! What a person would say about an experiment and a score.
 
 use super::page::{escape, number};
-use crate::score::{Score, words as score_words};
+use crate::score::{Honesty, Score, words as score_words};
 use catoptric_model::{Calibration, Dataset, PoseKind};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
@@ -180,12 +180,13 @@ fn honesty(score: &Score) -> String {
         };
     }
     if score.nees_mean.is_finite() {
-        let judgement = if score.nees_mean > score_words::OVER_CONFIDENT.0 {
-            "smaller than the errors made"
-        } else if score.nees_mean < score_words::UNDER_CONFIDENT_NEES {
-            "larger than the errors made"
-        } else {
-            "consistent with the errors made"
+        let judgement = match score.honesty {
+            Some(Honesty::OverConfident) => {
+                let times = number(score.nees_mean.sqrt(), 1);
+                format!("smaller than the errors made, which are {times} times as large")
+            }
+            Some(Honesty::UnderConfident) => "larger than the errors made".to_owned(),
+            Some(Honesty::Honest) | None => "consistent with the errors made".to_owned(),
         };
         text += &format!(
             " The stated uncertainty is {judgement}: {} % of them lie inside their 95 % ellipses.",

@@ -1,7 +1,8 @@
-//! The bounds an element's error is measured by, at the true angles: the limit of the whole experiment, and that of the
-//! element by itself.
+//! What the boards can tell, at the true angles: the bounds an element's error is measured by (that of the whole
+//! experiment, and that of the element by itself), and which elements their own boards leave open.
 
-use catoptric_calib::covariance::budget;
+use catoptric_calib::covariance::{MountUncertainty, budget};
+use catoptric_calib::observability::weakness;
 use catoptric_calib::observations::BoardInSensor;
 use catoptric_calib::{TrueDirection, limit};
 use catoptric_calib::{observations, pose};
@@ -9,7 +10,18 @@ use catoptric_model::{Dataset, Pose, PoseKind, PoseRecord};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
 use nalgebra::{Matrix2, Point3};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What the boards tell of the elements.
+#[derive(Debug, Default)]
+pub(super) struct Knowable {
+    /// The least covariance of (θ_a, φ), in rad², that an unbiased per-element estimate from these boards can have,
+    /// for every beam that is deflected once.
+    pub(super) bounds: BTreeMap<usize, Matrix2<f64>>,
+    /// Elements, deflected and unsplit, that their own boards leave open: fewer than two boards are hit, or a direction
+    /// is known to no better than [`WEAKEST_SD`](catoptric_calib::observability::WEAKEST_SD).
+    pub(super) open: BTreeSet<usize>,
+}
 
 /// The least covariance of (θ_a, φ), in rad², that any estimate from this dataset can have, for every beam that is
 /// deflected once and unsplit: facets, boards, mounting and biases are common to all of them.
@@ -38,12 +50,11 @@ pub(super) fn of_experiment(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize,
         .collect()
 }
 
-/// The least covariance of (θ_a, φ), in rad², that an unbiased per-element estimate from these boards can have, for
-/// every beam that is deflected once.
+/// What the boards of a dataset tell of every beam that is deflected once.
 ///
 /// The boards are those that the true ray meets farther from the edge than its spot; the mounting is as uncertain as
 /// this dataset leaves it. A method that ties elements together, by their facet, may do better.
-pub(super) fn at_truth(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize, Matrix2<f64>> {
+pub(super) fn at_truth(dataset: &Dataset, truth: &Truth) -> Knowable {
     let session = &dataset.session;
     let summaries: Vec<_> = dataset.poses.iter().map(PoseRecord::summarize).collect();
     let mount = pose::estimate(dataset, &summaries).uncertainty;
@@ -59,7 +70,7 @@ pub(super) fn at_truth(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize, Matr
         .collect();
     let cone = observations::cone_half_angle(session);
     let noise_sd = session.believed.range_noise_sd_mm * 1e-3;
-    let mut bounds = BTreeMap::new();
+    let mut knowable = Knowable::default();
     for beam in &truth.beams {
         let Some(deflection) = beam.deflection() else {
             continue;
@@ -77,8 +88,15 @@ pub(super) fn at_truth(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize, Matr
             })
             .collect();
         if let Some(bound) = budget(session, &mount, azimuth, &deflection, &views).and_then(|b| b.bound()) {
-            bounds.insert(beam.beam, bound);
+            knowable.bounds.insert(beam.beam, bound);
+        }
+        // What is not known of the mounting turns all beams alike, whatever the boards.
+        let boards_alone = budget(session, &MountUncertainty::none(), azimuth, &deflection, &views);
+        let is_open =
+            views.len() < 2 || boards_alone.is_some_and(|b| weakness(&b, deflection.elevation).is_some());
+        if beam.status == BeamClass::Deflected && is_open {
+            knowable.open.insert(beam.beam);
         }
     }
-    bounds
+    knowable
 }

@@ -2,19 +2,14 @@
 
 use super::element::solved;
 use super::statistics::mean;
-use super::{ApartScore, BeamCounts, ElementError};
+use super::{ApartScore, BeamCounts, CHI_SQUARED_999, ElementError, OpenCounts};
 use catoptric_model::{BeamEstimate, Calibration, Dataset, Status};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Elements that came back, those that did not, and those that should not have.
 pub(super) fn count(calibration: &Calibration, truth: Option<&Truth>) -> BeamCounts {
-    let has_reason = |b: &BeamEstimate| b.reason.as_ref().is_some_and(|r| !r.trim().is_empty());
-    let abstains = |b: &BeamEstimate| match b.status {
-        Status::Solved | Status::Direct => false,
-        Status::TooFewPoses | Status::Unobservable | Status::NotConverged | Status::Rejected => has_reason(b),
-    };
     let Some(truth) = truth else {
         return BeamCounts {
             solved: calibration.beams.iter().filter_map(solved).count(),
@@ -47,6 +42,34 @@ pub(super) fn count(calibration: &Calibration, truth: Option<&Truth>) -> BeamCou
         missed: Some(missed),
         wrong: Some(wrong),
         ..counts
+    }
+}
+
+/// Whether an entry has no direction, and says so and why.
+fn abstains(b: &BeamEstimate) -> bool {
+    match b.status {
+        Status::Solved | Status::Direct => false,
+        Status::TooFewPoses | Status::Unobservable | Status::NotConverged | Status::Rejected => {
+            b.reason.as_ref().is_some_and(|r| !r.trim().is_empty())
+        }
+    }
+}
+
+/// What became of the elements that their boards leave open.
+pub(super) fn open(
+    calibration: &Calibration,
+    elements: &[ElementError],
+    open: &BTreeSet<usize>,
+) -> OpenCounts {
+    let solved = || elements.iter().filter(|e| open.contains(&e.beam));
+    let entries = open.iter().filter_map(|&b| calibration.beam(b));
+    OpenCounts {
+        elements: open.len(),
+        abstained: entries.filter(|b| abstains(b)).count(),
+        solved: solved().count(),
+        wrong: solved()
+            .filter(|e| e.mahalanobis_squared.is_some_and(|m| m > CHI_SQUARED_999))
+            .count(),
     }
 }
 

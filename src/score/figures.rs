@@ -1,6 +1,6 @@
 //! What a score consists of.
 
-use super::{ElementError, SurfaceResidual};
+use super::{ElementError, Honesty, SurfaceResidual};
 use catoptric_sim::truth::BeamClass;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -13,7 +13,7 @@ pub enum Verdict {
     Pass,
     /// An element is missed or false, the covariance is dishonest, or the error is above the limit set.
     Fail,
-    /// There is no truth to judge by.
+    /// There is nothing to judge: no truth, or no mirror that deflects anything.
     Blind,
 }
 
@@ -42,6 +42,19 @@ pub struct BeamCounts {
     /// Solved elements that are direct, blocked or lost in truth, or do not exist. `None` without a truth.
     #[serde(rename = "false")]
     pub wrong: Option<usize>,
+}
+
+/// Elements, deflected and unsplit in truth, that their own boards leave open.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct OpenCounts {
+    /// How many there are.
+    pub elements: usize,
+    /// Of these, those without a direction whose status says so and why: that is right.
+    pub abstained: usize,
+    /// Of these, those with a direction.
+    pub solved: usize,
+    /// Of the solved ones, those whose truth lies outside of the 99.9 % ellipse that is stated.
+    pub wrong: usize,
 }
 
 /// Distribution of an angle, in degrees.
@@ -97,8 +110,12 @@ pub struct Score {
     pub method: String,
     /// What it comes to.
     pub verdict: Verdict,
+    /// Whether errors are as large as the stated covariance says; `None` where nothing tells.
+    pub honesty: Option<Honesty>,
     /// What became of the elements.
     pub beams: BeamCounts,
+    /// What became of the elements that the boards leave open. `None` without a truth.
+    pub open: Option<OpenCounts>,
     /// How many elements the calibration gives each status; "absent" for those it does not mention.
     pub statuses: BTreeMap<&'static str, usize>,
     /// Angle between estimated and true direction, in the sensor frame.
@@ -155,13 +172,17 @@ pub struct Score {
 impl Score {
     /// Sets a limit for the per-axis error, in degrees: a score above it, or without one, fails.
     ///
-    /// A blind score stays blind.
+    /// A blind score stays blind, and one that rightly solves nothing, since the boards leave every element open, keeps
+    /// its verdict.
     #[must_use]
     pub fn with_limit(mut self, max_rms_deg: f64) -> Self {
         let error = self.per_axis_rms_deg;
         match self.verdict {
             Verdict::Blind => self.warnings.push(format!(
-                "the limit of {max_rms_deg}° was not tested: there is no truth"
+                "the limit of {max_rms_deg}° was not tested: there is nothing to judge"
+            )),
+            Verdict::Pass | Verdict::Fail if self.rightly_solves_nothing() => self.warnings.push(format!(
+                "the limit of {max_rms_deg}° was not tested: the boards leave every element open, and none is solved"
             )),
             Verdict::Pass | Verdict::Fail if error <= max_rms_deg => {}
             Verdict::Pass | Verdict::Fail => {
@@ -178,6 +199,11 @@ impl Score {
             }
         }
         self
+    }
+
+    fn rightly_solves_nothing(&self) -> bool {
+        let open = self.open.map_or(0, |o| o.elements);
+        self.beams.solved == 0 && open > 0 && Some(open) == self.beams.deflected
     }
 
     /// The errors that the accuracy is counted from: solved, deflected and unsplit.

@@ -14,7 +14,9 @@
 //! efficiency        mean(C_θθ·cos²φ + C_φφ) / mean((cos φ·δθ)² + δφ²)
 //! ```
 //!
-//! Every element that the truth deflects unsplit is one of solved, abstained or missed. Figures that do not exist
+//! Every element that the truth deflects unsplit is one of solved, abstained or missed. Those that their own boards leave
+//! open are counted once more: abstaining is right there, and a direction is wrong if the truth lies outside of the
+//! 99.9 % ellipse that is stated for it (a method may know more than the boards, from a facet or the drawing). Figures that do not exist
 //! are NaN here and `null` in JSON, with the reason in `nulls`.
 
 mod bound;
@@ -22,6 +24,7 @@ pub(crate) mod counts;
 mod directions;
 mod element;
 mod figures;
+mod honesty;
 mod nulls;
 pub mod residual;
 mod statistics;
@@ -31,14 +34,15 @@ use catoptric_model::frame::Pose;
 use catoptric_model::{Calibration, Dataset, PoseRecord, Track, TrackedFrame};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
-use counts::{apart, count, statuses};
+use counts::{apart, count, open, statuses};
 use directions::Directions;
 use element::compare;
 use statistics::{largest, mean, rms};
 use std::collections::BTreeMap;
 
 pub use element::ElementError;
-pub use figures::{ApartScore, BeamCounts, DistanceError, PointError, Score, Spread, Verdict};
+pub use figures::{ApartScore, BeamCounts, DistanceError, OpenCounts, PointError, Score, Spread, Verdict};
+pub use honesty::Honesty;
 pub use residual::SurfaceResidual;
 pub use statistics::percentile;
 
@@ -47,6 +51,9 @@ pub const SCHEMA_VERSION: u32 = 1;
 
 /// 95 % quantile of χ² with two degrees of freedom: −2·ln 0.05.
 pub const CHI_SQUARED_95: f64 = 5.991_464_547_107_979;
+
+/// 99.9 % quantile of the same: −2·ln 0.001.
+pub const CHI_SQUARED_999: f64 = 13.815_510_557_964_274;
 
 /// Mean NEES above which a covariance is dishonest beyond bad luck.
 ///
@@ -62,7 +69,12 @@ pub const POINT_RANGES_M: [f64; 3] = [1.0, 4.0, 10.0];
 pub fn score(dataset: &Dataset, calibration: &Calibration, truth: Option<&Truth>) -> Score {
     let boards_mm = residual::boards(dataset, calibration);
     let walls_mm = residual::walls(dataset, calibration);
-    let elements = truth.map_or_else(Vec::new, |truth| compare(dataset, calibration, truth));
+    let knowable = truth.map(|truth| bound::at_truth(dataset, truth));
+    let elements = truth
+        .zip(knowable.as_ref())
+        .map_or_else(Vec::new, |(truth, knowable)| {
+            compare(dataset, calibration, truth, knowable)
+        });
     let scored: Vec<&ElementError> = elements
         .iter()
         .filter(|e| e.class == BeamClass::Deflected)
@@ -93,7 +105,9 @@ pub fn score(dataset: &Dataset, calibration: &Calibration, truth: Option<&Truth>
         schema_version: SCHEMA_VERSION,
         method: calibration.method.clone(),
         verdict: Verdict::Blind,
+        honesty: None,
         beams: count(calibration, truth),
+        open: knowable.map(|k| open(calibration, &elements, &k.open)),
         statuses: statuses(dataset, calibration),
         direction_deg: in_sensor.spread_deg(),
         per_axis_rms_deg: (0.5 * mean(scored.iter().map(squares))).sqrt().to_degrees(),

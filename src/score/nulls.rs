@@ -96,9 +96,21 @@ pub(super) fn nulls(
             "no solved element reads a wall of the empty room",
         ),
     ];
-    figures
+    let mut nulls: BTreeMap<_, _> = figures
         .into_iter()
         .filter(|(_, value, _)| !value.is_finite())
         .map(|(key, _, reason)| (key, reason))
-        .collect()
+        .collect();
+    if score.open.is_none() {
+        nulls.insert("open", "there is no truth");
+    }
+    if score.honesty.is_none() {
+        let reason = if score.nees_mean.is_nan() {
+            "no scored element has a covariance"
+        } else {
+            "the errors are numerical, and do not tell"
+        };
+        nulls.insert("honesty", because(reason));
+    }
+    nulls
 }

@@ -132,7 +132,7 @@ fn errors_are_counted_as_the_formulas_say() {
         let expected = 12.5 + s * cross + s * s * chord;
         assert!((found.powi(2) - expected).abs() < 1e-3 * expected, "{s} m");
     }
-    let bounds = bound::at_truth(&s.dataset, &s.truth);
+    let bounds = bound::of_experiment(&s.dataset, &s.truth);
     let trace = mean([a, b].iter().map(|beam| {
         let c = s.truth.beams[*beam].elevation_rad.expect("deflected").cos();
         bounds[beam][(0, 0)] * c * c + bounds[beam][(1, 1)]
@@ -162,8 +162,141 @@ fn a_covariance_a_tenth_too_small_per_axis_fails() {
     }
     let score = score(&s.dataset, &calibration, Some(&s.truth));
     assert_eq!(score.verdict, Verdict::Fail);
-    assert!(score.warnings[0].starts_with("fails: the stated covariance is dishonest"));
+    assert!(score.warnings[0].starts_with("fails: over-confident: errors are "));
     assert!((score.nees_mean - 100.0).abs() < 20.0);
+}
+
+/// A submission of known errors whose covariance is `factor` times what it should be.
+fn stated(truth: &Truth, factor: f64) -> Calibration {
+    let mut calibration = noisy(truth, 1e-3, 3);
+    for b in &mut calibration.beams {
+        b.covariance_rad2 = b.covariance_rad2.map(|c| c.map(|row| row.map(|x| x * factor)));
+    }
+    calibration
+}
+
+#[test]
+fn honesty_is_called_by_its_name_and_size() {
+    let s = sample();
+    let of = |calibration: &Calibration, truth| score(&s.dataset, calibration, truth);
+    let honest = of(&stated(&s.truth, 1.0), Some(&s.truth));
+    assert_eq!(honest.honesty, Some(Honesty::Honest));
+    assert!(!honest.warnings.iter().any(|w| w.contains("-confident")));
+    let under = of(&stated(&s.truth, 25.0), Some(&s.truth));
+    assert_eq!(under.honesty, Some(Honesty::UnderConfident));
+    assert!(
+        under
+            .warnings
+            .iter()
+            .any(|w| w.starts_with("under-confident: errors are 0.2"))
+    );
+    // Errors of 1 under a covariance of (1/8)², with the scatter of some 400 elements.
+    let over = of(&stated(&s.truth, 1.0 / 64.0), Some(&s.truth));
+    assert_eq!(
+        (over.honesty, over.verdict),
+        (Some(Honesty::OverConfident), Verdict::Fail)
+    );
+    let times: f64 = over.warnings[0]
+        .split("errors are ")
+        .nth(1)
+        .and_then(|rest| rest.split(' ').next()?.parse().ok())
+        .expect("it says how many times");
+    assert!((times - 8.0).abs() < 0.5, "{}", over.warnings[0]);
+    assert_eq!(
+        over.warnings
+            .iter()
+            .filter(|w| w.contains("over-confident"))
+            .count(),
+        1
+    );
+    assert_eq!(
+        of(&stated(&s.truth, 1.0 / 4.0), Some(&s.truth)).verdict,
+        Verdict::Pass
+    );
+    for (nothing_told, reason) in [
+        (of(&stated(&s.truth, 1.0), None), "there is no truth"),
+        (
+            of(&perfect(&s.truth), Some(&s.truth)),
+            "the errors are numerical, and do not tell",
+        ),
+    ] {
+        assert_eq!(nothing_told.honesty, None);
+        assert_eq!(nothing_told.nulls["honesty"], reason);
+    }
+}
+
+#[test]
+fn what_the_boards_leave_open_is_rightly_not_solved() {
+    let s = sample();
+    let mut dataset = s.dataset.clone();
+    // No board before any mirror.
+    dataset
+        .poses
+        .retain(|p| p.label.kind != catoptric_model::PoseKind::Facet);
+    let all = deflected(&s.truth).len();
+    let mut abstaining = perfect(&s.truth);
+    for b in abstaining.beams.iter_mut().filter(|b| b.status == Status::Solved) {
+        *b = BeamEstimate::without_angles(b.beam, Status::TooFewPoses, Some("no board".to_owned()));
+    }
+    let right = score(&dataset, &abstaining, Some(&s.truth)).with_limit(0.1);
+    let counts = |abstained, solved, wrong| {
+        Some(OpenCounts {
+            elements: all,
+            abstained,
+            solved,
+            wrong,
+        })
+    };
+    assert_eq!((right.verdict, right.open), (Verdict::Pass, counts(all, 0, 0)));
+    assert!(
+        right
+            .warnings
+            .iter()
+            .any(|w| w.starts_with("the limit of 0.1° was not tested"))
+    );
+    // Where nothing is open the same abstentions do not reach the limit.
+    let needless = score(&s.dataset, &abstaining, Some(&s.truth)).with_limit(0.1);
+    assert_eq!(
+        (needless.verdict, needless.open.map(|o| o.elements)),
+        (Verdict::Fail, Some(0))
+    );
+    // Who knows more than the boards may solve; who claims more than he knows is wrong.
+    let knows = score(&dataset, &noisy(&s.truth, 1e-3, 3), Some(&s.truth));
+    assert_eq!(knows.verdict, Verdict::Pass, "{:?}", knows.warnings);
+    assert!(knows.open.is_some_and(|o| o.solved == all && o.wrong <= 3));
+    let claims = score(&dataset, &stated(&s.truth, 1e-4), Some(&s.truth));
+    assert!(claims.open.is_some_and(|o| 2 * o.wrong > o.solved));
+    assert!(
+        claims
+            .warnings
+            .iter()
+            .any(|w| w.starts_with("fails: ") && w.contains("left open by the boards")),
+        "{:?}",
+        claims.warnings
+    );
+}
+
+#[test]
+fn without_a_mirror_there_is_nothing_to_judge() {
+    let s = sample();
+    let mut truth = s.truth.clone();
+    for b in &mut truth.beams {
+        b.status = BeamClass::Direct;
+    }
+    let nothing_solved = Calibration {
+        beams: Vec::new(),
+        ..perfect(&s.truth)
+    };
+    let score_of = |calibration: &Calibration| score(&s.dataset, calibration, Some(&truth));
+    let nothing = score_of(&nothing_solved);
+    assert_eq!(
+        (nothing.verdict, nothing.beams.deflected),
+        (Verdict::Blind, Some(0))
+    );
+    assert!(nothing.warnings[0].ends_with("there is nothing to judge"));
+    // But a direction for a beam that no mirror deflects is false.
+    let solved = perfect(&s.truth);
+    assert_eq!(score_of(&solved).verdict, Verdict::Fail);
 }
 
 #[test]
@@ -285,6 +418,8 @@ fn json_has_the_keys_of_the_interface() {
         }
     }
     assert!(json.get("elements").is_none());
+    assert_eq!(json["honesty"], "honest");
+    assert_eq!(json["open"]["elements"], 0);
     assert_eq!(
         json["nulls"].as_object().map(serde_json::Map::len),
         Some(2),

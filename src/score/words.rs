@@ -1,31 +1,22 @@
 //! What a score comes to, and why, in words.
 
+use super::honesty::{self, Honesty};
 use super::nulls::nulls;
 use super::{DISHONEST_NEES, Score, Verdict};
 use catoptric_model::{Calibration, Status};
 use std::collections::BTreeMap;
 
-/// Mean NEES, and coverage below which, a covariance is called too small without failing the score.
-pub(crate) const OVER_CONFIDENT: (f64, f64) = (2.0, 0.85);
-/// Mean NEES below which a covariance is called too large: if all elements share one error, an honest one is there in
-/// one run of ten.
-pub(crate) const UNDER_CONFIDENT_NEES: f64 = 0.1;
 /// Share of the squared error beyond which one rotation is said to dominate it.
 pub(crate) const DOMINANT_SHARE: f64 = 0.5;
 /// Share of the elements beyond which abstentions are worth a word.
 const MANY: f64 = 0.1;
-/// Below this an error is numerical, and nothing is at fault for it, in degrees.
-const NEGLIGIBLE_DEG: f64 = 1e-6;
-
 /// What warnings say whose matter a report tells in sentences of its own.
-const OVER: &str = "over-confident";
-const UNDER: &str = "under-confident";
 const COMMON: &str = "common mode dominates";
 const UNSOLVED: &str = "elements were not solved";
 
 /// Whether a warning is about accuracy, covariance or abstentions, of which a report speaks anyway.
 pub(crate) fn is_told(warning: &str) -> bool {
-    [OVER, UNDER, COMMON, UNSOLVED]
+    [honesty::OVER, honesty::UNDER, COMMON, UNSOLVED]
         .iter()
         .any(|words| warning.contains(words))
 }
@@ -37,15 +28,21 @@ pub(crate) fn common_share(score: &Score) -> f64 {
 
 /// Sets the verdict, and writes down its reasons, the warnings, and why figures are missing.
 pub(super) fn judge(score: &mut Score, calibration: &Calibration, has_truth: bool) {
+    score.honesty = honesty::of(score);
     let failures = failures(score);
-    score.verdict = match (has_truth, failures.is_empty()) {
-        (false, _) => Verdict::Blind,
+    score.verdict = match (has_truth && !nothing_deflected(score), failures.is_empty()) {
+        (_, false) => Verdict::Fail,
         (true, true) => Verdict::Pass,
-        (true, false) => Verdict::Fail,
+        (false, true) => Verdict::Blind,
     };
     score.warnings = failures;
     score.warnings.extend(warnings(score, calibration, has_truth));
     score.nulls = nulls(score, calibration, has_truth);
+}
+
+/// Whether there is a truth, and no element in it whose direction could be asked for.
+fn nothing_deflected(score: &Score) -> bool {
+    score.beams.deflected == Some(0)
 }
 
 fn failures(score: &Score) -> Vec<String> {
@@ -66,8 +63,15 @@ fn failures(score: &Score) -> Vec<String> {
     // Infinity is above the limit too; NaN, which is no covariance, is not.
     if score.nees_mean > DISHONEST_NEES {
         failures.push(format!(
-            "fails: the stated covariance is dishonest, the mean normalised squared error is {} where 1 is honest and {DISHONEST_NEES} the limit",
-            number(score.nees_mean)
+            "fails: {}; {DISHONEST_NEES} is the limit for a mean normalised squared error",
+            honesty::over_confident(score)
+        ));
+    }
+    // If all of them share one error, an honest covariance has all of them wrong once in a thousand runs.
+    if let Some(open) = score.open.filter(|o| o.wrong > 0 && 2 * o.wrong > o.solved) {
+        failures.push(format!(
+            "fails: {} left open by the boards and given a direction with a covariance that rules out the truth; abstaining is right there",
+            elements(open.wrong, "is", "are")
         ));
     }
     failures
@@ -87,18 +91,25 @@ fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<St
                 .to_owned(),
         );
     }
-    let (nees, coverage) = (score.nees_mean, score.coverage_95);
-    if nees > OVER_CONFIDENT.0 || coverage < OVER_CONFIDENT.1 {
-        warnings.push(format!(
-            "{OVER}: {:.0} % of the errors are inside their 95 % ellipses and the mean normalised squared error is {}",
-            coverage * 100.0,
-            number(nees)
-        ));
+    if nothing_deflected(score) {
+        warnings
+            .push("no element is deflected by a mirror and unsplit: there is nothing to judge".to_owned());
     }
-    if nees < UNDER_CONFIDENT_NEES && score.per_axis_rms_deg > NEGLIGIBLE_DEG {
+    match score.honesty {
+        Some(Honesty::OverConfident) if score.nees_mean <= DISHONEST_NEES => {
+            warnings.push(honesty::over_confident(score));
+        }
+        Some(Honesty::UnderConfident) => warnings.push(honesty::under_confident(score)),
+        Some(Honesty::OverConfident | Honesty::Honest) | None => {}
+    }
+    if let Some(open) = score.open.filter(|o| o.elements > 0) {
         warnings.push(format!(
-            "{UNDER}: the mean normalised squared error is {} where 1 is honest",
-            number(nees)
+            "their own boards leave {} of {} elements open: {} abstained there, which is right, {} solved, {} of these wrong by what they state",
+            open.elements,
+            score.beams.deflected.unwrap_or_default(),
+            open.abstained,
+            open.solved,
+            open.wrong
         ));
     }
     let stated = score.scored().filter(|e| e.mahalanobis_squared.is_some()).count();
@@ -110,7 +121,7 @@ fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<St
         ));
     }
     let share = common_share(score);
-    if share > DOMINANT_SHARE && score.per_axis_rms_deg > NEGLIGIBLE_DEG {
+    if share > DOMINANT_SHARE && score.per_axis_rms_deg > honesty::NEGLIGIBLE_DEG {
         warnings.push(format!(
             "{COMMON}: one rotation of {:.4}° shared by all elements makes {:.0} % of the squared error, as an error of the sensor's mounting does",
             score.common_mode_deg,
@@ -204,13 +215,5 @@ pub(crate) fn elements(count: usize, one: &str, many: &str) -> String {
         format!("1 element {one}")
     } else {
         format!("{count} elements {many}")
-    }
-}
-
-fn number(value: f64) -> String {
-    if value.is_finite() {
-        format!("{value:.2}")
-    } else {
-        "infinite".to_owned()
     }
 }
