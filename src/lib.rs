@@ -27,6 +27,7 @@ pub mod guide;
 pub mod io;
 pub mod report;
 pub mod score;
+pub mod study;
 pub mod tables;
 pub mod validate;
 

@@ -18,6 +18,7 @@ mod report;
 mod schema;
 mod score;
 mod simulate;
+mod study;
 mod sub_rays;
 mod trace;
 mod truth_tables;
@@ -78,6 +79,8 @@ enum Verb {
     Score(score::Arguments),
     /// Put several calibrations of one dataset side by side, ours or anybody's
     Compare(compare::Arguments),
+    /// Run many experiments and say what their errors have in common
+    Study(study::Arguments),
     /// Turn a scan into a point cloud
     Apply(apply::Arguments),
     /// Write a page to read about calibrations and their scores
@@ -147,6 +150,7 @@ fn run(cli: Cli) -> Result<(), CliError> {
         Verb::Validate(arguments) => validate::run(&arguments),
         Verb::Score(arguments) => score::run(&arguments, &context),
         Verb::Compare(arguments) => compare::run(&arguments),
+        Verb::Study(arguments) => study::run(&arguments, &context),
         Verb::Apply(arguments) => apply::run(&arguments, &context),
         Verb::Report(arguments) => report::run(&arguments, &context),
         Verb::New(arguments) => new::run(&arguments),

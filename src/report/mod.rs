@@ -9,10 +9,12 @@ mod figure;
 mod page;
 mod plots;
 mod scores;
+mod study;
 mod verdict;
 mod words;
 
 pub use characterization::characterization;
+pub use study::study;
 
 use crate::apply::PointCloud;
 use crate::score::Score;

@@ -14,7 +14,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// What the boards tell of the elements.
 #[derive(Debug, Default)]
-pub(super) struct Knowable {
+pub struct Knowable {
+    /// Limit of the experiment for each beam, covariance of (θ_a, φ) in rad².
+    pub(super) limits: BTreeMap<usize, Matrix2<f64>>,
     /// The least covariance of (θ_a, φ), in rad², that an unbiased per-element estimate from these boards can have,
     /// for every beam that is deflected once.
     pub(super) bounds: BTreeMap<usize, Matrix2<f64>>,
@@ -25,7 +27,7 @@ pub(super) struct Knowable {
 
 /// The least covariance of (θ_a, φ), in rad², that any estimate from this dataset can have, for every beam that is
 /// deflected once and unsplit: facets, boards, mounting and biases are common to all of them.
-pub(super) fn of_experiment(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize, Matrix2<f64>> {
+fn of_experiment(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize, Matrix2<f64>> {
     let believed = &dataset.session.believed;
     if believed.range_noise_sd_mm == 0.0 {
         // Nothing is believed to be in the way.
@@ -54,7 +56,7 @@ pub(super) fn of_experiment(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize,
 ///
 /// The boards are those that the true ray meets farther from the edge than its spot; the mounting is as uncertain as
 /// this dataset leaves it. A method that ties elements together, by their facet, may do better.
-pub(super) fn at_truth(dataset: &Dataset, truth: &Truth) -> Knowable {
+pub fn knowable(dataset: &Dataset, truth: &Truth) -> Knowable {
     let session = &dataset.session;
     let summaries: Vec<_> = dataset.poses.iter().map(PoseRecord::summarize).collect();
     let mount = pose::estimate(dataset, &summaries).uncertainty;
@@ -70,7 +72,10 @@ pub(super) fn at_truth(dataset: &Dataset, truth: &Truth) -> Knowable {
         .collect();
     let cone = observations::cone_half_angle(session);
     let noise_sd = session.believed.range_noise_sd_mm * 1e-3;
-    let mut knowable = Knowable::default();
+    let mut knowable = Knowable {
+        limits: of_experiment(dataset, truth),
+        ..Knowable::default()
+    };
     for beam in &truth.beams {
         let Some(deflection) = beam.deflection() else {
             continue;

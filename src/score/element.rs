@@ -1,8 +1,8 @@
 //! The errors of each element, and the elements among which something is counted.
 
-use super::bound::{self, Knowable};
+use super::bound::Knowable;
 use super::statistics::mahalanobis_squared;
-use catoptric_model::{BeamEstimate, Calibration, Dataset, Deflection};
+use catoptric_model::{BeamEstimate, Calibration, Deflection};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
 use nalgebra::{Matrix2, Vector2};
@@ -37,13 +37,7 @@ pub struct ElementError {
 }
 
 /// The errors of every solved element that the truth deflects once.
-pub(super) fn compare(
-    dataset: &Dataset,
-    calibration: &Calibration,
-    truth: &Truth,
-    knowable: &Knowable,
-) -> Vec<ElementError> {
-    let limits = bound::of_experiment(dataset, truth);
+pub(super) fn compare(calibration: &Calibration, truth: &Truth, knowable: &Knowable) -> Vec<ElementError> {
     let mut elements = Vec::new();
     for true_beam in &truth.beams {
         let (Some(actual), Some(estimate)) = (true_beam.deflection(), calibration.beam(true_beam.beam))
@@ -76,7 +70,10 @@ pub(super) fn compare(
             up: error.y,
             sigma: covariance.map(|c| [cos * c[(0, 0)].sqrt(), c[(1, 1)].sqrt()]),
             mahalanobis_squared: covariance.map(|c| mahalanobis_squared(&error, &c)),
-            bound: limits.get(&true_beam.beam).map(|b| to_tangent * b * to_tangent),
+            bound: knowable
+                .limits
+                .get(&true_beam.beam)
+                .map(|b| to_tangent * b * to_tangent),
             alone_bound: knowable
                 .bounds
                 .get(&true_beam.beam)

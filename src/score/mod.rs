@@ -40,6 +40,7 @@ use element::compare;
 use statistics::{largest, mean, rms};
 use std::collections::BTreeMap;
 
+pub use bound::{Knowable, knowable};
 pub use element::ElementError;
 pub use figures::{ApartScore, BeamCounts, DistanceError, OpenCounts, PointError, Score, Spread, Verdict};
 pub use honesty::Honesty;
@@ -67,14 +68,23 @@ pub const POINT_RANGES_M: [f64; 3] = [1.0, 4.0, 10.0];
 
 /// Scores a calibration against the truth; without one, against boards and walls only.
 pub fn score(dataset: &Dataset, calibration: &Calibration, truth: Option<&Truth>) -> Score {
+    let knowable = truth.map(|truth| knowable(dataset, truth));
+    score_by(dataset, calibration, truth.zip(knowable.as_ref()))
+}
+
+/// Scores a calibration against the truth and what can be known of it, which several calibrations of a dataset share.
+pub fn score_by(
+    dataset: &Dataset,
+    calibration: &Calibration,
+    reference: Option<(&Truth, &Knowable)>,
+) -> Score {
+    let truth = reference.map(|(truth, _)| truth);
+    let knowable = reference.map(|(_, knowable)| knowable);
     let boards_mm = residual::boards(dataset, calibration);
     let walls_mm = residual::walls(dataset, calibration);
-    let knowable = truth.map(|truth| bound::at_truth(dataset, truth));
-    let elements = truth
-        .zip(knowable.as_ref())
-        .map_or_else(Vec::new, |(truth, knowable)| {
-            compare(dataset, calibration, truth, knowable)
-        });
+    let elements = reference.map_or_else(Vec::new, |(truth, knowable)| {
+        compare(calibration, truth, knowable)
+    });
     let scored: Vec<&ElementError> = elements
         .iter()
         .filter(|e| e.class == BeamClass::Deflected)

@@ -190,7 +190,16 @@ proptest! {
             others: Vec::new(),
         };
         let [drift, warm_up, correlated, interference] = offsets;
-        let chance = Chance { drift, warm_up, correlated, interference, noise, dropout, detection: [0.5; 8] };
+        let chance = Chance {
+            drift,
+            element: 0.0,
+            warm_up,
+            correlated,
+            interference,
+            noise,
+            dropout,
+            detection: [0.5; 8],
+        };
         let reading = sensor.read(Some(&found), &chance);
         let exact = range + offsets.iter().sum::<f64>() + noise_sd * noise;
         let step = step_mm * 1e-3;

@@ -1,0 +1,195 @@
+//! What the runs of each contestant in each cell have in common.
+
+use super::statistics::{bias_p_value, clopper_pearson, mean_bounds};
+use super::{Run, SCHEMA_VERSION, Study};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Probability of the bounds on ANEES.
+const PROBABILITY: f64 = 0.999;
+
+/// A study's result: `study.json`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// Version of this format.
+    pub schema_version: u32,
+    /// Seeds of every cell.
+    pub seeds: u64,
+    /// One entry for each contestant in each cell.
+    pub methods: Vec<MethodSummary>,
+}
+
+/// A contestant in a cell. A figure that does not exist is NaN here and `null` in JSON.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MethodSummary {
+    /// Name of the contestant.
+    pub method: String,
+    /// Values of the axes.
+    pub axes: BTreeMap<String, String>,
+    /// Experiments.
+    pub runs: usize,
+    /// Experiments without a calibration.
+    pub failed: usize,
+    /// Why the first of them has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
+    /// Mean over the runs of deflected elements solved, abstained, missed, and of others solved by mistake.
+    pub solved: f64,
+    /// As `solved`.
+    pub abstained: f64,
+    /// As `solved`.
+    pub missed: f64,
+    /// As `solved`.
+    #[serde(rename = "false")]
+    pub wrong: f64,
+    /// Root mean square error along an axis, in degrees.
+    pub per_axis_rms_deg: f64,
+    /// Median over the runs of the same.
+    pub per_axis_median_deg: f64,
+    /// As `per_axis_rms_deg`, in the room frame.
+    pub per_axis_rms_room_deg: f64,
+    /// Limit on it, in degrees.
+    pub crlb_per_axis_deg: f64,
+    /// 1 / mean(error²/limit²) over the runs: 1 is the best that can be.
+    pub efficiency: f64,
+    /// Its standard error.
+    pub efficiency_se: f64,
+    /// Mean eᵀP⁻¹e/2 of one element per run: 1 if the covariance is honest.
+    pub anees: f64,
+    /// 99.9 % bounds of an honest one.
+    pub anees_bounds: [f64; 2],
+    /// Coverage of the same elements' ellipses.
+    pub coverage_68: Coverage,
+    /// As `coverage_68`.
+    pub coverage_95: Coverage,
+    /// As `coverage_68`.
+    pub coverage_99: Coverage,
+    /// Chance of a mean error as large without bias.
+    pub bias_p_value: f64,
+    /// What the figures say of its honesty.
+    pub verdict: String,
+}
+
+/// A share with its interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Coverage {
+    /// The share.
+    pub share: f64,
+    /// 95 % interval of Clopper and Pearson.
+    pub interval: [f64; 2],
+}
+
+/// Sums up runs, which must be in the order of the study's jobs and contestants.
+pub fn summarize(study: &Study, runs: &[Run]) -> Summary {
+    let mut methods = Vec::new();
+    for (index, cell) in study.cells.iter().enumerate() {
+        for contestant in &study.contestants {
+            let name = contestant.name();
+            let of_one: Vec<&Run> = runs
+                .iter()
+                .filter(|r| r.cell == index && r.method == name)
+                .collect();
+            let axes = cell.values.iter().cloned().collect();
+            methods.push(summary(name, axes, &of_one));
+        }
+    }
+    Summary {
+        schema_version: SCHEMA_VERSION,
+        seeds: study.seeds,
+        methods,
+    }
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
+    sum / count
+}
+
+fn summary(method: String, axes: BTreeMap<String, String>, runs: &[&Run]) -> MethodSummary {
+    let count = |of: fn(&Run) -> usize| mean(runs.iter().map(|r| of(r) as f64));
+    let solved: Vec<&&Run> = runs.iter().filter(|r| r.square.is_finite()).collect();
+    let root = |of: fn(&Run) -> f64| {
+        mean(solved.iter().map(|r| of(r)).filter(|v| v.is_finite()))
+            .sqrt()
+            .to_degrees()
+    };
+    let ratios: Vec<f64> = solved
+        .iter()
+        .map(|r| r.square / r.bound_square)
+        .filter(|v| v.is_finite())
+        .collect();
+    let ratio = mean(ratios.iter().copied());
+    let scatter = mean(ratios.iter().map(|r| (r - ratio).powi(2)));
+    let mut errors: Vec<f64> = solved.iter().map(|r| r.square.sqrt().to_degrees()).collect();
+    errors.sort_by(f64::total_cmp);
+    let squares: Vec<f64> = solved
+        .iter()
+        .map(|r| r.mahalanobis_squared)
+        .filter(|v| v.is_finite())
+        .collect();
+    let anees = mean(squares.iter().map(|m| 0.5 * m));
+    let anees_bounds = mean_bounds(squares.len(), PROBABILITY);
+    let coverage = |share: f64| {
+        // The quantile of χ² with two degrees of freedom is −2·ln(1 − p).
+        let limit = -2.0 * libm::log(1.0 - share);
+        let hits = squares.iter().filter(|m| **m <= limit).count();
+        Coverage {
+            share: hits as f64 / squares.len() as f64,
+            interval: if squares.is_empty() {
+                [f64::NAN; 2]
+            } else {
+                clopper_pearson(hits, squares.len())
+            },
+        }
+    };
+    let single: Vec<[f64; 2]> = solved
+        .iter()
+        .filter(|r| r.across.is_finite())
+        .map(|r| [r.across, r.up])
+        .collect();
+    let failures: Vec<&&Run> = runs.iter().filter(|r| !r.failure.is_empty()).collect();
+    MethodSummary {
+        method,
+        axes,
+        runs: runs.len(),
+        failed: failures.len(),
+        failure: failures.first().map(|r| r.failure.clone()),
+        solved: count(|r| r.solved),
+        abstained: count(|r| r.abstained),
+        missed: count(|r| r.missed),
+        wrong: count(|r| r.wrong),
+        per_axis_rms_deg: root(|r| r.square),
+        per_axis_median_deg: errors.get(errors.len() / 2).copied().unwrap_or(f64::NAN),
+        per_axis_rms_room_deg: root(|r| r.room_square),
+        crlb_per_axis_deg: root(|r| r.bound_square),
+        efficiency: 1.0 / ratio,
+        efficiency_se: (scatter / ratios.len() as f64).sqrt() / (ratio * ratio),
+        anees,
+        anees_bounds,
+        coverage_68: coverage(0.68),
+        coverage_95: coverage(0.95),
+        coverage_99: coverage(0.99),
+        bias_p_value: bias_p_value(&single),
+        verdict: verdict(anees, anees_bounds, squares.len(), runs.len() - failures.len()),
+    }
+}
+
+fn verdict(anees: f64, [low, high]: [f64; 2], judged: usize, calibrated: usize) -> String {
+    if calibrated == 0 {
+        "failed".to_owned()
+    } else if judged == 0 {
+        "states no covariance".to_owned()
+    } else if anees > high {
+        format!(
+            "over-confident: errors are {:.1} times what it states",
+            anees.sqrt()
+        )
+    } else if anees < low {
+        format!(
+            "under-confident: errors are {:.2} times what it states",
+            anees.sqrt()
+        )
+    } else {
+        "consistent".to_owned()
+    }
+}
