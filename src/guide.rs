@@ -7,6 +7,7 @@
 //! 5. [`files`]: every file and every key
 //! 6. [`physics_of_table_3`]: what of the paper's Table 3 pulse and threshold explain, and what they do not
 //! 7. [`characterizing`]: step 1, Tables 1 to 4 and Eqs. 3 to 5 of the bare sensor
+//! 8. [`studies`]: what holds over many experiments, the reference setting, Figure 10
 //! 9. [`test_your_own`]: a calibrator of your own, tiers, comparing
 //!
 //! The chapters are Markdown files in `docs/guide/`; their Rust examples are run by the tests.
@@ -31,6 +32,9 @@ pub mod physics_of_table_3 {}
 
 #[doc = include_str!("../docs/guide/7-characterizing.md")]
 pub mod characterizing {}
+
+#[doc = include_str!("../docs/guide/8-studies.md")]
+pub mod studies {}
 
 #[doc = include_str!("../docs/guide/9-test-your-own.md")]
 pub mod test_your_own {}

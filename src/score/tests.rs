@@ -132,7 +132,7 @@ fn errors_are_counted_as_the_formulas_say() {
         let expected = 12.5 + s * cross + s * s * chord;
         assert!((found.powi(2) - expected).abs() < 1e-3 * expected, "{s} m");
     }
-    let bounds = bound::of_experiment(&s.dataset, &s.truth);
+    let bounds = bound::knowable(&s.dataset, &s.truth).limits;
     let trace = mean([a, b].iter().map(|beam| {
         let c = s.truth.beams[*beam].elevation_rad.expect("deflected").cos();
         bounds[beam][(0, 0)] * c * c + bounds[beam][(1, 1)]

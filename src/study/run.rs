@@ -4,6 +4,7 @@ use super::oracle::Oracle;
 use super::{Contestant, Job, Study};
 use crate::score::{ElementError, Knowable, knowable, score_by};
 use catoptric_calib::Calibrator;
+use catoptric_model::bias::DistanceBias;
 use catoptric_model::{Calibration, Dataset, RangeBias};
 use catoptric_sim::truth::BeamClass;
 use catoptric_sim::{Laboratory, SimError, Truth};
@@ -129,7 +130,20 @@ impl Experiment {
             Contestant::Method(method) => Calibrator::calibrate(method, &self.dataset).map_err(words),
             Contestant::Uncorrected(method) => {
                 let mut dataset = self.dataset.clone();
-                dataset.session.believed.bias = RangeBias::default();
+                let believed = &mut dataset.session.believed;
+                // Who does not correct does not know better: the biases are as likely as they are large.
+                let nodes = &believed.bias.distance.error_mm;
+                let largest = nodes.iter().fold(0.0, |l: f64, e| l.max(e.abs()));
+                believed.distance_bias_sd_mm = libm::hypot(believed.distance_bias_sd_mm, largest);
+                believed.angle_gain_sd_mm =
+                    libm::hypot(believed.angle_gain_sd_mm, believed.bias.angle.gain_mm);
+                believed.bias = RangeBias {
+                    distance: DistanceBias {
+                        error_mm: vec![0.0; nodes.len()],
+                        ..believed.bias.distance.clone()
+                    },
+                    ..RangeBias::default()
+                };
                 Calibrator::calibrate(method, &dataset).map_err(words)
             }
             Contestant::Oracle => {

@@ -63,7 +63,7 @@ fn row(r: &Run) -> [String; 16] {
 pub fn from_csv(text: &str) -> Result<Vec<Run>, String> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let header = reader.headers().map_err(|e| e.to_string())?;
-    if header != &HEADER[..] {
+    if header != HEADER[..] {
         return Err(format!("line 1: the columns are not {}", HEADER.join(",")));
     }
     let mut runs = Vec::new();

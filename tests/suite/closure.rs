@@ -40,6 +40,11 @@ fn worst_error(truth: &Truth, calibration: &catoptric::model::Calibration) -> Re
     Ok(worst)
 }
 
+/// Every method but the drawing's.
+fn measuring() -> impl Iterator<Item = Method> {
+    Method::ALL.into_iter().filter(|m| *m != Method::Prior)
+}
+
 fn close(scene: &Scene, seed: u64) -> Result<(), TestCaseError> {
     let laboratory = Laboratory::new(scene, seed).map_err(|e| TestCaseError::reject(e.to_string()))?;
     let dataset = laboratory
@@ -48,7 +53,7 @@ fn close(scene: &Scene, seed: u64) -> Result<(), TestCaseError> {
     let truth = laboratory
         .truth()
         .map_err(|e| TestCaseError::fail(e.to_string()))?;
-    for method in Method::ALL {
+    for method in measuring() {
         let calibration = calib::calibrate(&dataset, method, &Options::default())
             .map_err(|e| TestCaseError::fail(e.to_string()))?;
         let worst = worst_error(&truth, &calibration).map_err(TestCaseError::fail)?;
@@ -66,7 +71,7 @@ fn the_repositorys_scenes_close() {
     }
 }
 
-/// Files hold ranges as 32-bit floats: 1.2e-7 m at 2 m, a few times that in an angle.
+/// Files hold ranges as 32-bit floats: 1.2e-7 m at 2 m, up to twenty times that in an angle of a short lever.
 #[test]
 fn the_repositorys_scenes_close_through_the_files() {
     for text in [PROTOTYPE, TWO_MIRROR] {
@@ -91,12 +96,12 @@ fn the_repositorys_scenes_close_through_the_files() {
         writer.write_truth(&truth).expect("it can be written");
         writer.finish(provenance).expect("it can be written");
         let dataset = read_dataset(&out).expect("it reads back");
-        for method in Method::ALL {
+        for method in measuring() {
             let calibration = calib::calibrate(&dataset, method, &Options::default()).expect("it calibrates");
             let worst = worst_error(&truth, &calibration).expect("every angle comes back");
             // Not exact either: the files do round.
             assert!(
-                worst < 1e-6 && worst > 1e-12,
+                worst < 3e-6 && worst > 1e-12,
                 "{}: off by {worst:e} rad",
                 method.name()
             );

@@ -20,6 +20,7 @@ mod physics;
 mod pipeline;
 mod properties;
 mod scenes;
+mod study;
 mod sub_rays;
 mod tiers;
 mod tracing;

@@ -233,13 +233,15 @@ fn demo_tells_the_whole_story_twice() {
     for file in [
         "dataset/manifest.json",
         "calibration-beam.json",
-        "calibration-recursive.json",
+        "calibration-joint.json",
+        "calibration-beam-gls.json",
     ] {
         assert!(folder.path().join("d").join(file).is_file(), "{file}");
     }
     for file in [
         "score-beam.json",
-        "score-recursive.json",
+        "score-joint.json",
+        "score-beam-gls.json",
         "report.html",
         "cloud.ply",
     ] {

@@ -75,15 +75,15 @@ fn tiers_1_to_4_grow_harder_and_outliers_spoil_no_direction() {
         assert_eq!(found.open.map(|o| o.elements), Some(0));
     }
     // The bound is what a tier makes possible, whatever a single draw does.
-    assert!(noise.crlb_per_axis_deg < markers.crlb_per_axis_deg);
-    assert!(markers.crlb_per_axis_deg < 0.7 * biases.crlb_per_axis_deg);
+    assert!(noise.alone_crlb_per_axis_deg < markers.alone_crlb_per_axis_deg);
+    assert!(markers.alone_crlb_per_axis_deg < 0.7 * biases.alone_crlb_per_axis_deg);
     assert_eq!(outliers.verdict, Verdict::Pass, "{:?}", outliers.warnings);
     assert!(
         2 * outliers.beams.solved > biases.beams.solved,
         "{:?}",
         outliers.beams
     );
-    assert!(outliers.per_axis_rms_deg < 3.0 * biases.crlb_per_axis_deg);
+    assert!(outliers.per_axis_rms_deg < 3.0 * biases.alone_crlb_per_axis_deg);
 }
 
 #[test]

@@ -64,7 +64,8 @@ pub struct ScannerSheet {
     pub divergence_full_mrad: f64,
 }
 
-/// How far the optical frame may stand from its nominal place, 1σ of each axis.
+/// How far the optical frame may stand from its nominal place, 1σ of each axis; 0 for a place that is known, in the rig as
+/// tracked.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MountTolerance {

@@ -135,15 +135,13 @@ impl Joint<'_> {
         // Motions of the mounting in degrees and millimetres about the drawn one, then the biases.
         let axes = ["x", "y", "z"];
         let mut names: Vec<(String, f64)> = Vec::new();
-        for axis in 0..3 {
-            names.push((
-                format!("sensor shifted along {} (mm)", axes[axis]),
-                1e3 * self.mounting.motion[(axis, axis)],
-            ));
+        for (axis, name) in axes.iter().enumerate() {
+            let unit = 1e3 * self.mounting.motion[(axis, axis)];
+            names.push((format!("sensor shifted along {name} (mm)"), unit));
         }
-        for axis in 0..3 {
+        for (axis, name) in axes.iter().enumerate() {
             let unit = self.mounting.motion[(3 + axis, 3 + axis)].to_degrees();
-            names.push((format!("sensor turned about {} (deg)", axes[axis]), unit));
+            names.push((format!("sensor turned about {name} (deg)"), unit));
         }
         names.extend(self.common.named());
         debug_assert_eq!(names.len(), w.len());

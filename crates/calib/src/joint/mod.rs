@@ -200,6 +200,9 @@ fn along([first, last]: [usize; 2], beam: usize) -> f64 {
 
 /// One board before undeflected beams.
 fn direct_group(work: &Workspace, selected: &crate::mount_data::DirectBoard) -> Option<Group> {
+    // Readings believed to have no noise are not rounded either.
+    let exact = work.dataset.session.believed.range_noise_sd_mm == 0.0;
+    let least = |sd: f64| if exact { LEAST_SD } else { sd.max(LEAST_SD) };
     let elements = selected.rays.iter().map(|ray| Element {
         beam: ray.beam,
         azimuth: ray.azimuth,
@@ -209,7 +212,7 @@ fn direct_group(work: &Workspace, selected: &crate::mount_data::DirectBoard) -> 
         sights: vec![Sight {
             board: 0,
             mean: ray.mean,
-            sd: ray.variance.sqrt().max(LEAST_SD),
+            sd: least(ray.variance.sqrt()),
             count: work.summaries[selected.pose][ray.beam].count,
         }],
     });

@@ -107,7 +107,6 @@ fn biases_that_mounting_and_elements_share_are_counted_once() {
 fn every_other_method_errs_as_much_as_it_says() {
     for method in [Method::Joint, Method::Facet, Method::BeamGls, Method::ClosedForm] {
         let found = nees(method, |seed| World::noisy(31_000 + 11 * seed));
-        println!("{}: {:?}, mounting {}", method.name(), found.angles, found.mount);
         assert_honest(&found);
     }
 }
@@ -148,7 +147,6 @@ fn joint_is_never_worse_than_each_element_by_itself() {
             mean_square(Method::BeamGls, departure_deg).sqrt(),
         );
         let rigid = mean_square(Method::Facet, departure_deg).sqrt();
-        println!("{departure_deg}°: joint {joint:.4}°, facet {rigid:.4}°, beam-gls {alone:.4}°");
         // A thousand errors each, of which those of one run are correlated: a hundredth is chance.
         assert!(joint < 1.01 * alone, "{departure_deg}°: {joint} against {alone}");
         last = joint / rigid;
