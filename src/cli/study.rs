@@ -29,7 +29,7 @@ const ELEMENTS: &str = "elements.csv";
 
 /// Arguments of `study`.
 #[derive(Debug, Args)]
-#[command(args_conflicts_with_subcommands = true)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     verb: Option<Verb>,
@@ -95,8 +95,8 @@ struct StudyArguments {
     #[arg(long)]
     elements: bool,
     /// The folder to write. An interrupted study goes on from there.
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    #[arg(long, value_name = "DIR", required = true)]
+    out: Option<PathBuf>,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -139,9 +139,9 @@ fn invalid(message: String, help: &str) -> CliError {
 
 fn study(arguments: &StudyArguments, context: &Context) -> Result<(), CliError> {
     let [part, parts] = shard(&arguments.shard)?;
-    let Some(scene_path) = &arguments.scene else {
+    let (Some(scene_path), Some(out)) = (&arguments.scene, &arguments.out) else {
         return Err(invalid(
-            "no scene is given".to_owned(),
+            "no scene or no folder is given".to_owned(),
             "catoptric study scene.toml --out study",
         ));
     };
@@ -151,7 +151,6 @@ fn study(arguments: &StudyArguments, context: &Context) -> Result<(), CliError> 
         contestants: contestants(arguments)?,
     };
     let plan = plan_of(&study, [part, parts])?;
-    let out = &arguments.out;
     claim(out, &plan)?;
     let jobs: Vec<Job> = study
         .jobs()
