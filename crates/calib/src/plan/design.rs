@@ -228,13 +228,16 @@ impl<'a> Designer<'a> {
 
     /// The candidate that lowers the cost most, the first of equals, and by how much.
     fn most_useful(&self, known: &[Known], among: impl Iterator<Item = usize>) -> (usize, f64) {
+        let before: Vec<f64> = known
+            .iter()
+            .map(|k| self.cost_of(corner(&k.covariance), k.boards))
+            .collect();
         among.fold((0, f64::NEG_INFINITY), |best, candidate| {
             let gain = self.rows[candidate]
                 .iter()
                 .map(|row| {
-                    let before = &known[row.element];
-                    self.cost_of(corner(&before.covariance), before.boards)
-                        - self.cost_of(updated_corner(&before.covariance, row), before.boards + 1)
+                    let at = &known[row.element];
+                    before[row.element] - self.cost_of(updated_corner(&at.covariance, row), at.boards + 1)
                 })
                 .sum::<f64>()
                 / known.len() as f64;

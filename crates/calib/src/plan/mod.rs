@@ -22,6 +22,7 @@ mod words;
 pub use candidates::Candidate;
 pub use design::Designer;
 pub use situation::{Placed, Situation};
+pub use words::facing;
 
 use crate::error::CalibError;
 use serde::Serialize;
@@ -69,7 +70,7 @@ impl Default for Request {
             range_m: [0.5, 4.0],
             max_incidence_deg: 60.0,
             readings: 100,
-            tries: 8000,
+            tries: 5000,
         }
     }
 }

@@ -2,16 +2,14 @@
 
 use super::candidates::Candidate;
 use super::{Open, PlannedPose, Standing};
+use catoptric_model::Pose;
 use catoptric_model::frame::tangent_basis;
 use nalgebra::{Unit, Vector3};
 
 /// A chosen pose with what it changes.
 pub(super) fn planned(candidate: &Candidate, before: Standing, after: Standing) -> PlannedPose {
     let pose = &candidate.room_from_board;
-    let normal = Unit::new_normalize(pose.rotation * Vector3::z());
-    let (level, _) = tangent_basis(&normal);
-    let x = pose.rotation * Vector3::x();
-    let turn = libm::atan2(normal.cross(&level).dot(&x), level.dot(&x));
+    let (normal, turn_deg) = facing(pose);
     let axes = pose.rotation.to_rotation_matrix();
     let m = axes.matrix();
     let attitude = [
@@ -22,8 +20,8 @@ pub(super) fn planned(candidate: &Candidate, before: Standing, after: Standing) 
     PlannedPose {
         board: candidate.board.clone(),
         center_m: pose.translation.vector.into(),
-        normal: normal.into_inner().into(),
-        turn_deg: turn.to_degrees(),
+        normal,
+        turn_deg,
         yaw_pitch_roll_deg: attitude.map(f64::to_degrees),
         beam: candidate.beam,
         range_m: candidate.range_m,
@@ -37,6 +35,15 @@ pub(super) fn planned(candidate: &Candidate, before: Standing, after: Standing) 
         before,
         after,
     }
+}
+
+/// Normal of a board's face, and the board's turn about it in degrees: 0 with its x axis horizontal.
+pub fn facing(room_from_board: &Pose) -> ([f64; 3], f64) {
+    let normal = Unit::new_normalize(room_from_board.rotation * Vector3::z());
+    let (level, _) = tangent_basis(&normal);
+    let x = room_from_board.rotation * Vector3::x();
+    let turn = libm::atan2(normal.cross(&level).dot(&x), level.dot(&x));
+    (normal.into_inner().into(), turn.to_degrees())
 }
 
 /// First and last of each run of neighbors; the beams are in order.
