@@ -7,6 +7,7 @@
 mod characterization;
 mod figure;
 mod page;
+mod plan;
 mod plots;
 mod scores;
 mod study;
@@ -14,6 +15,7 @@ mod verdict;
 mod words;
 
 pub use characterization::characterization;
+pub use plan::plan;
 pub use study::study;
 
 use crate::apply::PointCloud;
