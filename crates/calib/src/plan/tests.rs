@@ -264,8 +264,8 @@ fn every_candidate_is_possible() {
         }
         assert!(candidate.range_m >= 0.8 && candidate.range_m <= 2.0);
         // A point of the board nearest to the rig.
-        let nearest = (-20..=20).flat_map(|i| {
-            (-20..=20).map(move |j| Point3::new(0.0225 * f64::from(i), 0.0175 * f64::from(j), 0.0))
+        let nearest = (-8..=8).flat_map(|i| {
+            (-8..=8).map(move |j| Point3::new(0.05625 * f64::from(i), 0.04375 * f64::from(j), 0.0))
         });
         assert!(
             nearest
