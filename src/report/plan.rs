@@ -6,7 +6,6 @@ use catoptric_calib::plan::{FacetPlan, Plan, PlannedPose, Situation, Standing};
 use catoptric_model::frame::yaw_pitch_roll;
 use catoptric_model::{Pose, Session};
 use nalgebra::{Point3, Translation3, Vector3};
-use plotters::style::BLACK;
 use std::ops::Range;
 
 /// Size of a view, in pixels.
@@ -119,13 +118,6 @@ fn view(
     let session = situation.session();
     let sensor = Point3::from(situation.room_from_sensor().translation.vector);
     let flat = |p: &Point3<f64>| (p[i], p[j]);
-    let ink = color(
-        session
-            .facets
-            .iter()
-            .position(|f| f.name == facet.facet)
-            .unwrap_or(0),
-    );
     let line = |points: Vec<(f64, f64)>, color, width, opacity| Stroke {
         points,
         color,
@@ -154,7 +146,7 @@ fn view(
             .as_ref()
             .and_then(|room| Some(room.cast(origin, direction)?.0));
         let end = origin + direction.into_inner() * wall.unwrap_or(farthest).min(farthest);
-        strokes.push(line(vec![flat(&sensor), flat(origin), flat(&end)], ink, 1, 0.5));
+        strokes.push(line(vec![flat(&sensor), flat(origin), flat(&end)], GRID, 1, 1.0));
     }
     let mut words: Vec<Word> = Vec::new();
     let (x, y) = extents(session, facet, &sensor, [i, j]);
@@ -169,11 +161,11 @@ fn view(
                 center.1 + 1.1 * (corner.1 - center.1),
             )
         });
-        strokes.push(line(corners, BLACK, 2, 0.85));
+        strokes.push(line(corners, color(place), 2, 1.0));
         words.push(Word {
             at,
             text: (place + 1).to_string(),
-            color: BLACK,
+            color: color(place),
         });
     }
     let axes = Axes {

@@ -23,6 +23,12 @@ const WALL_CLEARANCE: f64 = 0.03;
 /// Least distance between a board and the outermost part of the rig, in metres.
 const RIG_CLEARANCE: f64 = 0.1;
 
+/// Poses tried around each that was chosen.
+const NEAR: usize = 48;
+
+/// How far they are off at first: beams, metres, and degrees of tilt, direction and roll.
+const AROUND: (f64, f64, f64, f64, f64) = (12.0, 0.3, 10.0, 25.0, 40.0);
+
 /// Real root of γ⁶ = γ + 1.
 const GAMMA: f64 = 1.134_724_138_401_519_4;
 
@@ -50,6 +56,8 @@ pub struct Candidate {
     pub tilt_deg: f64,
     /// Direction to which its normal leans, seen along that beam in the room, in degrees: 0 to growing azimuth, 90 up.
     pub direction_deg: f64,
+    /// Turn about its normal, in degrees; at 0 its x axis lies along the fan as far as the tilt allows.
+    pub roll_deg: f64,
     /// Beams that it serves, in order.
     pub beams: Vec<usize>,
     /// The board in the sensor frame.
@@ -102,19 +110,11 @@ pub fn candidates(
     if fan.elements.is_empty() {
         return Err(none("no beam of it needs a board"));
     }
-    let site = Site {
-        situation,
-        fan,
-        request,
-        rig_radius: rig_radius(session),
-        cone: cone_half_angle(session),
-        lever: longest_lever(session),
-        least_cos: libm::cos(request.max_incidence_deg.to_radians()),
-    };
+    let site = Site::new(situation, fan, request);
     let mut found = Vec::new();
     let mut refused = [0_usize; Refusal::ALL.len()];
     for number in 0..request.tries {
-        match site.candidate(&wish(&site, number)) {
+        match site.candidate(&site.wish(number)) {
             Ok(candidate) => found.push(candidate),
             Err(refusal) => refused[refusal as usize] += 1,
         }
@@ -124,6 +124,10 @@ pub fn candidates(
         return Err(none(Refusal::ALL[most].words()));
     }
     Ok(found)
+}
+
+fn whole_centimetres(metres: f64) -> f64 {
+    (metres * 100.0).round() / 100.0
 }
 
 /// Why a pose is not possible.
@@ -157,10 +161,10 @@ impl Refusal {
 }
 
 /// What all candidates of a facet share.
-struct Site<'a> {
+pub(super) struct Site<'a> {
     situation: &'a Situation,
     fan: &'a Fan,
-    request: &'a Request,
+    request: Request,
     rig_radius: f64,
     cone: f64,
     lever: f64,
@@ -207,30 +211,76 @@ fn rig_radius(session: &Session) -> f64 {
         .fold(0.0, |r: f64, p| r.max(p.coords.norm()))
 }
 
-fn wish(site: &Site, number: usize) -> Wish {
-    // An even start and one step of the sequence for each seed, which moves all dimensions.
-    let at = |dimension: i32| {
-        let start = 0.5 + (site.request.seed % 1_000_003) as f64 * 0.618_033_988_749_894_9;
-        (start + number as f64 * GAMMA.powi(-dimension)).fract()
-    };
-    let [low, high] = site.request.range_m;
-    let elements = site.fan.elements.len();
-    // In range: a fractional part is below one.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    let element = ((at(1) * elements as f64) as usize).min(elements - 1);
-    let reach = site.reach(&site.fan.elements[element]).min(high);
-    // Whole centimetres and degrees, so that a person can set up what is said.
-    Wish {
-        element,
-        board: number % site.situation.session().boards.len(),
-        range: ((low + (reach - low) * at(2)) * 100.0).round() / 100.0,
-        tilt_deg: (site.request.max_incidence_deg * at(3)).round(),
-        direction_deg: (360.0 * at(4)).round() % 360.0,
-        roll_deg: (180.0 * at(5)).round() % 180.0,
+impl<'a> Site<'a> {
+    pub(super) fn new(situation: &'a Situation, fan: &'a Fan, request: &Request) -> Self {
+        let session = situation.session();
+        Self {
+            situation,
+            fan,
+            request: *request,
+            rig_radius: rig_radius(session),
+            cone: cone_half_angle(session),
+            lever: longest_lever(session),
+            least_cos: libm::cos(request.max_incidence_deg.to_radians()),
+        }
     }
-}
 
-impl Site<'_> {
+    /// The possible ones of some poses around another, the closer the later the round.
+    pub(super) fn near(&self, center: &Candidate, round: i32) -> Vec<Candidate> {
+        let elements = &self.fan.elements;
+        let boards = &self.situation.session().boards;
+        let Some(board) = boards.iter().position(|b| b.name == center.board) else {
+            return Vec::new();
+        };
+        let aimed = elements.iter().position(|e| e.beam == center.beam).unwrap_or(0);
+        let width = 0.5_f64.powi(round);
+        let wishes = (0..NEAR).map(|number| {
+            let off = |dimension: i32, reach: f64| {
+                (2.0 * (0.5 + number as f64 * GAMMA.powi(-dimension)).fract() - 1.0) * reach * width
+            };
+            let element = (aimed as f64 + off(1, AROUND.0))
+                .round()
+                .clamp(0.0, elements.len() as f64 - 1.0);
+            // Not negative and no more than the number of elements.
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            Wish {
+                element: element as usize,
+                board,
+                range: whole_centimetres(center.range_m + off(2, AROUND.1)),
+                tilt_deg: (center.tilt_deg + off(3, AROUND.2)).round().max(0.0),
+                direction_deg: (center.direction_deg + off(4, AROUND.3))
+                    .round()
+                    .rem_euclid(360.0),
+                roll_deg: (center.roll_deg + off(5, AROUND.4)).round().rem_euclid(180.0),
+            }
+        });
+        wishes.filter_map(|wish| self.candidate(&wish).ok()).collect()
+    }
+
+    /// Number n of the sequence.
+    fn wish(&self, number: usize) -> Wish {
+        // An even start and one step of the sequence for each seed, which moves all dimensions.
+        let at = |dimension: i32| {
+            let start = 0.5 + (self.request.seed % 1_000_003) as f64 * 0.618_033_988_749_894_9;
+            (start + number as f64 * GAMMA.powi(-dimension)).fract()
+        };
+        let [low, high] = self.request.range_m;
+        let elements = self.fan.elements.len();
+        // In range: a fractional part is below one.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let element = ((at(1) * elements as f64) as usize).min(elements - 1);
+        let reach = self.reach(&self.fan.elements[element]).min(high);
+        // Whole centimetres and degrees, so that a person can set up what is said.
+        Wish {
+            element,
+            board: number % self.situation.session().boards.len(),
+            range: whole_centimetres(low + (reach - low) * at(2)),
+            tilt_deg: (self.request.max_incidence_deg * at(3)).round(),
+            direction_deg: (360.0 * at(4)).round() % 360.0,
+            roll_deg: (180.0 * at(5)).round() % 180.0,
+        }
+    }
+
     /// Way of an element's ray to the shell of the room, in metres.
     fn reach(&self, element: &Element) -> f64 {
         let (origin, v) = self.ray(element);
@@ -252,7 +302,8 @@ impl Site<'_> {
         let sheet = &session.boards[wish.board];
         let aimed = &self.fan.elements[wish.element];
         let (sin, cos) = libm::sincos(wish.tilt_deg.to_radians());
-        if wish.range < self.request.range_m[0] || wish.range * sin > self.lever * cos {
+        let [least, greatest] = self.request.range_m;
+        if wish.range < least || wish.range > greatest || wish.range * sin > self.lever * cos {
             return Err(Refusal::Range);
         }
         let room_from_board = self.pose(wish);
@@ -283,6 +334,7 @@ impl Site<'_> {
             range_m: wish.range,
             tilt_deg: wish.tilt_deg,
             direction_deg: wish.direction_deg,
+            roll_deg: wish.roll_deg,
             beams: served.iter().map(|n| self.fan.elements[*n].beam).collect(),
             in_sensor: board,
             served,

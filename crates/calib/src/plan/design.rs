@@ -4,7 +4,7 @@
 //! C − (Cg)(Cg)ᵀ/(σ² + gᵀCg), whatever the order of boards. The angles start from a prior so wide that it does not count,
 //! so that elements without boards have a large but finite cost.
 
-use super::candidates::{Candidate, candidates};
+use super::candidates::{Candidate, Site, candidates};
 use super::situation::{Element, Fan, Situation};
 use super::{Criterion, Open, Request, Standing, words};
 use crate::common::CommonErrors;
@@ -32,6 +32,9 @@ const LEAST_GAIN: f64 = 1e-9;
 /// Rounds of exchanges, at most; five are usual.
 const MOST_ROUNDS: usize = 50;
 
+/// Rounds of looking around the chosen poses, each at half the distance of the one before.
+const REFINEMENTS: i32 = 4;
+
 /// What one board tells of one element.
 #[derive(Debug, Clone)]
 struct Row {
@@ -52,6 +55,7 @@ pub struct Designer<'a> {
     situation: &'a Situation,
     fan: &'a Fan,
     request: Request,
+    site: Site<'a>,
     candidates: Vec<Candidate>,
     rows: Vec<Vec<Row>>,
     /// With the boards there are.
@@ -73,6 +77,7 @@ impl<'a> Designer<'a> {
             situation,
             fan,
             request: *request,
+            site: Site::new(situation, fan, request),
             rows: Vec::new(),
             candidates,
             start: Vec::new(),
@@ -139,10 +144,11 @@ impl<'a> Designer<'a> {
         Some((0.5 * (c[(0, 0)] + c[(1, 1)])).sqrt().to_degrees())
     }
 
-    /// The best set of candidates that greedy choice and exchange find, the most informative first.
+    /// The best set that greedy choice and exchange find, the most informative first.
     ///
-    /// The same candidate may be in it more than once: setting a board up anew has a drift and marker errors of its own.
-    pub fn best(&self, poses: usize) -> Vec<usize> {
+    /// Poses around those chosen become candidates too, and are exchanged for them while that is better. The same
+    /// candidate may be in the set more than once: setting a board up anew has a drift and marker errors of its own.
+    pub fn best(&mut self, poses: usize) -> Vec<usize> {
         let mut chosen = Vec::with_capacity(poses);
         let mut known = self.start.clone();
         for _ in 0..poses {
@@ -150,7 +156,23 @@ impl<'a> Designer<'a> {
             add(&mut known, &self.rows[best]);
             chosen.push(best);
         }
-        let mut cost = self.total(&known);
+        self.exchange(&mut chosen);
+        for round in 0..REFINEMENTS {
+            let near = chosen
+                .iter()
+                .flat_map(|c| self.site.near(&self.candidates[*c], round));
+            for candidate in near.collect::<Vec<_>>() {
+                self.candidates.push(candidate);
+                self.rows.push(self.rows_of(self.len() - 1, false));
+            }
+            self.exchange(&mut chosen);
+        }
+        self.ordered(chosen)
+    }
+
+    /// Exchanges chosen candidates for others until no exchange is better.
+    fn exchange(&self, chosen: &mut [usize]) {
+        let mut cost = self.cost(chosen);
         for _ in 0..MOST_ROUNDS {
             let mut changed = false;
             for place in 0..chosen.len() {
@@ -171,7 +193,6 @@ impl<'a> Designer<'a> {
                 break;
             }
         }
-        self.ordered(chosen)
     }
 
     /// The elements that are open with some candidates set up, and why, neighbors together.

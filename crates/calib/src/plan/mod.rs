@@ -91,7 +91,7 @@ pub struct Plan {
 pub struct FacetPlan {
     /// The facet.
     pub facet: String,
-    /// Poses that were possible.
+    /// Poses of the sequence that were possible.
     pub candidates: usize,
     /// Before any of the poses.
     pub before: Standing,
@@ -197,7 +197,8 @@ pub fn plan(situation: &Situation, facets: &[String], request: &Request) -> Resu
 /// # Errors
 /// As [`plan`].
 pub fn plan_facet(situation: &Situation, facet: &str, request: &Request) -> Result<FacetPlan, CalibError> {
-    let designer = Designer::new(situation, facet, request)?;
+    let mut designer = Designer::new(situation, facet, request)?;
+    let candidates = designer.len();
     let chosen = designer.best(request.poses);
     let mut before = designer.standing(&[]);
     let mut poses = Vec::with_capacity(chosen.len());
@@ -212,7 +213,7 @@ pub fn plan_facet(situation: &Situation, facet: &str, request: &Request) -> Resu
     }
     Ok(FacetPlan {
         facet: facet.to_owned(),
-        candidates: designer.len(),
+        candidates,
         before: designer.standing(&[]),
         after: before,
         poses,
