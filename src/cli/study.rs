@@ -185,7 +185,7 @@ fn study(arguments: &StudyArguments, context: &Context) -> Result<(), CliError> 
     if arguments.elements {
         let rows = jobs
             .par_iter()
-            .map(|job| Ok(elements_csv(&study, *job, &angles(&study, *job)?)))
+            .map(|job| Ok(elements_csv(*job, &angles(&study, *job)?)))
             .collect::<Result<Vec<String>, CliError>>()?;
         let text = format!("{ELEMENTS_HEADER}{}", rows.concat());
         io::write_file(out.join(ELEMENTS), text.as_bytes())?;
@@ -524,8 +524,7 @@ fn join_times(out: &Path, chunks: usize) -> Result<(), CliError> {
 const ELEMENTS_HEADER: &str =
     "cell,seed,method,beam,azimuth_deg,elevation_deg,true_azimuth_deg,true_elevation_deg\n";
 
-fn elements_csv(study: &Study, job: Job, found: &[catoptric::study::ElementAngles]) -> String {
-    let _ = study;
+fn elements_csv(job: Job, found: &[catoptric::study::ElementAngles]) -> String {
     found
         .iter()
         .map(|e| {
