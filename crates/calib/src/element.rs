@@ -1,5 +1,6 @@
 //! One element from its readings to its estimate: boards and angles chosen in turn until both stand.
 
+use crate::bare::Bare;
 use crate::choose::Attempt;
 use crate::covariance::MountUncertainty;
 use crate::initial;
@@ -33,6 +34,7 @@ const LARGEST_EXCESS: f64 = 0.2;
 pub(crate) struct Workspace<'a> {
     pub(crate) dataset: &'a Dataset,
     pub(crate) summaries: &'a [Vec<Summary>],
+    pub(crate) bare: &'a Bare,
     /// Each pose's board in the sensor frame.
     pub(crate) boards: &'a [Option<BoardInSensor>],
     pub(crate) rig_from_sensor: Pose,
