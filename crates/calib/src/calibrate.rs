@@ -4,6 +4,7 @@ use crate::bare::Bare;
 use crate::element::Workspace;
 use crate::error::CalibError;
 use crate::joint::{self, Assigned};
+use crate::locate;
 use crate::observations::{BoardInSensor, azimuth};
 use crate::options::{Method, Options};
 use crate::pose::{self, Mount};
@@ -11,8 +12,7 @@ use crate::screen::{Candidate, Screen};
 use crate::solve::BareDistance;
 use catoptric_model::session::{NominalFacet, Session};
 use catoptric_model::{
-    BeamEstimate, Calibration, Dataset, Deflection, MirrorPlane, PoseRecord, Status, Summary, beam,
-    calibration, mirror,
+    BeamEstimate, Calibration, Dataset, Deflection, MirrorPlane, Status, Summary, beam, calibration, mirror,
 };
 use nalgebra::{Unit, Vector3};
 
@@ -104,7 +104,7 @@ pub(crate) fn prepare(dataset: &Dataset) -> Result<Prepared, CalibError> {
         .iter()
         .map(plane_as_drawn)
         .collect::<Result<_, _>>()?;
-    let summaries: Vec<Vec<Summary>> = dataset.poses.iter().map(PoseRecord::summarize).collect();
+    let summaries = locate::summaries(dataset);
     let mount = pose::estimate(dataset, &summaries);
     let boards = dataset
         .poses

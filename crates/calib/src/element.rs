@@ -4,6 +4,7 @@ use crate::bare::Bare;
 use crate::choose::Attempt;
 use crate::covariance::MountUncertainty;
 use crate::initial;
+use crate::locate;
 use crate::observability::{self, Weakness};
 use crate::observations::{BoardInSensor, azimuth};
 use crate::options::{Method, Options};
@@ -170,8 +171,8 @@ impl Attempt<'_> {
                 let readings: Vec<Vec<f64>> = poses
                     .iter()
                     .map(|p| {
-                        let all = self.work.dataset.poses[*p].readings(self.beam);
-                        all.filter(|r| r.is_finite()).collect()
+                        let record = &self.work.dataset.poses[*p];
+                        locate::kept(record, self.beam, self.summary(*p), self.noise)
                     })
                     .collect();
                 // Where the readings leave a direction open there is nothing to recurse on; the batch says which.

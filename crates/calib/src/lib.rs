@@ -30,6 +30,7 @@ pub mod jacobian;
 mod joint;
 mod judge;
 pub mod least_squares;
+mod locate;
 mod mount_data;
 pub mod observability;
 pub mod observations;

@@ -6,6 +6,7 @@ use crate::error::ModelError;
 use crate::frame::Pose;
 use crate::motion::Motion;
 use crate::session::Session;
+use crate::summary::Summary;
 use nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -165,19 +166,6 @@ pub struct PoseRecord {
     pub ranges: Vec<f64>,
 }
 
-/// Statistics of one beam over a stretch.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Summary {
-    /// Readings that are ranges.
-    pub count: usize,
-    /// Readings that are not.
-    pub missing: usize,
-    /// Mean of the ranges, in metres; 0 without any.
-    pub mean: f64,
-    /// Sample standard deviation, in metres; 0 for fewer than two.
-    pub sd: f64,
-}
-
 /// A recorded experiment: what a calibration is made from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dataset {
@@ -256,35 +244,24 @@ impl Stretch {
 
 impl PoseRecord {
     /// The readings of one beam, scan after scan.
-    pub fn readings(&self, beam: usize) -> impl Iterator<Item = f64> + '_ {
+    pub fn readings(&self, beam: usize) -> impl Iterator<Item = f64> + Clone + '_ {
         self.ranges.iter().skip(beam).step_by(self.beams).copied()
     }
 
     /// Mean and spread of every beam.
     pub fn summarize(&self) -> Vec<Summary> {
-        // Scan after scan, as the readings lie in memory. Welford's recurrence, in which `sd` holds the sum of squares
-        // until the end: the naive sum loses the noise under the range.
+        // Scan after scan, as the readings lie in memory.
         let mut summaries = vec![Summary::default(); self.beams];
         for scan in self.ranges.chunks(self.beams.max(1)) {
             for (s, r) in summaries.iter_mut().zip(scan) {
                 if r.is_finite() {
-                    s.count += 1;
-                    let step = r - s.mean;
-                    s.mean += step / s.count as f64;
-                    s.sd += step * (r - s.mean);
+                    s.add(*r);
                 } else {
                     s.missing += 1;
                 }
             }
         }
-        for s in &mut summaries {
-            s.sd = if s.count > 1 {
-                (s.sd / (s.count - 1) as f64).sqrt()
-            } else {
-                0.0
-            };
-        }
-        summaries
+        summaries.into_iter().map(Summary::finished).collect()
     }
 }
 
@@ -373,9 +350,9 @@ mod tests {
             s[0],
             Summary {
                 count: 3,
-                missing: 0,
                 mean: 2.0,
-                sd: 1.0
+                sd: 1.0,
+                ..Summary::default()
             }
         );
         assert_eq!(
@@ -384,7 +361,7 @@ mod tests {
                 count: 1,
                 missing: 2,
                 mean: 5.0,
-                sd: 0.0
+                ..Summary::default()
             }
         );
     }

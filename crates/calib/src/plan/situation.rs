@@ -359,6 +359,7 @@ fn predicted(session: &Session, board: &BoardInSensor, readings: usize) -> Vec<S
                     let bias = believed.bias.terms(hit.distance, cos_incidence, &board.color);
                     Summary {
                         count: readings,
+                        outliers: 0,
                         missing: 0,
                         mean: hit.distance + bias.total(),
                         sd: believed.range_noise_sd_mm * 1e-3,
@@ -366,6 +367,7 @@ fn predicted(session: &Session, board: &BoardInSensor, readings: usize) -> Vec<S
                 }
                 None => Summary {
                     count: 0,
+                    outliers: 0,
                     missing: readings,
                     mean: f64::NAN,
                     sd: f64::NAN,
