@@ -10,6 +10,7 @@ use crate::options::{Method, Options};
 use crate::pose::{self, Mount};
 use crate::screen::{Candidate, Screen};
 use crate::solve::BareDistance;
+use crate::tracking;
 use catoptric_model::session::{NominalFacet, Session};
 use catoptric_model::{
     BeamEstimate, Calibration, Dataset, Deflection, MirrorPlane, Status, Summary, beam, calibration, mirror,
@@ -37,6 +38,9 @@ const LEAST_ELEMENTS: usize = 5;
 /// }
 /// ```
 pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result<Calibration, CalibError> {
+    dataset.check()?;
+    let (dataset, warnings) = tracking::put_right(dataset);
+    let dataset = dataset.as_ref();
     let session = &dataset.session;
     let prepared = prepare(dataset)?;
     let (mount, drawn) = (&prepared.mount, &prepared.drawn);
@@ -63,7 +67,7 @@ pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result
         facets: Vec::new(),
         rig_from_sensor: Some(mount.to_file()),
         bias: None,
-        warnings: Vec::new(),
+        warnings,
         assessment: None,
     };
     match method {

@@ -41,6 +41,7 @@ pub mod recursive;
 pub mod screen;
 pub mod solve;
 pub mod spread;
+pub mod tracking;
 
 pub use calibrate::calibrate;
 pub use calibrator::Calibrator;

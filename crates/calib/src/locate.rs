@@ -114,6 +114,7 @@ mod tests {
             room_from_rig: Pose::identity(),
             room_from_board: None,
             motion: None,
+            watched: Vec::new(),
             beams: beams.len(),
             ranges: (0..scans).flat_map(|s| beams.iter().map(move |b| b[s])).collect(),
         }

@@ -7,6 +7,7 @@ use crate::frame::Pose;
 use crate::motion::Motion;
 use crate::session::Session;
 use crate::summary::Summary;
+use crate::tracking::Watched;
 use nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -160,6 +161,8 @@ pub struct PoseRecord {
     pub room_from_board: Option<Pose>,
     /// Where the rig was during a flight; `None` where nothing moved.
     pub motion: Option<Motion>,
+    /// The markers of rig and board over the stretch; none of a flight, nor where only poses were recorded.
+    pub watched: Vec<Watched>,
     /// Beams of a scan.
     pub beams: usize,
     /// Readings in metres, scan after scan; −∞ too close, +∞ no return, NaN invalid (REP-117).
@@ -220,10 +223,15 @@ impl Stretch {
             ModelError::Inconsistent(format!("pose {}: the rig was never tracked", self.label.pose))
         })?;
         let room_from_board = self.label.board.as_deref().and_then(mean);
+        let watched = match motion {
+            Some(_) => Vec::new(),
+            None => self.tracks.iter().filter_map(Watched::of).collect(),
+        };
         Ok(PoseRecord {
             room_from_rig,
             room_from_board,
             motion,
+            watched,
             beams: self.beams,
             ranges: self.ranges,
             label: self.label,
@@ -342,6 +350,7 @@ mod tests {
             room_from_rig: Pose::identity(),
             room_from_board: None,
             motion: None,
+            watched: Vec::new(),
             beams: 2,
             ranges: vec![1.0, f64::INFINITY, 2.0, f64::NAN, 3.0, 5.0],
         };

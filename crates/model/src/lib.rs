@@ -43,6 +43,7 @@ pub mod paper;
 pub mod range;
 pub mod session;
 pub mod summary;
+pub mod tracking;
 
 pub use assessment::Assessment;
 pub use beam::Deflection;
@@ -60,3 +61,4 @@ pub use motion::Motion;
 pub use range::{CorrectedRange, RawRange};
 pub use session::Session;
 pub use summary::{Summary, Window};
+pub use tracking::Watched;
