@@ -90,6 +90,9 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let calibration = calib::calibrate(&dataset, method, &options)?;
     interrupt::check()?;
     context.detail(&format!("calibrated in {:.2} s", begin.elapsed().as_secs_f64()));
+    for warning in &calibration.warnings {
+        context.say(&format!("warning: {warning}"));
+    }
     io::write_json(&arguments.out, &calibration)?;
     print(&format!(
         "wrote {}: {}\nnext: catoptric score {} {}\n",

@@ -464,11 +464,14 @@ fn documented_keys_are_the_keys_of_the_files() {
         &["bias.color"],
     );
 
-    let quick = ["experiment.scans_per_pose=1", "scanner.sub_rays=1"].map(str::to_owned);
+    let quick = ["experiment.scans_per_pose=2", "scanner.sub_rays=1"].map(str::to_owned);
     let flight = r#"
 [[flight]]
 name = "hover"
 waypoint = [{ time_s = 0, position_m = [0, 0, 1.8] }, { time_s = 0.025, position_m = [0, 0, 1.8] }]
+[[experiment.mishap]]
+pose = 3
+moved_mm = [0, 0, 4]
 "#;
     let small = scene::scene_template(Layout::TwoMirror).to_owned() + flight;
     let small = scene::parse(&small, "two-mirror.toml", &quick).unwrap();
@@ -479,7 +482,11 @@ waypoint = [{ time_s = 0, position_m = [0, 0, 1.8] }, { time_s = 0.025, position
         &json(serde_json::to_value(&dataset.session)),
         &["believed.bias.color"],
     );
-    same("truth.json", &json(serde_json::to_value(&truth)), &["bias.color"]);
+    same(
+        "truth.json",
+        &json(serde_json::to_value(&truth)),
+        &["bias.color", "poses[].mishap"],
+    );
 
     let calibration = calib::calibrate(&dataset, calib::Method::Beam, &calib::Options::default()).unwrap();
     let score = score(&dataset, &calibration, Some(&truth));
