@@ -10,6 +10,7 @@ mod page;
 mod plots;
 mod scores;
 mod study;
+mod trials;
 mod verdict;
 mod words;
 
