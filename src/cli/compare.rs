@@ -45,6 +45,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
     print(&words(&found))
 }
 
+/// A calibration as a row of a table.
+type Cells = fn(&Row) -> Vec<String>;
+
 /// The tables as a person reads them.
 fn words(found: &Comparison) -> String {
     let order = if found.blind {
@@ -53,7 +56,7 @@ fn words(found: &Comparison) -> String {
         "the least point error at 4 m first"
     };
     let mut text = format!("{}, {order}\n", counted(found.rows.len(), "calibration"));
-    let (heads, cells): (&[&str], fn(&Row) -> Vec<String>) = if found.blind {
+    let (heads, cells): (&[&str], Cells) = if found.blind {
         (&BLIND_HEADS, blind_cells)
     } else {
         (&HEADS, cells)
