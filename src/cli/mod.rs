@@ -13,6 +13,7 @@ mod interrupt;
 mod man;
 mod new;
 mod output;
+mod plan;
 mod progress;
 mod report;
 mod schema;
@@ -81,6 +82,8 @@ enum Verb {
     Compare(compare::Arguments),
     /// Run many experiments and say what their errors have in common
     Study(study::Arguments),
+    /// Say which board poses to record next, and what each gains
+    Plan(plan::Arguments),
     /// Turn a scan into a point cloud
     Apply(apply::Arguments),
     /// Write a page to read about calibrations and their scores
@@ -151,6 +154,7 @@ fn run(cli: Cli) -> Result<(), CliError> {
         Verb::Score(arguments) => score::run(&arguments, &context),
         Verb::Compare(arguments) => compare::run(&arguments),
         Verb::Study(arguments) => study::run(&arguments, &context),
+        Verb::Plan(arguments) => plan::run(&arguments, &context),
         Verb::Apply(arguments) => apply::run(&arguments, &context),
         Verb::Report(arguments) => report::run(&arguments, &context),
         Verb::New(arguments) => new::run(&arguments),

@@ -7,6 +7,7 @@
 mod characterization;
 mod figure;
 mod page;
+mod plan;
 mod plots;
 mod scores;
 mod study;
@@ -15,6 +16,7 @@ mod verdict;
 mod words;
 
 pub use characterization::characterization;
+pub use plan::plan;
 pub use study::study;
 
 use crate::apply::PointCloud;

@@ -18,6 +18,7 @@ mod noise;
 mod paper;
 mod physics;
 mod pipeline;
+mod plan;
 mod properties;
 mod scenes;
 mod study;

@@ -273,7 +273,7 @@ pub(crate) fn check_session(session: &Session) -> Result<(), CalibError> {
     Ok(())
 }
 
-fn plane_as_drawn(facet: &NominalFacet) -> Result<MirrorPlane, CalibError> {
+pub(crate) fn plane_as_drawn(facet: &NominalFacet) -> Result<MirrorPlane, CalibError> {
     let plane = facet.plane().ok_or_else(|| CalibError::Facet {
         name: facet.name.clone(),
         corners: facet.corners_mm.len(),
@@ -282,7 +282,11 @@ fn plane_as_drawn(facet: &NominalFacet) -> Result<MirrorPlane, CalibError> {
 }
 
 /// The plane that most of a facet's solved elements agree on: medians, which a few strays do not move.
-fn plane_as_built(session: &Session, facet: &NominalFacet, solved: &[BeamEstimate]) -> Option<MirrorPlane> {
+pub(crate) fn plane_as_built(
+    session: &Session,
+    facet: &NominalFacet,
+    solved: &[BeamEstimate],
+) -> Option<MirrorPlane> {
     let mut planes: Vec<MirrorPlane> = Vec::new();
     for estimate in solved.iter().filter(|e| e.facet.as_ref() == Some(&facet.name)) {
         let Some(deflection) = estimate.deflection() else {

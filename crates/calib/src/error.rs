@@ -32,6 +32,22 @@ pub enum CalibError {
         /// What is missing.
         what: String,
     },
+    /// A facet that the session does not hold.
+    #[error("no facet is called {name:?}; there are {known}")]
+    UnknownFacet {
+        /// The name asked for.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// No board can stand where a facet's beams go.
+    #[error("no board pose before facet {facet:?} is possible: {reason}")]
+    NoPlace {
+        /// The facet.
+        facet: String,
+        /// What is in the way.
+        reason: String,
+    },
     /// A calibrator that is not ours and gave no calibration.
     #[error("{name}: {what}")]
     Foreign {

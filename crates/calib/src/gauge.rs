@@ -113,7 +113,7 @@ impl Determined {
 /// let up = Deflection { azimuth: 0.0, elevation: 0.5, distance: 0.07 };
 /// let board = |tilt: f64| BoardPlane::new(
 ///     Point3::new(2.0, 0.0, 1.1),
-///     Unit::new_normalize(Vector3::new(-1.0, tilt, -0.5)),
+///     Unit::new_normalize(Vector3::y() * tilt - up.exit_direction(0.0).into_inner()),
 /// );
 /// let hinge = Layout {
 ///     rays: vec![Ray::Alone { azimuth: 0.0, deflection: up }],

@@ -33,6 +33,7 @@ mod mount_data;
 pub mod observability;
 pub mod observations;
 pub mod options;
+pub mod plan;
 pub mod pose;
 pub mod recursive;
 pub mod screen;

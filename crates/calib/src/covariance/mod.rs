@@ -11,7 +11,7 @@ use crate::common::CommonErrors;
 use crate::jacobian;
 use crate::observations::BoardView;
 use catoptric_model::{Deflection, Session, range};
-use nalgebra::{DMatrix, DVector, Dyn, Matrix2, Matrix6, OMatrix, U2, U6, Vector2};
+use nalgebra::{DMatrix, DVector, Dyn, Matrix2, Matrix6, OMatrix, RowDVector, RowVector6, U2, U6, Vector2};
 
 pub(crate) use plane::PlaneFit;
 use plane::plane_variance;
@@ -90,33 +90,18 @@ pub fn budget(
     deflection: &Deflection,
     boards: &[BoardView],
 ) -> Option<Budget> {
-    let beliefs = &session.believed;
     let common = CommonErrors::of(session);
-    let (k, v) = (boards.len(), deflection.exit_direction(beam_azimuth));
-    let d_sd = session.bare_structure.distance_sd_mm * 1e-3;
+    let k = boards.len();
     let mut h = DMatrix::zeros(k, 2);
     let mut sigma = DMatrix::zeros(k, k);
     let mut shared = DMatrix::zeros(k, common.len() + 1);
     let mut moved = OMatrix::<f64, Dyn, U6>::zeros(k);
     for (row, board) in boards.iter().enumerate() {
-        let gradient = jacobian::analytic(deflection, beam_azimuth, &board.plane)?;
-        h.set_row(row, &gradient.angles().transpose());
-        let r = range::predict(deflection, beam_azimuth, &board.plane)?;
-        let hit = deflection.deflection_point(beam_azimuth) + v.into_inner() * (r - deflection.distance);
-        let cos_incidence = board.plane.cos_incidence(&v);
-        let mount_row = jacobian::of_mount(&hit, &board.plane.normal, &v);
-        moved.set_row(row, &mount_row);
-        sigma[(row, row)] = board.noise_sd.powi(2) / board.count.max(1) as f64
-            + (beliefs.drift_sd_mm * 1e-3).powi(2)
-            + (beliefs.element_sd_mm * 1e-3).powi(2)
-            + plane_variance(board.markers, &hit, board, beliefs.marker_sd_mm * 1e-3) / cos_incidence.powi(2)
-            + common.unlisted_variance(board.color);
-        let mut biases = common.row(r, cos_incidence, board.color);
-        if mount.common.ncols() == biases.len() {
-            biases += mount_row * &mount.common;
-        }
-        shared.view_mut((row, 0), (1, common.len())).copy_from(&biases);
-        shared[(row, common.len())] = gradient.distance * d_sd;
+        let sighting = Sighting::new(session, &common, mount, beam_azimuth, deflection, board)?;
+        h.set_row(row, &sighting.angles.transpose());
+        sigma[(row, row)] = sighting.own;
+        shared.set_row(row, &sighting.shared);
+        moved.set_row(row, &sighting.mount);
     }
     sigma += &shared * shared.transpose() + &moved * mount.independent * moved.transpose();
     let counts = DVector::from_iterator(k, boards.iter().map(|b| b.count as f64));
@@ -125,6 +110,56 @@ pub fn budget(
         covariance: sigma,
         counts,
     })
+}
+
+/// What one board tells of one element, and what can be off about it.
+pub(crate) struct Sighting {
+    /// (∂r/∂θ_a, ∂r/∂φ), in metres per radian.
+    pub(crate) angles: Vector2<f64>,
+    /// Variance of what is this board's alone: noise of the mean, drift, markers, in square metres.
+    pub(crate) own: f64,
+    /// Error by one standard deviation of each of the [`CommonErrors`], and last of d, in metres.
+    pub(crate) shared: RowDVector<f64>,
+    /// ∂r/∂(motion of the sensor).
+    pub(crate) mount: RowVector6<f64>,
+}
+
+impl Sighting {
+    /// `None` if the ray misses the plane.
+    pub(crate) fn new(
+        session: &Session,
+        common: &CommonErrors,
+        mount: &MountUncertainty,
+        beam_azimuth: f64,
+        deflection: &Deflection,
+        board: &BoardView,
+    ) -> Option<Self> {
+        let beliefs = &session.believed;
+        let v = deflection.exit_direction(beam_azimuth);
+        let gradient = jacobian::analytic(deflection, beam_azimuth, &board.plane)?;
+        let r = range::predict(deflection, beam_azimuth, &board.plane)?;
+        let hit = deflection.deflection_point(beam_azimuth) + v.into_inner() * (r - deflection.distance);
+        let cos_incidence = board.plane.cos_incidence(&v);
+        let mount_row = jacobian::of_mount(&hit, &board.plane.normal, &v);
+        let own = board.noise_sd.powi(2) / board.count.max(1) as f64
+            + (beliefs.drift_sd_mm * 1e-3).powi(2)
+            + (beliefs.element_sd_mm * 1e-3).powi(2)
+            + plane_variance(board.markers, &hit, board, beliefs.marker_sd_mm * 1e-3) / cos_incidence.powi(2)
+            + common.unlisted_variance(board.color);
+        let mut biases = common.row(r, cos_incidence, board.color);
+        if mount.common.ncols() == biases.len() {
+            biases += mount_row * &mount.common;
+        }
+        let mut shared = RowDVector::zeros(common.len() + 1);
+        shared.columns_mut(0, common.len()).copy_from(&biases);
+        shared[common.len()] = gradient.distance * session.bare_structure.distance_sd_mm * 1e-3;
+        Some(Self {
+            angles: gradient.angles(),
+            own,
+            shared,
+            mount: mount_row,
+        })
+    }
 }
 
 impl Budget {

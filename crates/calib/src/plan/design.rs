@@ -1,0 +1,416 @@
+//! From candidates to a design: one by one the best, then exchanges until none is better.
+//!
+//! Each element keeps C, the covariance of (cos φ·θ_a, φ, q). A board with row g and variance σ² makes it
+//! C − (Cg)(Cg)ᵀ/(σ² + gᵀCg), whatever the order of boards. The angles start from a prior so wide that it does not count,
+//! so that elements without boards have a large but finite cost.
+
+use super::candidates::{Candidate, Site, candidates};
+use super::situation::{Element, Fan, Situation};
+use super::{Criterion, Open, Request, Standing, words};
+use crate::common::CommonErrors;
+use crate::covariance::{self, MountUncertainty, Sighting};
+use crate::element::LEAST_BOARDS;
+use crate::error::CalibError;
+use crate::observability::{self, WEAKEST_SD};
+use crate::observations::BoardView;
+use crate::solve::libm_cos;
+use catoptric_model::Session;
+use nalgebra::{DMatrix, DVector, Matrix6};
+
+/// Prior of each angle, in radians (30°): 10⁻⁶ of what a determined element knows.
+const PRIOR_SD: f64 = std::f64::consts::PI / 6.0;
+
+/// Variance that stands for none, in square metres: a micrometre's.
+const LEAST_VARIANCE: f64 = 1e-12;
+
+/// Cost of each board that an element lacks, as log det: more than any board between candidates makes.
+const LACKING_LOG_DET: f64 = 10.0;
+
+/// Relative gain below which an exchange is none.
+const LEAST_GAIN: f64 = 1e-9;
+
+/// Rounds of exchanges, at most; five are usual.
+const MOST_ROUNDS: usize = 50;
+
+/// Rounds of looking around the chosen poses, each at half the distance of the one before.
+const REFINEMENTS: i32 = 4;
+
+/// What one board tells of one element.
+#[derive(Debug, Clone)]
+struct Row {
+    element: usize,
+    g: DVector<f64>,
+    variance: f64,
+}
+
+/// What is known of one element.
+#[derive(Debug, Clone)]
+struct Known {
+    covariance: DMatrix<f64>,
+    boards: usize,
+}
+
+/// Candidates before one facet, and what sets of them are worth.
+pub struct Designer<'a> {
+    situation: &'a Situation,
+    fan: &'a Fan,
+    request: Request,
+    site: Site<'a>,
+    candidates: Vec<Candidate>,
+    rows: Vec<Vec<Row>>,
+    /// With the boards there are.
+    start: Vec<Known>,
+}
+
+impl<'a> Designer<'a> {
+    /// The candidates before a facet.
+    ///
+    /// # Errors
+    /// As [`candidates`].
+    pub fn new(situation: &'a Situation, facet: &str, request: &Request) -> Result<Self, CalibError> {
+        let candidates = candidates(situation, facet, request)?;
+        let fan = situation.fan(facet).ok_or_else(|| CalibError::UnknownFacet {
+            name: facet.to_owned(),
+            known: String::new(),
+        })?;
+        let mut designer = Self {
+            situation,
+            fan,
+            request: *request,
+            site: Site::new(situation, fan, request),
+            rows: Vec::new(),
+            candidates,
+            start: Vec::new(),
+        };
+        designer.start = designer.start(false);
+        designer.rows = (0..designer.len()).map(|c| designer.rows_of(c, false)).collect();
+        Ok(designer)
+    }
+
+    /// Number of candidates.
+    pub fn len(&self) -> usize {
+        self.candidates.len()
+    }
+
+    /// Never: without a candidate there is no designer.
+    pub fn is_empty(&self) -> bool {
+        self.candidates.is_empty()
+    }
+
+    /// A candidate by its number.
+    pub fn candidate(&self, number: usize) -> &Candidate {
+        &self.candidates[number]
+    }
+
+    /// The criterion over all elements with some candidates set up; less is better. A is in deg², D a log of rad⁴.
+    pub fn cost(&self, chosen: &[usize]) -> f64 {
+        self.total(&self.with(chosen))
+    }
+
+    /// How well the elements are determined with some candidates set up.
+    pub fn standing(&self, chosen: &[usize]) -> Standing {
+        let open = self.reasons(chosen);
+        let determined: Vec<bool> = open.iter().map(Option::is_none).collect();
+        let of = |known: &[Known]| {
+            let of_determined: Vec<f64> = (known.iter().zip(&determined))
+                .filter(|(_, d)| **d)
+                .map(|(k, _)| 0.5 * (k.covariance[(0, 0)] + k.covariance[(1, 1)]))
+                .collect();
+            let mean = of_determined.iter().sum::<f64>() / of_determined.len() as f64;
+            (!of_determined.is_empty()).then(|| mean.sqrt().to_degrees())
+        };
+        let mut mounted = self.start(true);
+        for candidate in chosen {
+            add(&mut mounted, &self.rows_of(*candidate, true));
+        }
+        let count = determined.iter().filter(|d| **d).count();
+        Standing {
+            determined: count,
+            open: determined.len() - count + self.fan.excluded.len(),
+            bound_deg: of(&self.with(chosen)),
+            bound_with_mounting_deg: of(&mounted),
+        }
+    }
+
+    /// The bound of one beam with some candidates set up, in degrees per axis, the mounting taken as known; `None` for a
+    /// beam that is open.
+    pub fn bound_deg(&self, beam: usize, chosen: &[usize]) -> Option<f64> {
+        let number = self.fan.elements.iter().position(|e| e.beam == beam)?;
+        if self.reasons(chosen)[number].is_some() {
+            return None;
+        }
+        let known = self.with(chosen);
+        let c = &known.get(number)?.covariance;
+        Some((0.5 * (c[(0, 0)] + c[(1, 1)])).sqrt().to_degrees())
+    }
+
+    /// The best set that greedy choice and exchange find, the most informative first.
+    ///
+    /// Poses around those chosen become candidates too, and are exchanged for them while that is better. The same
+    /// candidate may be in the set more than once: setting a board up anew has a drift and marker errors of its own.
+    pub fn best(&mut self, poses: usize) -> Vec<usize> {
+        let mut chosen = Vec::with_capacity(poses);
+        let mut known = self.start.clone();
+        for _ in 0..poses {
+            let (best, _) = self.most_useful(&known, 0..self.len());
+            add(&mut known, &self.rows[best]);
+            chosen.push(best);
+        }
+        self.exchange(&mut chosen);
+        for round in 0..REFINEMENTS {
+            let near = chosen
+                .iter()
+                .flat_map(|c| self.site.near(&self.candidates[*c], round));
+            for candidate in near.collect::<Vec<_>>() {
+                self.candidates.push(candidate);
+                self.rows.push(self.rows_of(self.len() - 1, false));
+            }
+            self.exchange(&mut chosen);
+        }
+        self.ordered(chosen)
+    }
+
+    /// Exchanges chosen candidates for others until no exchange is better.
+    fn exchange(&self, chosen: &mut [usize]) {
+        let mut cost = self.cost(chosen);
+        for _ in 0..MOST_ROUNDS {
+            let mut changed = false;
+            for place in 0..chosen.len() {
+                let others: Vec<usize> = (0..chosen.len())
+                    .filter(|p| *p != place)
+                    .map(|p| chosen[p])
+                    .collect();
+                let without = self.with(&others);
+                let (best, gain) = self.most_useful(&without, 0..self.len());
+                let better = self.total(&without) - gain;
+                if better < cost - LEAST_GAIN * cost.abs() {
+                    chosen[place] = best;
+                    cost = better;
+                    changed = true;
+                }
+            }
+            if !changed {
+                break;
+            }
+        }
+    }
+
+    /// The elements that are open with some candidates set up, and why, neighbors together.
+    pub fn open(&self, chosen: &[usize]) -> Vec<Open> {
+        let reasons = self.reasons(chosen);
+        let mut open: Vec<(usize, String)> = (self.fan.elements.iter().zip(reasons))
+            .filter_map(|(element, reason)| Some((element.beam, reason?)))
+            .chain(self.fan.excluded.iter().cloned())
+            .collect();
+        open.sort();
+        words::runs_with_reasons(&open)
+    }
+
+    /// Why each element is open; `None` for one that is not.
+    fn reasons(&self, chosen: &[usize]) -> Vec<Option<String>> {
+        let session = self.situation.session();
+        let of_one = |(number, element): (usize, &Element)| {
+            let mut views = self.views(element);
+            views.extend(
+                chosen
+                    .iter()
+                    .map(|c| &self.candidates[*c])
+                    .filter(|c| c.served.binary_search(&number).is_ok())
+                    .map(|c| self.view(c)),
+            );
+            if views.len() < LEAST_BOARDS {
+                return Some(format!(
+                    "it reads {} of the {} boards before its facet; {LEAST_BOARDS} are needed",
+                    views.len(),
+                    self.fan.boards + chosen.len()
+                ));
+            }
+            let mount = MountUncertainty::none();
+            let budget = covariance::budget(session, &mount, element.azimuth, &element.deflection, &views)?;
+            Some(observability::weakness(&budget, element.deflection.elevation)?.reason)
+        };
+        self.fan.elements.iter().enumerate().map(of_one).collect()
+    }
+
+    /// Puts the most informative first.
+    fn ordered(&self, mut rest: Vec<usize>) -> Vec<usize> {
+        let mut known = self.start.clone();
+        let mut ordered = Vec::with_capacity(rest.len());
+        while !rest.is_empty() {
+            let (best, _) = self.most_useful(&known, rest.iter().copied());
+            add(&mut known, &self.rows[best]);
+            ordered.push(best);
+            if let Some(place) = rest.iter().position(|c| *c == best) {
+                rest.remove(place);
+            }
+        }
+        ordered
+    }
+
+    /// The candidate that lowers the cost most, the first of equals, and by how much.
+    fn most_useful(&self, known: &[Known], among: impl Iterator<Item = usize>) -> (usize, f64) {
+        let before: Vec<f64> = known
+            .iter()
+            .map(|k| self.cost_of(corner(&k.covariance), k.boards))
+            .collect();
+        among.fold((0, f64::NEG_INFINITY), |best, candidate| {
+            let gain = self.rows[candidate]
+                .iter()
+                .map(|row| {
+                    let at = &known[row.element];
+                    before[row.element] - self.cost_of(updated_corner(&at.covariance, row), at.boards + 1)
+                })
+                .sum::<f64>()
+                / known.len() as f64;
+            if gain > best.1 { (candidate, gain) } else { best }
+        })
+    }
+
+    fn total(&self, known: &[Known]) -> f64 {
+        let sum: f64 = known
+            .iter()
+            .map(|k| self.cost_of(corner(&k.covariance), k.boards))
+            .sum();
+        sum / known.len() as f64
+    }
+
+    /// Cost of one element by C₁₁, C₁₂ and C₂₂ of its angles, in rad².
+    fn cost_of(&self, [a, b, c]: [f64; 3], boards: usize) -> f64 {
+        let lacking = LEAST_BOARDS.saturating_sub(boards) as f64;
+        let squared_deg = (180.0 / std::f64::consts::PI).powi(2);
+        match self.request.criterion {
+            Criterion::A => (0.5 * (a + c) + lacking * WEAKEST_SD * WEAKEST_SD) * squared_deg,
+            Criterion::D => libm::log((a * c - b * b).max(f64::MIN_POSITIVE)) + lacking * LACKING_LOG_DET,
+        }
+    }
+
+    fn with(&self, chosen: &[usize]) -> Vec<Known> {
+        let mut known = self.start.clone();
+        for candidate in chosen {
+            add(&mut known, &self.rows[*candidate]);
+        }
+        known
+    }
+
+    /// What the boards there are tell; with the mounting as unknown as it is, or as known.
+    fn start(&self, mounting: bool) -> Vec<Known> {
+        let session = self.situation.session();
+        let columns = 2 + CommonErrors::of(session).len() + 1 + if mounting { 6 } else { 0 };
+        let mut prior = DMatrix::identity(columns, columns);
+        prior[(0, 0)] = PRIOR_SD * PRIOR_SD;
+        prior[(1, 1)] = PRIOR_SD * PRIOR_SD;
+        let mut known = vec![
+            Known {
+                covariance: prior,
+                boards: 0
+            };
+            self.fan.elements.len()
+        ];
+        for (number, element) in self.fan.elements.iter().enumerate() {
+            let rows: Vec<Row> = self
+                .views(element)
+                .iter()
+                .filter_map(|view| self.row(number, element, view, mounting))
+                .collect();
+            add(&mut known, &rows);
+        }
+        known
+    }
+
+    fn rows_of(&self, candidate: usize, mounting: bool) -> Vec<Row> {
+        let candidate = &self.candidates[candidate];
+        let view = self.view(candidate);
+        candidate
+            .served
+            .iter()
+            .filter_map(|number| self.row(*number, &self.fan.elements[*number], &view, mounting))
+            .collect()
+    }
+
+    fn row(&self, number: usize, element: &Element, view: &BoardView, mounting: bool) -> Option<Row> {
+        let session = self.situation.session();
+        let known = MountUncertainty::none();
+        let mount = if mounting { &self.situation.mount } else { &known };
+        let common = CommonErrors::of(session);
+        let seen = Sighting::new(
+            session,
+            &common,
+            mount,
+            element.azimuth,
+            &element.deflection,
+            view,
+        )?;
+        let columns = 2 + seen.shared.len() + if mounting { 6 } else { 0 };
+        let mut g = DVector::zeros(columns);
+        g[0] = seen.angles.x / libm_cos(element.deflection.elevation);
+        g[1] = seen.angles.y;
+        g.rows_mut(2, seen.shared.len())
+            .copy_from(&seen.shared.transpose());
+        if mounting {
+            let moved = seen.mount * square_root(&mount.independent);
+            g.rows_mut(2 + seen.shared.len(), 6).copy_from(&moved.transpose());
+        }
+        Some(Row {
+            element: number,
+            g,
+            variance: seen.own.max(LEAST_VARIANCE),
+        })
+    }
+
+    fn view<'c>(&self, candidate: &'c Candidate) -> BoardView<'c> {
+        let noise = noise(self.situation.session());
+        candidate.in_sensor.view(noise, self.request.readings)
+    }
+
+    /// The boards that an element reads already.
+    fn views<'s>(&'s self, element: &Element) -> Vec<BoardView<'s>> {
+        let boards = &self.situation.boards;
+        element
+            .read
+            .iter()
+            .map(|(number, noise, count)| boards[*number].view(*noise, *count))
+            .collect()
+    }
+}
+
+fn noise(session: &Session) -> f64 {
+    session.believed.range_noise_sd_mm * 1e-3
+}
+
+fn add(known: &mut [Known], rows: &[Row]) {
+    for row in rows {
+        let at = &mut known[row.element];
+        let moved = &at.covariance * &row.g;
+        let whole = row.variance + row.g.dot(&moved);
+        at.covariance.ger(-1.0 / whole, &moved, &moved, 1.0);
+        at.boards += 1;
+    }
+}
+
+fn corner(covariance: &DMatrix<f64>) -> [f64; 3] {
+    [covariance[(0, 0)], covariance[(0, 1)], covariance[(1, 1)]]
+}
+
+/// The angles' part of C − (Cg)(Cg)ᵀ/(σ² + gᵀCg), without the rest.
+fn updated_corner(covariance: &DMatrix<f64>, row: &Row) -> [f64; 3] {
+    let (mut first, mut second, mut whole) = (0.0, 0.0, row.variance);
+    // By columns, as they lie in memory; C is symmetric.
+    for (column, g) in covariance.column_iter().zip(row.g.iter()) {
+        first += column[0] * g;
+        second += column[1] * g;
+        whole += g * column.iter().zip(row.g.iter()).map(|(c, g)| c * g).sum::<f64>();
+    }
+    let [a, b, c] = corner(covariance);
+    [
+        a - first * first / whole,
+        b - first * second / whole,
+        c - second * second / whole,
+    ]
+}
+
+/// L with LLᵀ = M for a positive semidefinite M.
+fn square_root(m: &Matrix6<f64>) -> Matrix6<f64> {
+    let eigen = m.symmetric_eigen();
+    let scale = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+    eigen.eigenvectors * Matrix6::from_diagonal(&scale)
+}
