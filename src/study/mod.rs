@@ -49,6 +49,7 @@ use catoptric_calib::{Calibrator, Method};
 use catoptric_sim::Scene;
 use std::fmt;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Version of `study.json`.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -92,6 +93,8 @@ pub struct Study {
     pub seeds: u64,
     /// Who calibrates each experiment.
     pub contestants: Vec<Contestant>,
+    /// Once it is set, programs under way are ended; what they were at is then no result.
+    pub stop: Arc<AtomicBool>,
 }
 
 /// One experiment: a cell and a seed.
@@ -126,6 +129,7 @@ impl Study {
             }],
             seeds,
             contestants,
+            stop: Arc::default(),
         }
     }
 

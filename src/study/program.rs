@@ -6,7 +6,8 @@ use catoptric_model::Calibration;
 use catoptric_sim::{Laboratory, noise};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Characters of a program's own words that are passed on.
@@ -24,7 +25,7 @@ pub struct Program {
     /// Words of the command; `{dataset}` and `{out}` stand for the folder and for the file to write, and each is added at the
     /// end if no word has it.
     pub command: Vec<String>,
-    /// After how long it is taken to hang, in seconds. It is ended then; what it has started itself is not.
+    /// After how long it is taken to hang, in seconds. It is ended then, and on Unix so is what it has started itself.
     pub timeout_s: u64,
 }
 
@@ -40,21 +41,27 @@ impl Program {
         })
     }
 
-    /// Records an experiment into a folder that goes afterwards, without its truth, and runs the program on it.
+    /// Records an experiment into a folder that goes afterwards, without its truth, and runs the program on it. Once `stop`
+    /// is set it is ended as one that hangs.
     ///
     /// # Errors
     /// In words, which do not depend on where the folder was: the program cannot be started, fails, hangs, or what it writes
     /// is no sane calibration.
-    pub fn calibrate(&self, laboratory: &Laboratory) -> Result<Calibration, String> {
+    pub fn calibrate(&self, laboratory: &Laboratory, stop: &AtomicBool) -> Result<Calibration, String> {
         let folder = tempfile::tempdir().map_err(|e| format!("no folder can be made for it: {e}"))?;
-        self.calibrate_in(folder.path(), laboratory)
+        self.calibrate_in(folder.path(), laboratory, stop)
             .map_err(|words| shortened(&anywhere(folder.path(), words)))
     }
 
-    fn calibrate_in(&self, folder: &Path, laboratory: &Laboratory) -> Result<Calibration, String> {
+    fn calibrate_in(
+        &self,
+        folder: &Path,
+        laboratory: &Laboratory,
+        stop: &AtomicBool,
+    ) -> Result<Calibration, String> {
         let (dataset, out) = (folder.join("dataset"), folder.join("calibration.json"));
         record(laboratory, &dataset).map_err(|e| format!("its dataset cannot be written: {e}"))?;
-        self.run(&dataset, &out)?;
+        self.run(&dataset, &out, stop)?;
         if !out.exists() {
             return Err("it wrote no calibration".to_owned());
         }
@@ -67,7 +74,8 @@ impl Program {
         }
     }
 
-    fn run(&self, dataset: &Path, out: &Path) -> Result<(), String> {
+    /// The words of the command for the places of the files.
+    fn words(&self, dataset: &Path, out: &Path) -> Vec<String> {
         let places =
             [("{dataset}", dataset), ("{out}", out)].map(|(key, path)| (key, path.to_string_lossy()));
         let mut words = self.command.clone();
@@ -79,23 +87,30 @@ impl Program {
                 *word = word.replace(key, path);
             }
         }
+        words
+    }
+
+    fn run(&self, dataset: &Path, out: &Path, stop: &AtomicBool) -> Result<(), String> {
+        let words = self.words(dataset, out);
         let said = tempfile::tempfile().map_err(|e| e.to_string())?;
         let errors = said.try_clone().map_err(|e| e.to_string())?;
-        let mut child = Command::new(&words[0])
+        let mut command = Command::new(&words[0]);
+        command
             .args(&words[1..])
             .stdin(Stdio::null())
             .stdout(Stdio::null())
-            .stderr(errors)
-            .spawn()
-            .map_err(|e| format!("{:?} cannot be started: {e}", words[0]))?;
+            .stderr(errors);
+        let mut child = spawn(&mut command).map_err(|e| format!("{:?} cannot be started: {e}", words[0]))?;
         let begin = Instant::now();
         let status = loop {
             match child.try_wait() {
                 Ok(Some(status)) => break status,
+                Ok(None) if stop.load(Ordering::SeqCst) => {
+                    end(&mut child);
+                    return Err("it was stopped".to_owned());
+                }
                 Ok(None) if begin.elapsed() > Duration::from_secs(self.timeout_s) => {
-                    // It may just have ended by itself.
-                    let _ = child.kill();
-                    let _ = child.wait();
+                    end(&mut child);
                     return Err(format!("it did not end within {} s", self.timeout_s));
                 }
                 Ok(None) => std::thread::sleep(POLL),
@@ -107,6 +122,31 @@ impl Program {
         }
         Err(format!("it ended with {status}{}", last_words(said)))
     }
+}
+
+/// Starts a program at the head of a process group of its own, so that all it starts can be ended with it.
+#[cfg(unix)]
+fn spawn(command: &mut Command) -> std::io::Result<Child> {
+    use std::os::unix::process::CommandExt;
+    command.process_group(0).spawn()
+}
+
+#[cfg(not(unix))]
+fn spawn(command: &mut Command) -> std::io::Result<Child> {
+    command.spawn()
+}
+
+/// Ends a program that has not been waited for, so that its number is still its own, and its group.
+fn end(child: &mut Child) {
+    #[cfg(unix)]
+    if let Ok(group) = i32::try_from(child.id()) {
+        use nix::sys::signal::{Signal, killpg};
+        // Nobody may be left in it.
+        let _ = killpg(nix::unistd::Pid::from_raw(group), Signal::SIGKILL);
+    }
+    // It may just have ended by itself.
+    let _ = child.kill();
+    let _ = child.wait();
 }
 
 /// What a program said.
@@ -180,6 +220,18 @@ mod tests {
                 && long.ends_with("word why")
                 && long.chars().count() <= QUOTED + 3
         );
+    }
+
+    #[test]
+    fn a_command_gets_the_places_that_it_does_not_name() {
+        let words = |command: &str| {
+            let program = Program::parse(&format!("mine={command}"), 5).expect("it has a command");
+            program.words(Path::new("/d"), Path::new("/o")).join(" ")
+        };
+        assert_eq!(words("run"), "run /d /o");
+        assert_eq!(words("run {dataset}"), "run /d /o");
+        assert_eq!(words("run --out={out}"), "run --out=/o /d");
+        assert_eq!(words("run {out} {dataset}/x"), "run /o /d/x");
     }
 
     #[test]

@@ -8,6 +8,7 @@ use catoptric_model::bias::DistanceBias;
 use catoptric_model::{Calibration, Dataset, Deflection, RangeBias};
 use catoptric_sim::truth::BeamClass;
 use catoptric_sim::{Laboratory, SimError, Truth};
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// What one contestant made of one experiment. Angles are in radians; figures that do not exist are NaN.
@@ -67,7 +68,7 @@ pub fn run_with_elements(study: &Study, job: Job) -> Result<(Vec<Run>, Vec<Eleme
     let mut elements = Vec::new();
     for contestant in &study.contestants {
         let begin = Instant::now();
-        let calibration = experiment.calibrate(contestant);
+        let calibration = experiment.calibrate(contestant, &study.stop);
         let milliseconds = begin.elapsed().as_secs_f64() * 1e3;
         let (run, angles) = experiment.judge(contestant, job, calibration, milliseconds);
         runs.push(run);
@@ -95,7 +96,7 @@ impl Experiment {
         })
     }
 
-    fn calibrate(&self, contestant: &Contestant) -> Result<Calibration, String> {
+    fn calibrate(&self, contestant: &Contestant, stop: &AtomicBool) -> Result<Calibration, String> {
         let words = |e: catoptric_calib::CalibError| e.to_string();
         match contestant {
             Contestant::Method(method) => Calibrator::calibrate(method, &self.dataset).map_err(words),
@@ -121,7 +122,7 @@ impl Experiment {
                 let truth = self.truth.clone();
                 Oracle { truth }.calibrate(&self.dataset).map_err(words)
             }
-            Contestant::Program(program) => program.calibrate(&self.laboratory),
+            Contestant::Program(program) => program.calibrate(&self.laboratory, stop),
             Contestant::Own(calibrator) => calibrator.calibrate(&self.dataset).map_err(words),
         }
     }

@@ -206,10 +206,12 @@ fn verdict(m: &MethodSummary, judged: usize, solved: usize) -> String {
             anees.sqrt()
         )
     } else if anees < low {
-        format!(
-            "under-confident: errors are {:.2} times what it states",
-            anees.sqrt()
-        )
+        let ratio = anees.sqrt();
+        if ratio < 0.01 {
+            "under-confident: errors are less than a hundredth of what it states".to_owned()
+        } else {
+            format!("under-confident: errors are {ratio:.2} times what it states")
+        }
     } else {
         "consistent".to_owned()
     }
@@ -264,4 +266,59 @@ fn nulls(m: &MethodSummary, judged: usize, drawn: usize) -> BTreeMap<&'static st
     .filter(|(_, value, _)| !value.is_finite())
     .map(|(key, _, why)| (key, why))
     .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::{Contestant, from_csv, to_csv};
+
+    /// The summary of runs with the given eᵀP⁻¹e of their element, as they are written.
+    fn of(squares: &[&str]) -> MethodSummary {
+        let scene = toml::from_str(include_str!("../../scenes/reference-facet.toml")).expect("it is valid");
+        let study = Study::of_scene(scene, squares.len() as u64, vec![Contestant::Oracle]);
+        let rows: String = (1..)
+            .zip(squares)
+            .map(|(seed, square)| format!("0,{seed},oracle,1,0,0,0,1e-8,,1e-8,,700,1e-4,1e-4,{square},\n"))
+            .collect();
+        let runs = from_csv(&(to_csv(&[]) + &rows)).expect("they are runs");
+        summarize(&study, &runs).methods.remove(0)
+    }
+
+    #[test]
+    fn verdicts_are_those_of_the_stated_covariance() {
+        let honest = of(&["2"; 8]);
+        assert_eq!((honest.anees, honest.verdict.as_str()), (1.0, "consistent"));
+        assert_eq!(
+            of(&["32"; 8]).verdict,
+            "over-confident: errors are 4.0 times what it states"
+        );
+        assert_eq!(
+            of(&["0.02"; 8]).verdict,
+            "under-confident: errors are 0.10 times what it states"
+        );
+        assert_eq!(
+            of(&["1e-9"; 8]).verdict,
+            "under-confident: errors are less than a hundredth of what it states"
+        );
+        assert_eq!(of(&[""; 8]).verdict, "states no covariance");
+    }
+
+    #[test]
+    fn an_error_that_is_ruled_out_counts() {
+        // One covariance of zero among honest ones, and elements without any, which are not judged.
+        let found = of(&["2", "2", "inf", "", ""]);
+        assert_eq!(
+            found.verdict,
+            "over-confident: it rules out an error that it made"
+        );
+        assert!(found.anees.is_infinite());
+        assert!((found.coverage_95 - 2.0 / 3.0).abs() < 1e-15);
+        assert_eq!(
+            found.nulls["anees"],
+            "infinite: a covariance rules out the error that was made"
+        );
+        let json = serde_json::to_value(&found).expect("it is data");
+        assert!(json["anees"].is_null() && json["nulls"]["anees"].is_string());
+    }
 }

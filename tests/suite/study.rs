@@ -2,7 +2,7 @@
 //!
 //! That the statistics' formulas are right is the business of their unit tests. Programs are those of any Unix.
 
-use crate::common::{run, stderr, stdout};
+use crate::common::{catoptric, run, stderr, stdout};
 use catoptric::calib::{CalibError, Calibrator, Method};
 use catoptric::io::scene as scenes;
 use catoptric::model::{Calibration, Dataset};
@@ -199,6 +199,15 @@ fn foreign_folders_and_shards_are_refused() {
         (["--axis", "errors.drift_sd=1,2"], "drift_sd_mm"),
         (["--axis", "errors.drift_sd_mm=1,2,1"], "1 is there twice"),
         (["--axis", "errors.drift_sd_mm=1:2"], "from:to:steps"),
+        (
+            ["--axis=errors.drift_sd_mm=1,2", "--axis=errors.drift_sd_mm=3"],
+            "is an axis already",
+        ),
+        (
+            ["--axis=errors.drift_sd_mm=1,2", "--set=errors.drift_sd_mm=3"],
+            "gives it one value",
+        ),
+        (["--methods", "oracle,beam,oracle"], "\"oracle\" is named twice"),
         (["--shard", "3/2"], "3/2"),
         (["--program", "mine"], "NAME=COMMAND"),
     ] {
@@ -279,6 +288,180 @@ fn programs_are_contestants_and_their_failures_results() {
         "{}",
         stderr(&other)
     );
+}
+
+/// A script in a folder, as a command.
+fn script(folder: &Path, name: &str, text: &str) -> String {
+    std::fs::write(folder.join(name), text).unwrap();
+    format!("sh {}", folder.join(name).display())
+}
+
+/// A program that starts another, notes both and waits for it; it fails at once if there is a file `go`.
+fn hanging(folder: &Path) -> String {
+    let at = folder.display();
+    let text = format!("test -e {at}/go && exit 3\nsleep 300 &\necho $$ $! >> {at}/processes\nwait\n");
+    script(folder, "hang.sh", &text)
+}
+
+/// Waits until the processes that a hanging program noted are gone.
+#[cfg(unix)]
+fn all_ended(folder: &Path) -> bool {
+    let noted = read(folder, "processes");
+    assert!(noted.split_whitespace().count() >= 2, "{noted:?}");
+    let is_there = |process: &str| {
+        let state = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+        // Whoever has adopted an ended one need not have asked after it yet.
+        let lives = std::process::Command::new("kill")
+            .args(["-0", process])
+            .stderr(std::process::Stdio::null())
+            .status()
+            .unwrap();
+        lives.success() && !state.contains(") Z ")
+    };
+    (0..100).any(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        !noted.split_whitespace().any(is_there)
+    })
+}
+
+#[cfg(unix)]
+#[test]
+fn what_a_hanging_program_has_started_ends_with_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (scene, program) = (scene(), format!("hanging={}", hanging(at)));
+    let done = run(
+        at,
+        &[
+            "study",
+            &scene,
+            "--seeds",
+            "2",
+            "--methods",
+            "oracle",
+            "--program",
+            &program,
+            "--program-timeout-s",
+            "1",
+            "--set",
+            "experiment.scans_per_pose=1",
+            "--out",
+            "s",
+            "--quiet",
+        ],
+    );
+    assert!(done.status.success(), "{}", stderr(&done));
+    assert!(
+        stdout(&done).contains("it did not end within 1 s"),
+        "{}",
+        stdout(&done)
+    );
+    assert!(all_ended(at));
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_programs_and_keeps_none_of_their_failures() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let (scene, program) = (scene(), format!("hanging={}", hanging(at)));
+    let arguments = |out: &str| {
+        [
+            "study",
+            &scene,
+            "--seeds",
+            "3",
+            "--methods",
+            "oracle",
+            "--program",
+            &program,
+            "--set",
+            "experiment.scans_per_pose=1",
+            "--out",
+            out,
+            "--quiet",
+        ]
+        .map(str::to_owned)
+    };
+    let child = catoptric()
+        .args(arguments("s"))
+        .current_dir(at)
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let begun = (0..600).any(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        std::fs::read_to_string(at.join("processes")).is_ok_and(|noted| noted.ends_with('\n'))
+    });
+    assert!(begun, "no program was started");
+    let interrupted = std::process::Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .unwrap();
+    assert!(interrupted.success());
+    let ended = child.wait_with_output().unwrap();
+    assert_eq!(ended.status.code(), Some(130));
+    assert!(all_ended(at));
+    let left: Vec<_> = std::fs::read_dir(at.join("s"))
+        .unwrap()
+        .map(|f| f.unwrap().file_name())
+        .collect();
+    assert_eq!(left, ["plan.json"]);
+    // What goes on from there is as if nothing had been.
+    std::fs::write(at.join("go"), "").unwrap();
+    for out in ["s", "t"] {
+        let done = catoptric().args(arguments(out)).current_dir(at).output().unwrap();
+        assert!(done.status.success(), "{}", stderr(&done));
+    }
+    let runs = read(at, "s/runs.csv");
+    assert_eq!(runs, read(at, "t/runs.csv"));
+    assert_eq!(runs.matches("it ended with exit status: 3").count(), 3, "{runs}");
+}
+
+#[test]
+fn a_program_that_states_a_hundredth_of_its_covariance_is_over_confident() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    // Both calibrate alike; the second divides every number of every covariance.
+    let calibrate = format!(
+        "{} calibrate --quiet \"$1\" --method beam-gls --out \"$2\" > \"$2.said\" || exit 1\n",
+        env!("CARGO_BIN_EXE_catoptric")
+    );
+    let divide = r#"awk '/"covariance_rad2": \[/ { left = 4 }
+left > 0 && /^ *-?[0-9]/ { end = /,$/ ? "," : ""; sub(/,$/, ""); printf "%.17g%s\n", $1 / 100, end; left--; next }
+{ print }' "$2" > "$2.divided" && mv "$2.divided" "$2"
+"#;
+    let honest = format!("honest={}", script(at, "honest.sh", &calibrate));
+    let bold = format!("bold={}", script(at, "bold.sh", &(calibrate + divide)));
+    let scene = scene();
+    let mut arguments = vec!["study", &scene, "--seeds", "12", "--methods", "oracle"];
+    arguments.extend(["--program", &honest, "--program", &bold]);
+    arguments.extend([
+        "--set",
+        "experiment.scans_per_pose=4",
+        "--out",
+        "s",
+        "--quiet",
+        "--json",
+    ]);
+    let output = run(at, &arguments);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let found: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let [oracle, honest, bold] = [0, 1, 2].map(|i| &found["methods"][i]);
+    let number = |m: &serde_json::Value, key: &str| m[key].as_f64().unwrap_or(f64::NAN);
+    assert_eq!(oracle["verdict"], "exact");
+    assert_eq!(honest["verdict"], "consistent");
+    assert!(
+        bold["verdict"].as_str().unwrap().starts_with("over-confident: "),
+        "{bold}"
+    );
+    let times = number(bold, "anees") / number(honest, "anees");
+    assert!((times - 100.0).abs() < 1e-6, "{times}");
+    assert_eq!(
+        number(bold, "per_axis_rms_deg"),
+        number(honest, "per_axis_rms_deg")
+    );
+    assert!(bold["coverage_95_interval"][1].as_f64().unwrap() < 0.95);
 }
 
 /// One of our methods that states its standard deviations so many times as large as they are.

@@ -68,6 +68,12 @@ pub(super) fn cells(scene_path: &Path, axes: &[String], sets: &[String]) -> Resu
                 "give all values of a key in one --axis",
             ));
         }
+        if let Some(set) = sets.iter().find(|set| set.split('=').next() == Some(&key)) {
+            return Err(invalid(
+                format!("--axis {text}: --set {set} gives it one value"),
+                "leave the --set out",
+            ));
+        }
         grid = grid
             .iter()
             .flat_map(|cell| {

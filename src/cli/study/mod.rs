@@ -57,12 +57,7 @@ struct StudyArguments {
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     seeds: u64,
     /// Who calibrates: our methods, and "oracle", which knows the truth.
-    #[arg(
-        long,
-        value_name = "NAME,…",
-        value_delimiter = ',',
-        default_value = "joint,beam-gls,beam"
-    )]
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', default_value = "joint")]
     methods: Vec<String>,
     /// A program that calibrates too, any number of times: NAME=COMMAND. It is given the folder of a blind dataset and the
     /// file to write: where the command says {dataset} and {out}, and at its end if it does not. What it says is split at
@@ -72,7 +67,7 @@ struct StudyArguments {
     /// After how long a program is taken to hang, in seconds.
     #[arg(long, value_name = "S", default_value_t = 600)]
     program_timeout_s: u64,
-    /// Adds to every method of ours one that is told of no bias.
+    /// Adds to every method of ours one that is told of no bias, and believes that biases are as likely as those are large.
     #[arg(long)]
     uncorrected: bool,
     /// A value of the scene to be varied, any number of times: key=a,b,c or key=from:to:steps.
@@ -122,6 +117,7 @@ fn study_scene(arguments: &StudyArguments, context: &Context) -> Result<(), CliE
         cells: grid::cells(scene, &arguments.axis, &arguments.set)?,
         seeds: arguments.seeds,
         contestants: grid::contestants(arguments)?,
+        stop: interrupt::flag(),
     };
     let plan = Plan::of(&study, shard)?;
     plan.claim(out)?;
@@ -166,7 +162,7 @@ fn simulate(
     Ok(found)
 }
 
-/// Nothing of a chunk is kept if Ctrl-C was pressed meanwhile: it ends programs too, which is no failure of theirs.
+/// Nothing of a chunk is kept if Ctrl-C was pressed meanwhile: programs are ended then, which is no failure of theirs.
 fn experiments(study: &Study, chunk: &[Job], with_elements: bool) -> Result<Found, CliError> {
     let one = |job: &Job| {
         interrupt::check()?;

@@ -6,6 +6,7 @@ use catoptric::io::{self, scene};
 use catoptric::study::{Cell, Contestant, Program, SCHEMA_VERSION, Study};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::sync::Arc;
 
 const FILE: &str = "plan.json";
 
@@ -163,6 +164,7 @@ impl Plan {
                 .iter()
                 .map(contestant)
                 .collect::<Result<_, _>>()?,
+            stop: Arc::default(),
         })
     }
 }
