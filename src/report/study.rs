@@ -20,7 +20,7 @@ pub fn study(name: &str, study: &Study, summary: &Summary, elements: &[ElementAn
     for axis in names.iter().filter(|axis| points(summary, axis).len() > 1) {
         html += &over(summary, axis);
     }
-    let mut headings = vec!["method"];
+    let mut headings = vec!["method", "verdict"];
     headings.extend(names.iter().map(String::as_str));
     headings.extend([
         "runs",
@@ -36,7 +36,6 @@ pub fn study(name: &str, study: &Study, summary: &Summary, elements: &[ElementAn
         "99 %",
         "bias p",
         "solved",
-        "verdict",
     ]);
     let rows: Vec<Vec<String>> = summary.methods.iter().map(|m| row(m, &names)).collect();
     html += &table(&headings, &rows);
@@ -48,7 +47,7 @@ pub fn study(name: &str, study: &Study, summary: &Summary, elements: &[ElementAn
 }
 
 fn row(m: &MethodSummary, names: &[String]) -> Vec<String> {
-    let mut row = vec![m.method.clone()];
+    let mut row = vec![m.method.clone(), m.verdict.clone()];
     row.extend(names.iter().map(|n| m.axes.get(n).cloned().unwrap_or_default()));
     let share = |share: f64, [low, high]: [f64; 2]| {
         format!("{} ({} to {})", number(share, 3), number(low, 3), number(high, 3))
@@ -71,7 +70,6 @@ fn row(m: &MethodSummary, names: &[String]) -> Vec<String> {
         share(m.coverage_99, m.coverage_99_interval),
         number(m.bias_p_value, 3),
         number(m.solved, 1),
-        m.verdict.clone(),
     ]);
     row
 }

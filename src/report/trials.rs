@@ -1,6 +1,7 @@
 //! The trials of a study one by one, as in the paper's Figure 10: θ and φ of every element in each, their mean and how
 //! they spread.
 
+use super::angles::{NAMES, angles};
 use super::figure::{Axes, Stroke, around_zero, color, css, laws};
 use super::page::{escape, figure, number, table};
 use crate::study::{ElementAngles, Spread, Study, spread};
@@ -13,8 +14,6 @@ const MOST_TRIALS: u64 = 30;
 
 /// The paper's colors, blue for θ and magenta for φ, as near as the palette has them.
 const COLORS: [usize; 2] = [0, 3];
-
-const NAMES: [&str; 2] = ["θ_a", "φ"];
 
 /// A section for every cell, with a figure for every contestant; nothing without elements.
 pub(super) fn trials(study: &Study, elements: &[ElementAngles]) -> String {
@@ -35,6 +34,8 @@ pub(super) fn trials(study: &Study, elements: &[ElementAngles]) -> String {
         let mut methods: Vec<&str> = of_cell.iter().map(|s| s.method.as_str()).collect();
         methods.dedup();
         html += &overall(&of_cell, &methods);
+        let in_cell: Vec<&ElementAngles> = elements.iter().filter(|e| e.cell == index).collect();
+        html += &angles(&of_cell, &in_cell, study.seeds <= MOST_TRIALS);
         // The same for all contestants, so that they can be compared by eye.
         let limits = around_zero(
             elements

@@ -134,6 +134,23 @@ mod tests {
     const SD: f64 = 0.25;
 
     #[test]
+    fn what_is_seen_has_an_edge() {
+        let pulse = |range, power| Pulse { range, power };
+        for (pulses, seen) in [
+            (vec![], false),
+            (vec![pulse(3.0, 0.999)], false),
+            (vec![pulse(3.0, 1.0)], true),
+            // Each too dim, and only near enough to each other bright enough together.
+            (vec![pulse(3.0, 0.6), pulse(3.1, 0.6)], true),
+            (vec![pulse(3.0, 0.6), pulse(4.5, 0.6)], false),
+            (vec![pulse(3.0, 0.6), pulse(4.5, 1.2)], true),
+        ] {
+            assert_eq!(is_seen(&pulses, SD, 1.0), seen, "{pulses:?}");
+            assert_eq!(leading_edge(&pulses, SD, 1.0).is_some(), seen, "{pulses:?}");
+        }
+    }
+
+    #[test]
     fn one_pulse_has_its_closed_form() {
         for power in [1.0, 1.5, 40.0, 1e6] {
             let edge = leading_edge(&[Pulse { range: 3.0, power }], SD, 1.0).expect("it is bright enough");
