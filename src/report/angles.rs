@@ -153,7 +153,7 @@ mod tests {
         assert_eq!(html.matches("<svg").count(), 2);
         assert!(html.contains("by “beam”") && !html.contains("joint"), "{html}");
         // The mean of 179° and 181°, of 178° and 179°, and the truth.
-        let row = "<td>7</td><td>179.500</td><td>180.000</td><td>178.500</td><td>50.250</td><td>50.000</td>";
+        let row = "7</th><td>179.500</td><td>180.000</td><td>178.500</td><td>50.250</td><td>50.000</td>";
         assert!(html.contains(row), "{html}");
         let alone: Vec<&Spread> = spreads.iter().filter(|s| s.method == "joint").collect();
         assert_eq!(angles(&alone, &refs, true), "");
