@@ -280,16 +280,16 @@ impl<'a> Recorded<'a> {
         let mut segments = segments_of(&first);
         let mut recorder = laboratory.recorder(number);
         recorder.add(&first);
+        // What is seen once something has moved.
+        let mut latest = None;
         for scan in 1..laboratory.scans_of(number) {
-            if sight.moves() {
+            if sight.changes_at(scan) {
                 let begin = Instant::now();
-                let returns = sight.returns(scan);
+                latest = Some(sight.returns(scan));
                 trace += begin.elapsed();
-                segments += segments_of(&returns);
-                recorder.add(&returns);
-            } else {
-                recorder.add(&first);
+                segments += latest.as_ref().map_or(0, segments_of);
             }
+            recorder.add(latest.as_ref().unwrap_or(&first));
         }
         Ok(Self {
             sight,

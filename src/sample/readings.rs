@@ -52,6 +52,7 @@ pub(super) fn record(
         room_from_rig,
         room_from_board: board,
         motion: None,
+        watched: Vec::new(),
         beams: beam::COUNT,
         ranges: Vec::new(),
     }

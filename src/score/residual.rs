@@ -2,6 +2,7 @@
 
 use super::statistics::{mean, rms};
 use catoptric_calib::observations::{self, BoardInSensor};
+use catoptric_calib::tracking;
 use catoptric_model::{Calibration, CorrectedRange, Dataset, Deflection, Pose, PoseKind, PoseRecord};
 use catoptric_model::{RangeBias, RawRange, beam};
 use nalgebra::Unit;
@@ -44,6 +45,9 @@ struct Visit {
 /// its spot. A reading there is corrected by all of Eq. 3, since board and incidence are known, and its residual is
 /// the distance of the lifted point from the board's plane, cos θ_N·(r − d − s).
 pub fn boards(dataset: &Dataset, calibration: &Calibration) -> SurfaceResidual {
+    // A label on the wrong marker puts a board where it was not.
+    let (dataset, _) = tracking::put_right(dataset);
+    let dataset = dataset.as_ref();
     let rig_from_sensor = mount(dataset, calibration);
     let cone = observations::cone_half_angle(&dataset.session);
     collect(dataset, calibration, PoseKind::Facet, |pose| {

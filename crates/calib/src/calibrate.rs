@@ -1,17 +1,19 @@
 //! The whole procedure on one dataset: mounting, screening, and every element in turn.
 
+use crate::bare::Bare;
 use crate::element::Workspace;
 use crate::error::CalibError;
 use crate::joint::{self, Assigned};
+use crate::locate;
 use crate::observations::{BoardInSensor, azimuth};
 use crate::options::{Method, Options};
 use crate::pose::{self, Mount};
 use crate::screen::{Candidate, Screen};
 use crate::solve::BareDistance;
+use crate::tracking;
 use catoptric_model::session::{NominalFacet, Session};
 use catoptric_model::{
-    BeamEstimate, Calibration, Dataset, Deflection, MirrorPlane, PoseRecord, Status, Summary, beam,
-    calibration, mirror,
+    BeamEstimate, Calibration, Dataset, Deflection, MirrorPlane, Status, Summary, beam, calibration, mirror,
 };
 use nalgebra::{Unit, Vector3};
 
@@ -36,6 +38,9 @@ const LEAST_ELEMENTS: usize = 5;
 /// }
 /// ```
 pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result<Calibration, CalibError> {
+    dataset.check()?;
+    let (dataset, warnings) = tracking::put_right(dataset);
+    let dataset = dataset.as_ref();
     let session = &dataset.session;
     let prepared = prepare(dataset)?;
     let (mount, drawn) = (&prepared.mount, &prepared.drawn);
@@ -62,11 +67,11 @@ pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result
         facets: Vec::new(),
         rig_from_sensor: Some(mount.to_file()),
         bias: None,
-        warnings: Vec::new(),
+        warnings,
         assessment: None,
     };
     match method {
-        Method::Prior => calibration.beams = as_drawn(session, &candidates, drawn),
+        Method::Prior => calibration.beams = as_drawn(session, &prepared.bare, &candidates, drawn),
         Method::Joint | Method::Facet => {
             // An element by itself decides whether its readings are of use, and which boards it hits.
             let alone = Workspace {
@@ -88,6 +93,7 @@ pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result
 pub(crate) struct Prepared {
     pub(crate) drawn: Vec<MirrorPlane>,
     summaries: Vec<Vec<Summary>>,
+    pub(crate) bare: Bare,
     pub(crate) mount: Mount,
     boards: Vec<Option<BoardInSensor>>,
 }
@@ -102,7 +108,7 @@ pub(crate) fn prepare(dataset: &Dataset) -> Result<Prepared, CalibError> {
         .iter()
         .map(plane_as_drawn)
         .collect::<Result<_, _>>()?;
-    let summaries: Vec<Vec<Summary>> = dataset.poses.iter().map(PoseRecord::summarize).collect();
+    let summaries = locate::summaries(dataset);
     let mount = pose::estimate(dataset, &summaries);
     let boards = dataset
         .poses
@@ -112,6 +118,7 @@ pub(crate) fn prepare(dataset: &Dataset) -> Result<Prepared, CalibError> {
     Ok(Prepared {
         drawn,
         summaries,
+        bare: Bare::of(session),
         mount,
         boards,
     })
@@ -127,6 +134,7 @@ impl Prepared {
         Workspace {
             dataset,
             summaries: &self.summaries,
+            bare: &self.bare,
             boards: &self.boards,
             rig_from_sensor: self.mount.rig_from_sensor,
             mount: &self.mount.uncertainty,
@@ -190,7 +198,12 @@ fn together(
 }
 
 /// What the drawing says of every element that a mirror may deflect; nobody knows how far it is off.
-fn as_drawn(session: &Session, candidates: &[Candidate], drawn: &[MirrorPlane]) -> Vec<BeamEstimate> {
+fn as_drawn(
+    session: &Session,
+    bare: &Bare,
+    candidates: &[Candidate],
+    drawn: &[MirrorPlane],
+) -> Vec<BeamEstimate> {
     let of_one = |(beam, candidate): (usize, &Candidate)| match candidate {
         Candidate::Direct(reason) => BeamEstimate::without_angles(beam, Status::Direct, Some(reason.clone())),
         Candidate::Rejected(reason) => {
@@ -208,20 +221,18 @@ fn as_drawn(session: &Session, candidates: &[Candidate], drawn: &[MirrorPlane]) 
                 facet: Some(session.facets[*facet].name.clone()),
                 azimuth_rad: Some(deflection.azimuth),
                 elevation_rad: Some(deflection.elevation),
-                distance_m: Some(
-                    session
-                        .bare_structure
-                        .distance(beam)
-                        .map_or(deflection.distance, |bare| {
-                            let thickness = session.bare_structure.mirror_thickness_mm * 1e-3;
-                            let exit = deflection.exit_direction(azimuth(session, beam));
-                            BareDistance {
-                                distance: bare,
-                                thickness,
-                            }
-                            .to_mirror(azimuth(session, beam), &exit)
-                        }),
-                ),
+                distance_m: Some(bare.distance(session, &session.facets[*facet].name, beam).map_or(
+                    deflection.distance,
+                    |bare| {
+                        let thickness = session.bare_structure.mirror_thickness_mm * 1e-3;
+                        let exit = deflection.exit_direction(azimuth(session, beam));
+                        BareDistance {
+                            distance: bare,
+                            thickness,
+                        }
+                        .to_mirror(azimuth(session, beam), &exit)
+                    },
+                )),
                 ..BeamEstimate::without_angles(beam, Status::Solved, None)
             }
         }

@@ -42,7 +42,7 @@ impl<'a> Attempt<'a> {
         nominal: &Deflection,
     ) -> Self {
         let noise = session.believed.range_noise_sd_mm * 1e-3;
-        let distance = session.bare_structure.distance(beam).map_or(
+        let distance = work.bare.distance(session, &facet.name, beam).map_or(
             // Nobody measured it: the drawing's mirror, whose face is its own.
             BareDistance {
                 distance: nominal.distance,

@@ -1,8 +1,10 @@
 //! One element from its readings to its estimate: boards and angles chosen in turn until both stand.
 
+use crate::bare::Bare;
 use crate::choose::Attempt;
 use crate::covariance::MountUncertainty;
 use crate::initial;
+use crate::locate;
 use crate::observability::{self, Weakness};
 use crate::observations::{BoardInSensor, azimuth};
 use crate::options::{Method, Options};
@@ -33,6 +35,7 @@ const LARGEST_EXCESS: f64 = 0.2;
 pub(crate) struct Workspace<'a> {
     pub(crate) dataset: &'a Dataset,
     pub(crate) summaries: &'a [Vec<Summary>],
+    pub(crate) bare: &'a Bare,
     /// Each pose's board in the sensor frame.
     pub(crate) boards: &'a [Option<BoardInSensor>],
     pub(crate) rig_from_sensor: Pose,
@@ -168,8 +171,8 @@ impl Attempt<'_> {
                 let readings: Vec<Vec<f64>> = poses
                     .iter()
                     .map(|p| {
-                        let all = self.work.dataset.poses[*p].readings(self.beam);
-                        all.filter(|r| r.is_finite()).collect()
+                        let record = &self.work.dataset.poses[*p];
+                        locate::kept(record, self.beam, self.summary(*p), self.noise)
                     })
                     .collect();
                 // Where the readings leave a direction open there is nothing to recurse on; the batch says which.

@@ -14,6 +14,7 @@
 //! truth. It reads no file, prints nothing and draws nothing at random.
 
 mod ahead;
+mod bare;
 mod calibrate;
 mod calibrator;
 mod characterize;
@@ -29,6 +30,7 @@ pub mod jacobian;
 mod joint;
 mod judge;
 pub mod least_squares;
+mod locate;
 mod mount_data;
 pub mod observability;
 pub mod observations;
@@ -39,6 +41,7 @@ pub mod recursive;
 pub mod screen;
 pub mod solve;
 pub mod spread;
+pub mod tracking;
 
 pub use calibrate::calibrate;
 pub use calibrator::Calibrator;

@@ -46,9 +46,9 @@ mod tests {
     fn of(sd: f64) -> Summary {
         Summary {
             count: 100,
-            missing: 0,
             mean: 1.0,
             sd,
+            ..Summary::default()
         }
     }
 

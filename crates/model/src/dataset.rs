@@ -6,6 +6,8 @@ use crate::error::ModelError;
 use crate::frame::Pose;
 use crate::motion::Motion;
 use crate::session::Session;
+use crate::summary::Summary;
+use crate::tracking::Watched;
 use nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -159,23 +161,12 @@ pub struct PoseRecord {
     pub room_from_board: Option<Pose>,
     /// Where the rig was during a flight; `None` where nothing moved.
     pub motion: Option<Motion>,
+    /// The markers of rig and board over the stretch; none of a flight, nor where only poses were recorded.
+    pub watched: Vec<Watched>,
     /// Beams of a scan.
     pub beams: usize,
     /// Readings in metres, scan after scan; −∞ too close, +∞ no return, NaN invalid (REP-117).
     pub ranges: Vec<f64>,
-}
-
-/// Statistics of one beam over a stretch.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Summary {
-    /// Readings that are ranges.
-    pub count: usize,
-    /// Readings that are not.
-    pub missing: usize,
-    /// Mean of the ranges, in metres; 0 without any.
-    pub mean: f64,
-    /// Sample standard deviation, in metres; 0 for fewer than two.
-    pub sd: f64,
 }
 
 /// A recorded experiment: what a calibration is made from.
@@ -232,10 +223,15 @@ impl Stretch {
             ModelError::Inconsistent(format!("pose {}: the rig was never tracked", self.label.pose))
         })?;
         let room_from_board = self.label.board.as_deref().and_then(mean);
+        let watched = match motion {
+            Some(_) => Vec::new(),
+            None => self.tracks.iter().filter_map(Watched::of).collect(),
+        };
         Ok(PoseRecord {
             room_from_rig,
             room_from_board,
             motion,
+            watched,
             beams: self.beams,
             ranges: self.ranges,
             label: self.label,
@@ -256,35 +252,24 @@ impl Stretch {
 
 impl PoseRecord {
     /// The readings of one beam, scan after scan.
-    pub fn readings(&self, beam: usize) -> impl Iterator<Item = f64> + '_ {
+    pub fn readings(&self, beam: usize) -> impl Iterator<Item = f64> + Clone + '_ {
         self.ranges.iter().skip(beam).step_by(self.beams).copied()
     }
 
     /// Mean and spread of every beam.
     pub fn summarize(&self) -> Vec<Summary> {
-        // Scan after scan, as the readings lie in memory. Welford's recurrence, in which `sd` holds the sum of squares
-        // until the end: the naive sum loses the noise under the range.
+        // Scan after scan, as the readings lie in memory.
         let mut summaries = vec![Summary::default(); self.beams];
         for scan in self.ranges.chunks(self.beams.max(1)) {
             for (s, r) in summaries.iter_mut().zip(scan) {
                 if r.is_finite() {
-                    s.count += 1;
-                    let step = r - s.mean;
-                    s.mean += step / s.count as f64;
-                    s.sd += step * (r - s.mean);
+                    s.add(*r);
                 } else {
                     s.missing += 1;
                 }
             }
         }
-        for s in &mut summaries {
-            s.sd = if s.count > 1 {
-                (s.sd / (s.count - 1) as f64).sqrt()
-            } else {
-                0.0
-            };
-        }
-        summaries
+        summaries.into_iter().map(Summary::finished).collect()
     }
 }
 
@@ -365,6 +350,7 @@ mod tests {
             room_from_rig: Pose::identity(),
             room_from_board: None,
             motion: None,
+            watched: Vec::new(),
             beams: 2,
             ranges: vec![1.0, f64::INFINITY, 2.0, f64::NAN, 3.0, 5.0],
         };
@@ -373,9 +359,9 @@ mod tests {
             s[0],
             Summary {
                 count: 3,
-                missing: 0,
                 mean: 2.0,
-                sd: 1.0
+                sd: 1.0,
+                ..Summary::default()
             }
         );
         assert_eq!(
@@ -384,7 +370,7 @@ mod tests {
                 count: 1,
                 missing: 2,
                 mean: 5.0,
-                sd: 0.0
+                ..Summary::default()
             }
         );
     }

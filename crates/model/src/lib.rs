@@ -42,6 +42,8 @@ pub mod motion;
 pub mod paper;
 pub mod range;
 pub mod session;
+pub mod summary;
+pub mod tracking;
 
 pub use assessment::Assessment;
 pub use beam::Deflection;
@@ -50,8 +52,7 @@ pub use board::{BoardPlane, Rectangle};
 pub use calibration::{BeamEstimate, Calibration, Status};
 pub use characterization::Characterization;
 pub use dataset::{
-    Dataset, PoseKind, PoseLabel, PoseRecord, SpotNote, Stretch, Summary, TestKind, TestNote, Track,
-    TrackedFrame,
+    Dataset, PoseKind, PoseLabel, PoseRecord, SpotNote, Stretch, TestKind, TestNote, Track, TrackedFrame,
 };
 pub use error::ModelError;
 pub use frame::{Pose, PoseData};
@@ -59,3 +60,5 @@ pub use mirror::MirrorPlane;
 pub use motion::Motion;
 pub use range::{CorrectedRange, RawRange};
 pub use session::Session;
+pub use summary::{Summary, Window};
+pub use tracking::Watched;

@@ -6,6 +6,7 @@
 
 mod experiment;
 mod flight;
+mod mishap;
 mod outline;
 mod stage;
 mod structure;
@@ -50,6 +51,7 @@ pub fn problems(scene: &Scene) -> Vec<Problem> {
         structure::check(scene, &mut found);
         if scene.room.has_walls() {
             experiment::check(scene, &mut found);
+            mishap::check(scene, &mut found);
         }
         flight::check(scene, &mut found);
     }

@@ -63,6 +63,14 @@ pub enum SimError {
         /// The flight.
         name: String,
     },
+    /// A mishap that cannot happen.
+    #[error("a mishap in pose {pose}: {what}")]
+    Mishap {
+        /// Number of the pose.
+        pose: usize,
+        /// Why it cannot.
+        what: String,
+    },
     /// A scene to trace rays in, and no more.
     #[error(
         "the scene has no laboratory: recording takes a [superstructure] with markers, and either room.size_m and a \

@@ -3,8 +3,9 @@
 use crate::noise::{Draws, Purpose};
 use crate::scene::{Mocap, MocapProfile};
 use catoptric_model::dataset::RIG_SUBJECT;
+use catoptric_model::tracking::solve_pose;
 use catoptric_model::{Pose, Track, TrackedFrame};
-use nalgebra::{Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Point3, Vector3};
 
 /// Errors of a marker, 1σ along the room's x, y and z, in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,40 +41,6 @@ impl Mocap {
             }),
         }
     }
-}
-
-/// The pose that takes a template to the points seen, in the sense of least squares (Kabsch); `None` for points seen
-/// too few or on a line.
-pub fn solve_pose(template: &[Point3<f64>], seen: &[Option<Point3<f64>>]) -> Option<Pose> {
-    let pairs: Vec<_> = template
-        .iter()
-        .zip(seen)
-        .filter_map(|(t, s)| Some((t, (*s)?)))
-        .collect();
-    if pairs.len() < 3 {
-        return None;
-    }
-    let n = pairs.len() as f64;
-    let from = pairs.iter().map(|(t, _)| t.coords).sum::<Vector3<f64>>() / n;
-    let to = pairs.iter().map(|(_, s)| s.coords).sum::<Vector3<f64>>() / n;
-    let covariance: Matrix3<f64> = pairs
-        .iter()
-        .map(|(t, s)| (s.coords - to) * (t.coords - from).transpose())
-        .sum();
-    let svd = covariance.svd(true, true);
-    let (u, v_t) = (svd.u?, svd.v_t?);
-    // Points on a line leave the turn about it open.
-    if svd.singular_values[1] <= 1e-9 * svd.singular_values[0] {
-        return None;
-    }
-    // The rotation, not the reflection that may fit a plane template as well.
-    let sign = (u.determinant() * v_t.determinant()).signum();
-    let rotation = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t;
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
-    Some(Pose::from_parts(
-        Translation3::from(to - rotation * from),
-        rotation,
-    ))
 }
 
 /// A body to be tracked.
@@ -151,7 +118,6 @@ pub fn track(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use catoptric_model::frame::yaw_pitch_roll;
 
     fn template() -> Vec<Point3<f64>> {
         vec![
@@ -160,30 +126,6 @@ mod tests {
             Point3::new(-0.1, -0.3, 0.0),
             Point3::new(0.05, 0.1, 0.0),
         ]
-    }
-
-    #[test]
-    fn exact_markers_give_the_exact_pose() {
-        let truth = Pose::from_parts(Translation3::new(1.0, -2.0, 0.5), yaw_pitch_roll(2.0, -0.7, 3.0));
-        let seen: Vec<_> = template().iter().map(|p| Some(truth * p)).collect();
-        let found = solve_pose(&template(), &seen).expect("four markers are seen");
-        for p in template() {
-            assert!((found * p - truth * p).norm() < 1e-14);
-        }
-    }
-
-    #[test]
-    fn too_few_or_collinear_markers_give_none() {
-        let two = [
-            Some(Point3::origin()),
-            None,
-            None,
-            Some(Point3::new(1.0, 0.0, 0.0)),
-        ];
-        assert!(solve_pose(&template(), &two).is_none());
-        let line: Vec<_> = (0..4).map(|i| Point3::new(f64::from(i), 0.0, 0.0)).collect();
-        let seen: Vec<_> = line.iter().copied().map(Some).collect();
-        assert!(solve_pose(&line, &seen).is_none());
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The truth: what was really simulated, kept apart from what was observed.
 
+use crate::scene::Mishap;
 use catoptric_model::beam::{self, Deflection};
 use catoptric_model::{PoseData, PoseKind, RangeBias};
 use nalgebra::{Unit, Vector3};
@@ -100,6 +101,12 @@ pub struct TruePose {
     /// Where the board stood.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub room_from_board: Option<PoseData>,
+    /// Where the board stood after it had moved during the stretch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub room_from_board_after: Option<PoseData>,
+    /// What went wrong.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mishap: Option<Mishap>,
     /// Where the sensor was at the start of every scan of a flight; in other stretches it is where it always is.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub room_from_sensor: Vec<PoseData>,

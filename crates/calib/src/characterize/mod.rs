@@ -24,13 +24,14 @@ mod spot;
 
 use crate::calibrate::check_session;
 use crate::error::CalibError;
+use crate::locate;
 use crate::mount_data::{DirectBoard, Selection, Selector};
 use crate::pose;
 use adjust::{Adjustment, Prior, adjust};
 use catoptric_model::characterization::{
     Characterization, Fit, Law, Parameter, SCHEMA_VERSION, Scatter, StretchRow,
 };
-use catoptric_model::{AngleTable, Dataset, Pose, PoseRecord, RangeBias, Summary};
+use catoptric_model::{AngleTable, Dataset, Pose, RangeBias};
 use design::{Design, Term};
 use nalgebra::{DMatrix, Matrix2, Vector2};
 use std::collections::BTreeMap;
@@ -62,7 +63,7 @@ pub fn characterize(dataset: &Dataset) -> Result<Characterization, CalibError> {
     dataset.check()?;
     let session = &dataset.session;
     check_session(session)?;
-    let summaries: Vec<Vec<Summary>> = dataset.poses.iter().map(PoseRecord::summarize).collect();
+    let summaries = locate::summaries(dataset);
     let none = RangeBias::default();
     let selector = Selector::new(dataset, &summaries).with_bias(&none, LARGEST_BIAS);
     let prior = Prior::of(session);

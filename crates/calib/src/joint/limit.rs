@@ -11,6 +11,7 @@ use crate::error::CalibError;
 use crate::least_squares;
 use crate::observations::azimuth;
 use crate::options::{Method, Options};
+use crate::tracking;
 use catoptric_model::{Dataset, Deflection, MirrorPlane, frame};
 use nalgebra::{DMatrix, DVector, Matrix2, Unit, Vector3};
 use std::collections::BTreeMap;
@@ -37,6 +38,9 @@ pub fn limit(
     dataset: &Dataset,
     truth: &[TrueDirection],
 ) -> Result<BTreeMap<usize, Option<Matrix2<f64>>>, CalibError> {
+    dataset.check()?;
+    let (dataset, _) = tracking::put_right(dataset);
+    let dataset = dataset.as_ref();
     let prepared = prepare(dataset)?;
     let options = Options::default();
     let work = prepared.workspace(dataset, Method::Joint, &options);

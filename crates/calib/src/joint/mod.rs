@@ -142,7 +142,10 @@ fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) -> Group {
     let bare = |facet: usize| {
         let distances = assigned.iter().filter(|a| a.facet == facet).filter_map(|a| {
             let u = beam::direction(azimuth(session, a.beam));
-            Some((u, session.bare_structure.distance(a.beam)?))
+            Some((
+                u,
+                work.bare.distance(session, &session.facets[facet].name, a.beam)?,
+            ))
         });
         BareFacet {
             distances: distances.collect(),

@@ -7,6 +7,7 @@ use crate::observations::{BoardInSensor, azimuth, cone_half_angle};
 use crate::options::{Method, Options};
 use crate::pose;
 use crate::spread;
+use crate::tracking;
 use catoptric_model::session::{BoardSheet, NominalFacet};
 use catoptric_model::{
     BoardPlane, Dataset, Deflection, MirrorPlane, Pose, PoseKind, PoseLabel, PoseRecord, Session, Status,
@@ -116,6 +117,9 @@ impl Situation {
     /// # Errors
     /// As [`calibrate`](fn@calibrate).
     pub fn recorded(dataset: &Dataset) -> Result<Self, CalibError> {
+        dataset.check()?;
+        let (dataset, _) = tracking::put_right(dataset);
+        let dataset = dataset.as_ref();
         let session = &dataset.session;
         let options = Options::default();
         let calibration = calibrate(dataset, Method::BeamGls, &options)?;
@@ -336,6 +340,7 @@ fn expected_mount(session: &Session, room_from_rig: &Pose, placed: &[Placed]) ->
             room_from_rig: *room_from_rig,
             room_from_board: Some(place.room_from_board),
             motion: None,
+            watched: Vec::new(),
             beams: session.scanner.beams,
             ranges: Vec::new(),
         });
@@ -359,6 +364,7 @@ fn predicted(session: &Session, board: &BoardInSensor, readings: usize) -> Vec<S
                     let bias = believed.bias.terms(hit.distance, cos_incidence, &board.color);
                     Summary {
                         count: readings,
+                        outliers: 0,
                         missing: 0,
                         mean: hit.distance + bias.total(),
                         sd: believed.range_noise_sd_mm * 1e-3,
@@ -366,6 +372,7 @@ fn predicted(session: &Session, board: &BoardInSensor, readings: usize) -> Vec<S
                 }
                 None => Summary {
                     count: 0,
+                    outliers: 0,
                     missing: readings,
                     mean: f64::NAN,
                     sd: f64::NAN,

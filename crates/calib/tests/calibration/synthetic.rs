@@ -414,6 +414,7 @@ impl Lab<'_> {
             room_from_rig: self.room_from_rig,
             room_from_board: board.map(|b| self.tracked(&(self.room_from_sensor * b), draw)),
             motion: None,
+            watched: Vec::new(),
             beams: world.beams,
             ranges,
         }

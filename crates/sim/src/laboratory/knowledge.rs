@@ -8,7 +8,7 @@ use crate::placement;
 use crate::scene::{ErrorModel, Marker, Scene};
 use crate::structure::{self, Structure};
 use catoptric_model::session::{self, Session};
-use catoptric_model::{PoseData, PoseKind, RangeBias, beam};
+use catoptric_model::{PoseData, PoseKind, PoseRecord, RangeBias, Summary, beam};
 use nalgebra::{Unit, Vector3};
 
 /// Bare readings beyond this are not of the structure, in metres.
@@ -123,7 +123,16 @@ impl Laboratory {
         let number = self.planned.iter().position(|p| p.kind == PoseKind::Bare);
         let stretch = number.map(|number| self.stretch(number)).transpose()?;
         let record = stretch.and_then(|s| s.into_record().ok());
-        let summaries = record.map(|r| r.summarize()).unwrap_or_default();
+        // The experimenter looks at his readings before he averages them.
+        let noise_sd = self.beliefs().range_noise_sd_mm * 1e-3;
+        let looked_at = |record: &PoseRecord, beam: usize, plain: Summary| {
+            let found = Summary::of_main_body(record.readings(beam), noise_sd);
+            found.filter(|s| s.outliers > 0).unwrap_or(plain)
+        };
+        let summaries: Vec<Summary> = record.map_or_else(Vec::new, |r| {
+            let plain = r.summarize().into_iter().enumerate();
+            plain.map(|(beam, plain)| looked_at(&r, beam, plain)).collect()
+        });
         if let Some(sd_mm) = self.scene.experiment.bare_distance_sd_mm {
             return self.measured_bare(sd_mm, thickness);
         }

@@ -4,6 +4,7 @@
 
 mod chance;
 mod knowledge;
+mod mishap;
 mod recorder;
 mod room;
 mod sight;
@@ -27,6 +28,7 @@ use crate::stage::Stage;
 use crate::structure::Structure;
 use crate::trajectory::Trajectory;
 use catoptric_model::dataset::RIG_SUBJECT;
+use catoptric_model::tracking::solve_pose;
 use catoptric_model::{
     Dataset, Pose, PoseLabel, PoseRecord, RangeBias, SpotNote, Stretch, TestKind, TestNote,
 };
@@ -99,13 +101,14 @@ impl Laboratory {
             trajectories,
         };
         laboratory.check_markers()?;
+        laboratory.check_mishaps()?;
         Ok(laboratory)
     }
 
     fn check_markers(&self) -> Result<(), SimError> {
         let spans = |template: &[Point3<f64>]| {
             let all: Vec<_> = template.iter().copied().map(Some).collect();
-            mocap::solve_pose(template, &all).is_some()
+            solve_pose(template, &all).is_some()
         };
         if !spans(&room::points(&self.scene.superstructure.marker)) {
             return Err(SimError::Markers {
@@ -173,14 +176,12 @@ impl Laboratory {
         draws.normal() * self.scene.errors.drift_sd_mm * 1e-3
     }
 
-    /// Walls and the stretch's board, in the sensor frame.
-    fn targets(&self, number: usize) -> Result<Vec<Target>, SimError> {
+    /// Walls and the stretch's board where it stands, in the sensor frame.
+    fn targets(&self, number: usize, room_from_board: Option<&Pose>) -> Result<Vec<Target>, SimError> {
         let sensor_from_room = self.room_from_sensor().inverse();
         let wall_paint = color::paint(&self.scene, &self.scene.room.color)?;
         let mut targets = wall_targets(&self.scene, &sensor_from_room, &wall_paint);
-        if let (Some((board, _)), Some(room_from_board)) = (&self.planned[number].board, &self.boards[number])
-        {
-            let board = &self.scene.board[*board];
+        if let (Some(board), Some(room_from_board)) = (self.board_of(number), room_from_board) {
             let corners = room::outline(board)
                 .corners()
                 .map(|c| room_from_board * c)
@@ -211,12 +212,13 @@ impl Laboratory {
     /// An unknown color.
     pub fn stretch(&self, number: usize) -> Result<Stretch, SimError> {
         let sight = self.sight(number)?;
-        if !sight.moves() {
-            return Ok(self.record(number, &sight.returns(0)));
-        }
+        let mut returns = sight.returns(0);
         let mut recorder = self.recorder(number);
         for scan in 0..self.scans_of(number) {
-            recorder.add(&sight.returns(scan));
+            if sight.changes_at(scan) {
+                returns = sight.returns(scan);
+            }
+            recorder.add(&returns);
         }
         Ok(recorder.finish())
     }
@@ -305,13 +307,22 @@ impl Laboratory {
         if let (Some((board, _)), Some(room_from_board)) = (&self.planned[number].board, &self.boards[number])
         {
             let template = room::points(&board_markers(&self.scene.board[*board]));
-            tracks.push(track(&Body {
+            let movement = self
+                .movement(number)
+                .map(|m| (self.elapsed_s(m.scan, 0), m.room_from_board));
+            let stands = |elapsed_s: f64| match &movement {
+                Some((from, there)) if elapsed_s >= *from => *there,
+                _ => *room_from_board,
+            };
+            let mut seen = track(&Body {
                 subject: &self.scene.board[*board].name,
                 index: board + 1,
                 template: &template,
-                room_from_body: &|_| *room_from_board,
+                room_from_body: &stands,
                 placement: number + 1,
-            }));
+            });
+            self.mislabel(number, &mut seen);
+            tracks.push(seen);
         }
         tracks
     }

@@ -17,6 +17,8 @@ use rayon::prelude::*;
 pub struct Sight<'a> {
     laboratory: &'a Laboratory,
     setting: Setting<'a>,
+    /// What it is like from a scan on, after the board has moved.
+    after: Option<(usize, Setting<'a>)>,
     trajectory: Option<&'a Trajectory>,
 }
 
@@ -42,15 +44,32 @@ impl Laboratory {
                     PoseKind::Bare => Mirrors::Removed,
                     _ => Mirrors::Attached,
                 };
-                let targets = self.targets(number)?;
-                Setting::in_room(&self.scene, &self.structure, mirrors, Some(&self.stage), targets)?
+                self.setting_with(number, mirrors, self.boards[number].as_ref())?
             }
         };
+        let after = match self.movement(number) {
+            Some(m) => {
+                let there = Some(&m.room_from_board);
+                Some((m.scan, self.setting_with(number, Mirrors::Attached, there)?))
+            }
+            None => None,
+        };
         Ok(Sight {
+            after,
             laboratory: self,
             setting,
             trajectory,
         })
+    }
+
+    fn setting_with(
+        &self,
+        number: usize,
+        mirrors: Mirrors,
+        room_from_board: Option<&Pose>,
+    ) -> Result<Setting<'_>, SimError> {
+        let targets = self.targets(number, room_from_board)?;
+        Setting::in_room(&self.scene, &self.structure, mirrors, Some(&self.stage), targets)
     }
 
     /// Time at which a beam of a scan is read, in seconds since its stretch began.
@@ -61,9 +80,14 @@ impl Laboratory {
 }
 
 impl Sight<'_> {
-    /// Whether something moves, so that no two scans need be alike.
+    /// Whether something moves, so that not all scans are alike.
     pub fn moves(&self) -> bool {
-        self.trajectory.is_some()
+        self.trajectory.is_some() || self.after.is_some()
+    }
+
+    /// Whether a scan may see something else than the one before it; the first has none.
+    pub fn changes_at(&self, scan: usize) -> bool {
+        scan > 0 && (self.trajectory.is_some() || self.after.as_ref().is_some_and(|(from, _)| *from == scan))
     }
 
     /// Everything that light can meet, as the sensor has it around itself at the start.
@@ -71,7 +95,7 @@ impl Sight<'_> {
         &self.setting
     }
 
-    /// What every beam of a scan meets; the same for all scans where nothing moves.
+    /// What every beam of a scan meets; the same as for the scan before unless [`Sight::changes_at`] says otherwise.
     pub fn returns(&self, scan: usize) -> Returns {
         let beams = (0..beam::COUNT).into_par_iter();
         beams
@@ -89,7 +113,10 @@ impl Sight<'_> {
     /// Looks from where the sensor is when it reads a beam of a scan.
     fn seen_by<T>(&self, scan: usize, beam: usize, look: impl FnOnce(&Setting<'_>) -> T) -> T {
         match self.trajectory {
-            None => look(&self.setting),
+            None => look(match &self.after {
+                Some((from, setting)) if scan >= *from => setting,
+                _ => &self.setting,
+            }),
             Some(trajectory) => {
                 let elapsed_s = self.laboratory.elapsed_s(scan, beam);
                 let moved = self.start_from_sensor(trajectory, elapsed_s);

@@ -43,6 +43,8 @@ impl Laboratory {
                     pose: number,
                     kind: self.planned[number].kind,
                     room_from_board: self.boards[number].as_ref().map(PoseData::from),
+                    room_from_board_after: self.movement(number).map(|m| PoseData::from(&m.room_from_board)),
+                    mishap: self.mishap(number).cloned(),
                     room_from_sensor: self.flown(number),
                     drift_m: self.drift(number),
                     warm_up_m: self.scene.errors.warm_up.map(|_| {

@@ -7,6 +7,7 @@ mod body;
 mod detection;
 mod errors;
 mod flight;
+mod mishap;
 mod room;
 mod scanner;
 mod superstructure;
@@ -19,6 +20,7 @@ pub use body::{
 pub use detection::{Detection, Detector, EchoChoice, Principle};
 pub use errors::{Characterization, Correlated, ErrorModel, Errors, Interference, NoiseTable, WarmUp};
 pub use flight::{Attitude, Flight, Waypoint};
+pub use mishap::{Mishap, Mislabelled};
 pub use room::{Board, BoardPose, Color, Design, Experiment, MarkerNoise, Mocap, MocapProfile, Room};
 pub use scanner::{BeamShape, HousingBox, Light, Limits, Mount, Preset, Scanner};
 pub use superstructure::{

@@ -3,6 +3,7 @@
 use super::Marker;
 use super::body::{RoomMirror, RoomSurface};
 use super::errors::NoiseTable;
+use super::mishap::Mishap;
 use super::test::SensorTest;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -199,6 +200,9 @@ pub struct Experiment {
     /// Board poses given one by one. With any, none are chosen by the rules above.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pose: Vec<BoardPose>,
+    /// What goes wrong during the recording, which a calibration has to find out.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub mishap: Vec<Mishap>,
     /// Tests of the bare sensor: Cooper, step 1.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub test: Vec<SensorTest>,
@@ -270,6 +274,7 @@ impl Default for Experiment {
             placement_sd_deg: 2.0,
             pause_s: 5.0,
             pose: Vec::new(),
+            mishap: Vec::new(),
             test: Vec::new(),
             spot_sd_mm: SPOT_SD_MM,
         }

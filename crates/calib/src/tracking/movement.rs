@@ -1,0 +1,132 @@
+//! Did a body stay where it was while it was scanned?
+
+use super::{limit, solved};
+use catoptric_model::tracking::MeanMarker;
+use catoptric_model::{PoseRecord, Session, Watched};
+use nalgebra::{Point3, Vector3};
+
+/// A mean place of a marker may wander by this much along one axis without the body having moved, in metres.
+const WANDER: f64 = 3e-4;
+
+/// A change of level that is always taken for that of a sensor which is not quite steady, in metres.
+const LEVEL_FLOOR: f64 = 3e-3;
+
+/// Standard errors, and drifts, that a level may change by.
+const LEVEL_SIGMAS: f64 = 5.0;
+
+/// Readings of a beam in each half of a stretch that its levels are compared by, at least.
+const LEAST_READINGS: usize = 5;
+
+/// Beams, at least, whose levels say something of a pose.
+const LEAST_BEAMS: usize = 5;
+
+/// How a body moved.
+pub(super) struct Movement {
+    /// Shift of the middle of its markers, in metres.
+    shift: f64,
+    /// Turn, in radians.
+    turn: f64,
+}
+
+impl Movement {
+    pub(super) fn words(&self, name: &str) -> String {
+        let turned = match self.turn.to_degrees() {
+            turn if turn >= 0.05 => format!(" and turned by {turn:.1}°"),
+            _ => String::new(),
+        };
+        format!(
+            "{name} moved by {:.1} mm{turned} during the stretch",
+            1e3 * self.shift
+        )
+    }
+}
+
+/// How the markers of a body moved, if they did: the parting of the stretch in two that they differ most between.
+pub(super) fn of_markers(watched: &Watched) -> Option<Movement> {
+    let parts = watched.parts.len();
+    let split = |at: usize| (watched.mean(0, at), watched.mean(at, parts));
+    let (excess, at) = (1..parts)
+        .map(|at| {
+            let (before, after) = split(at);
+            (excess(&before, &after, watched.jitter), at)
+        })
+        .max_by(|a, b| a.0.total_cmp(&b.0))?;
+    if excess <= 1.0 {
+        return None;
+    }
+    let (before, after) = split(at);
+    let both: Vec<(Point3<f64>, Point3<f64>)> = before
+        .iter()
+        .zip(&after)
+        .filter(|(b, a)| b.count > 0 && a.count > 0)
+        .map(|(b, a)| (b.place, a.place))
+        .collect();
+    let shift: Vector3<f64> = both.iter().map(|(b, a)| a - b).sum();
+    let (from, to): (Vec<_>, Vec<_>) = both.iter().map(|(b, a)| (*b, Some(*a))).unzip();
+    Some(Movement {
+        shift: (shift / both.len() as f64).norm(),
+        turn: solved(&from, &to).map_or(0.0, |(pose, _)| pose.rotation.angle()),
+    })
+}
+
+/// χ² of markers that stayed, over its limit.
+fn excess(before: &[MeanMarker], after: &[MeanMarker], jitter: f64) -> f64 {
+    let (mut sum, mut dimensions) = (0.0, 0);
+    for (b, a) in before.iter().zip(after) {
+        if b.count > 0 && a.count > 0 {
+            let of_means = jitter * jitter * (1.0 / b.count as f64 + 1.0 / a.count as f64);
+            sum += (a.place - b.place).norm_squared() / (of_means + WANDER * WANDER);
+            dimensions += 3;
+        }
+    }
+    if dimensions == 0 {
+        0.0
+    } else {
+        sum / limit(dimensions)
+    }
+}
+
+/// Whether most beams before a board read another level in the second half of the stretch than in the first, in words.
+pub(super) fn of_readings(record: &PoseRecord, session: &Session) -> Option<String> {
+    let label = &record.label;
+    let facet = label.facet.as_deref();
+    let drawn = facet.and_then(|name| session.facets.iter().find(|f| f.name == name));
+    let [first, last] = label.beams.or(drawn.map(|f| f.beams))?;
+    label.board.as_ref()?;
+    let half = label.scans / 2;
+    let unsteady = LEVEL_FLOOR + LEVEL_SIGMAS * session.believed.drift_sd_mm * 1e-3;
+    let (mut beams, mut changes) = (0, Vec::new());
+    for beam in first..(last + 1).min(record.beams) {
+        let before = level(record.readings(beam).take(half));
+        let after = level(record.readings(beam).skip(half));
+        let (Some((m1, v1)), Some((m2, v2))) = (before, after) else {
+            continue;
+        };
+        beams += 1;
+        let change = (m2 - m1).abs();
+        if change > unsteady + LEVEL_SIGMAS * (v1 + v2).sqrt() {
+            changes.push(change);
+        }
+    }
+    if beams < LEAST_BEAMS || 2 * changes.len() <= beams {
+        return None;
+    }
+    let count = changes.len();
+    let (_, middle, _) = changes.select_nth_unstable_by(count / 2, f64::total_cmp);
+    Some(format!(
+        "the readings of {count} of {beams} beams changed by {:.1} mm in the middle during the stretch, and no marker moved",
+        1e3 * *middle
+    ))
+}
+
+/// Mean of readings, and its variance.
+fn level(readings: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+    let (mut count, mut mean, mut squares) = (0_usize, 0.0, 0.0);
+    for r in readings.filter(|r| r.is_finite()) {
+        count += 1;
+        let step = r - mean;
+        mean += step / count as f64;
+        squares += step * (r - mean);
+    }
+    (count >= LEAST_READINGS).then(|| (mean, squares / ((count - 1) * count) as f64))
+}
