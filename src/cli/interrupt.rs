@@ -2,11 +2,12 @@
 
 use super::error::CliError;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, LazyLock};
 
 /// What the shell is told of a program ended by Ctrl-C: 128 + SIGINT.
 const EXIT_CODE: i32 = 130;
 
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+static INTERRUPTED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 
 /// Begins to listen. Where that cannot be, Ctrl-C ends the program at once, as without it.
 pub(crate) fn install() {
@@ -15,6 +16,11 @@ pub(crate) fn install() {
             std::process::exit(EXIT_CODE);
         }
     });
+}
+
+/// Set once Ctrl-C was pressed, for what must not know of this program.
+pub(crate) fn flag() -> Arc<AtomicBool> {
+    INTERRUPTED.clone()
 }
 
 /// An error once Ctrl-C was pressed. Long loops ask for it.

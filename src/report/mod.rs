@@ -4,6 +4,7 @@
 //! No scripts, nothing fetched, no clock: the same input gives the same bytes. Every plot carries its numbers in a
 //! table.
 
+mod angles;
 mod characterization;
 mod figure;
 mod page;
@@ -11,6 +12,7 @@ mod plan;
 mod plots;
 mod scores;
 mod study;
+mod trials;
 mod verdict;
 mod words;
 

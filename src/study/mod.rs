@@ -26,27 +26,36 @@
 //! # }
 //! ```
 
+mod elements;
+mod merge;
 mod oracle;
 mod program;
 mod run;
+mod spread;
 mod statistics;
 mod summary;
 mod table;
 
+pub use elements::{ELEMENTS_HEADER, ElementAngles, elements_from_csv, elements_to_csv};
+pub use merge::{in_order, merge};
 pub use oracle::Oracle;
 pub use program::Program;
-pub use run::{ElementAngles, Run, angles, run};
-pub use summary::{Coverage, MethodSummary, Summary, summarize};
+pub use run::{Run, run, run_with_elements};
+pub use spread::{Spread, spread, spread_to_csv};
+pub use summary::{MethodSummary, Summary, summarize};
 pub use table::{HEADER, from_csv, to_csv};
 
-use catoptric_calib::Method;
+use catoptric_calib::{Calibrator, Method};
 use catoptric_sim::Scene;
+use std::fmt;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Version of `study.json`.
 pub const SCHEMA_VERSION: u32 = 1;
 
 /// Who calibrates.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone)]
 pub enum Contestant {
     /// One of our methods.
     Method(Method),
@@ -56,6 +65,14 @@ pub enum Contestant {
     Oracle,
     /// A program that is given a blind dataset.
     Program(Program),
+    /// A calibrator of your own.
+    Own(Arc<dyn Calibrator + Send + Sync>),
+}
+
+impl fmt::Debug for Contestant {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Contestant").field(&self.name()).finish()
+    }
 }
 
 /// One point of the grid of scene values.
@@ -76,6 +93,8 @@ pub struct Study {
     pub seeds: u64,
     /// Who calibrates each experiment.
     pub contestants: Vec<Contestant>,
+    /// Once it is set, programs under way are ended; what they were at is then no result.
+    pub stop: Arc<AtomicBool>,
 }
 
 /// One experiment: a cell and a seed.
@@ -95,6 +114,7 @@ impl Contestant {
             Self::Uncorrected(method) => format!("{} uncorrected", method.name()),
             Self::Oracle => "oracle".to_owned(),
             Self::Program(program) => program.name.clone(),
+            Self::Own(calibrator) => calibrator.name().to_owned(),
         }
     }
 }
@@ -109,6 +129,7 @@ impl Study {
             }],
             seeds,
             contestants,
+            stop: Arc::default(),
         }
     }
 
@@ -116,5 +137,13 @@ impl Study {
     pub fn jobs(&self) -> impl Iterator<Item = Job> + use<> {
         let seeds = self.seeds;
         (0..self.cells.len()).flat_map(move |cell| (1..=seeds).map(move |seed| Job { cell, seed }))
+    }
+
+    /// The experiments of one of several parts, `part` from 1 on: every `parts`-th, so that all parts take about as long.
+    pub fn jobs_of_part(&self, [part, parts]: [usize; 2]) -> Vec<Job> {
+        self.jobs()
+            .skip(part.saturating_sub(1))
+            .step_by(parts.max(1))
+            .collect()
     }
 }

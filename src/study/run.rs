@@ -1,13 +1,14 @@
 //! One experiment: simulated, calibrated by every contestant, scored.
 
 use super::oracle::Oracle;
-use super::{Contestant, Job, Study};
+use super::{Contestant, ElementAngles, Job, Study};
 use crate::score::{ElementError, Knowable, knowable, score_by};
 use catoptric_calib::Calibrator;
 use catoptric_model::bias::DistanceBias;
-use catoptric_model::{Calibration, Dataset, RangeBias};
+use catoptric_model::{Calibration, Dataset, Deflection, RangeBias};
 use catoptric_sim::truth::BeamClass;
 use catoptric_sim::{Laboratory, SimError, Truth};
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// What one contestant made of one experiment. Angles are in radians; figures that do not exist are NaN.
@@ -49,60 +50,31 @@ pub struct Run {
     pub milliseconds: f64,
 }
 
-/// Angles of an element in one run, in degrees, for plots of single experiments.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ElementAngles {
-    /// Seed.
-    pub seed: u64,
-    /// Name of the contestant.
-    pub method: String,
-    /// Beam.
-    pub beam: usize,
-    /// Estimated θ_a and φ.
-    pub estimate: [f64; 2],
-    /// True θ_a and φ.
-    pub truth: [f64; 2],
-}
-
 /// Runs every contestant on one experiment.
 ///
 /// # Errors
 /// A scene that cannot be set up. A contestant that fails is a result, not an error.
 pub fn run(study: &Study, job: Job) -> Result<Vec<Run>, SimError> {
-    let experiment = Experiment::of(study, job)?;
-    let of_one = |contestant| {
-        let begin = Instant::now();
-        let calibration = experiment.calibrate(contestant);
-        let milliseconds = begin.elapsed().as_secs_f64() * 1e3;
-        experiment.judge(contestant, job, calibration, milliseconds)
-    };
-    Ok(study.contestants.iter().map(of_one).collect())
+    Ok(run_with_elements(study, job)?.0)
 }
 
-/// The angles of every scored element of one experiment, by every contestant.
+/// As [`run`], and the angles of every scored element.
 ///
 /// # Errors
 /// As [`run`].
-pub fn angles(study: &Study, job: Job) -> Result<Vec<ElementAngles>, SimError> {
+pub fn run_with_elements(study: &Study, job: Job) -> Result<(Vec<Run>, Vec<ElementAngles>), SimError> {
     let experiment = Experiment::of(study, job)?;
-    let mut all = Vec::new();
+    let mut runs = Vec::with_capacity(study.contestants.len());
+    let mut elements = Vec::new();
     for contestant in &study.contestants {
-        let Ok(calibration) = experiment.calibrate(contestant) else {
-            continue;
-        };
-        let pair = |d: &catoptric_model::Deflection| [d.azimuth.to_degrees(), d.elevation.to_degrees()];
-        let reference = Some((&experiment.truth, &experiment.knowable));
-        let score = score_by(&experiment.dataset, &calibration, reference);
-        let scored = score.elements.iter().filter(|e| e.class == BeamClass::Deflected);
-        all.extend(scored.map(|e| ElementAngles {
-            seed: job.seed,
-            method: contestant.name(),
-            beam: e.beam,
-            estimate: pair(&e.estimate),
-            truth: pair(&e.truth),
-        }));
+        let begin = Instant::now();
+        let calibration = experiment.calibrate(contestant, &study.stop);
+        let milliseconds = begin.elapsed().as_secs_f64() * 1e3;
+        let (run, angles) = experiment.judge(contestant, job, calibration, milliseconds);
+        runs.push(run);
+        elements.extend(angles);
     }
-    Ok(all)
+    Ok((runs, elements))
 }
 
 struct Experiment {
@@ -124,7 +96,7 @@ impl Experiment {
         })
     }
 
-    fn calibrate(&self, contestant: &Contestant) -> Result<Calibration, String> {
+    fn calibrate(&self, contestant: &Contestant, stop: &AtomicBool) -> Result<Calibration, String> {
         let words = |e: catoptric_calib::CalibError| e.to_string();
         match contestant {
             Contestant::Method(method) => Calibrator::calibrate(method, &self.dataset).map_err(words),
@@ -150,7 +122,8 @@ impl Experiment {
                 let truth = self.truth.clone();
                 Oracle { truth }.calibrate(&self.dataset).map_err(words)
             }
-            Contestant::Program(program) => program.calibrate(&self.laboratory),
+            Contestant::Program(program) => program.calibrate(&self.laboratory, stop),
+            Contestant::Own(calibrator) => calibrator.calibrate(&self.dataset).map_err(words),
         }
     }
 
@@ -160,7 +133,7 @@ impl Experiment {
         job: Job,
         calibration: Result<Calibration, String>,
         milliseconds: f64,
-    ) -> Run {
+    ) -> (Run, Vec<ElementAngles>) {
         let mut run = Run {
             cell: job.cell,
             seed: job.seed,
@@ -184,7 +157,7 @@ impl Experiment {
             Ok(calibration) => calibration,
             Err(failure) => {
                 run.failure = failure;
-                return run;
+                return (run, Vec::new());
             }
         };
         let score = score_by(&self.dataset, &calibration, Some((&self.truth, &self.knowable)));
@@ -207,7 +180,17 @@ impl Experiment {
             run.up = one.up;
             run.mahalanobis_squared = one.mahalanobis_squared.unwrap_or(f64::NAN);
         }
-        run
+        let pair = |d: &Deflection| [d.azimuth.to_degrees(), d.elevation.to_degrees()];
+        let angles = |e: &&ElementError| ElementAngles {
+            cell: job.cell,
+            seed: job.seed,
+            method: run.method.clone(),
+            beam: e.beam,
+            estimate: pair(&e.estimate),
+            truth: pair(&e.truth),
+        };
+        let elements = scored.iter().map(angles).collect();
+        (run, elements)
     }
 }
 

@@ -63,10 +63,32 @@ pub(crate) fn slope(pulses: &[Pulse], sd: f64, at: f64) -> f64 {
         .sum()
 }
 
+/// Whether a sum of pulses reaches the threshold anywhere: whether there is a [`leading_edge`].
+pub fn is_seen(pulses: &[Pulse], sd: f64, threshold: f64) -> bool {
+    bracket(pulses, sd, threshold).is_some()
+}
+
 /// The leading edge of the first echo; `None` if the threshold is never reached.
 ///
 /// Exact to 1e-13 m for one pulse and for any sum.
 pub fn leading_edge(pulses: &[Pulse], sd: f64, threshold: f64) -> Option<Edge> {
+    let (below, above) = bracket(pulses, sd, threshold)?;
+    let crossing = bisect(below, above, |x| height(pulses, sd, x) >= threshold);
+    let mut rising = crossing;
+    let mut falling = crossing + 0.25 * sd;
+    while slope(pulses, sd, falling) > 0.0 {
+        rising = falling;
+        falling += 0.25 * sd;
+    }
+    let top = bisect(rising, falling, |x| slope(pulses, sd, x) <= 0.0);
+    Some(Edge {
+        crossing,
+        peak: height(pulses, sd, top),
+    })
+}
+
+/// Places between which the sum first reaches the threshold: still below it, and at or above it.
+fn bracket(pulses: &[Pulse], sd: f64, threshold: f64) -> Option<(f64, f64)> {
     let total: f64 = pulses.iter().map(|p| p.power).sum();
     if total < threshold || pulses.is_empty() {
         return None;
@@ -84,18 +106,7 @@ pub fn leading_edge(pulses: &[Pulse], sd: f64, threshold: f64) -> Option<Edge> {
         below = above;
         above += 0.25 * sd;
     }
-    let crossing = bisect(below, above, |x| height(pulses, sd, x) >= threshold);
-    let mut rising = crossing;
-    let mut falling = crossing + 0.25 * sd;
-    while slope(pulses, sd, falling) > 0.0 {
-        rising = falling;
-        falling += 0.25 * sd;
-    }
-    let top = bisect(rising, falling, |x| slope(pulses, sd, x) <= 0.0);
-    Some(Edge {
-        crossing,
-        peak: height(pulses, sd, top),
-    })
+    Some((below, above))
 }
 
 /// The place between `no` and `yes` where a condition begins to hold.
@@ -121,6 +132,23 @@ mod tests {
     use super::*;
 
     const SD: f64 = 0.25;
+
+    #[test]
+    fn what_is_seen_has_an_edge() {
+        let pulse = |range, power| Pulse { range, power };
+        for (pulses, seen) in [
+            (vec![], false),
+            (vec![pulse(3.0, 0.999)], false),
+            (vec![pulse(3.0, 1.0)], true),
+            // Each too dim, and only near enough to each other bright enough together.
+            (vec![pulse(3.0, 0.6), pulse(3.1, 0.6)], true),
+            (vec![pulse(3.0, 0.6), pulse(4.5, 0.6)], false),
+            (vec![pulse(3.0, 0.6), pulse(4.5, 1.2)], true),
+        ] {
+            assert_eq!(is_seen(&pulses, SD, 1.0), seen, "{pulses:?}");
+            assert_eq!(leading_edge(&pulses, SD, 1.0).is_some(), seen, "{pulses:?}");
+        }
+    }
 
     #[test]
     fn one_pulse_has_its_closed_form() {

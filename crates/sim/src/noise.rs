@@ -74,9 +74,14 @@ impl Draws {
     /// Goes to the first draw of a column.
     pub fn seek(&mut self, column: u64) {
         let word = u128::from(column) * WORDS_PER_COLUMN;
-        // The next column in turn is where the stream already stands once a column's draws are used up.
-        if self.rng.get_word_pos() != word {
-            self.rng.set_word_pos(word);
+        match word.checked_sub(self.rng.get_word_pos()) {
+            // The next column in turn: its words are most likely computed already, and to jump would compute them anew.
+            Some(ahead) if ahead <= WORDS_PER_COLUMN => {
+                for _ in 0..ahead {
+                    self.rng.next_u32();
+                }
+            }
+            _ => self.rng.set_word_pos(word),
         }
     }
 

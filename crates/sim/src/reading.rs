@@ -294,9 +294,12 @@ impl Sensor {
         }
         let (part, mixed, detection) = match parts.as_slice() {
             [] => return None,
+            // One surface reads its own range, wherever on its edge that is.
             [only] if !physical => {
-                let edge = detect::leading_edge(&only.pulses, self.receiver.sd, self.receiver.threshold);
-                edge.map(|_| (only, 0.0, 0.0))?
+                if !detect::is_seen(&only.pulses, self.receiver.sd, self.receiver.threshold) {
+                    return None;
+                }
+                (only, 0.0, 0.0)
             }
             _ => self.detect(&parts, physical)?,
         };
