@@ -35,6 +35,11 @@ mod table;
 
 pub use oracle::Oracle;
 pub use program::Program;
+#[cfg(feature = "testing")]
+pub(crate) use run::drawn;
+#[cfg(feature = "testing")]
+pub(crate) use statistics::{mean_bounds, share_bounds};
+
 pub use run::{ElementAngles, Run, angles, run};
 pub use summary::{Coverage, MethodSummary, Summary, summarize};
 pub use table::{HEADER, from_csv, to_csv};
