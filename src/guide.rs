@@ -41,6 +41,8 @@ pub mod studies {}
 #[doc = include_str!("../docs/guide/9-test-your-own.md")]
 pub mod test_your_own {}
 
+// The suite runs its example; as a doc test it is compiled.
+#[allow(clippy::test_attr_in_doctest)]
 #[cfg_attr(feature = "testing", doc = include_str!("../docs/guide/10-ci.md"))]
 #[cfg_attr(
     not(feature = "testing"),
