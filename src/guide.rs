@@ -9,6 +9,7 @@
 //! 7. [`characterizing`]: step 1, Tables 1 to 4 and Eqs. 3 to 5 of the bare sensor
 //! 8. [`studies`]: what holds over many experiments, the reference setting, Figure 10
 //! 9. [`test_your_own`]: a calibrator of your own, tiers, comparing
+//! 10. [`ci`]: property tests and gates, jobs to copy
 //! 11. [`planning`]: which board poses to record next
 //!
 //! The chapters are Markdown files in `docs/guide/`; their Rust examples are run by the tests.
@@ -39,6 +40,15 @@ pub mod studies {}
 
 #[doc = include_str!("../docs/guide/9-test-your-own.md")]
 pub mod test_your_own {}
+
+// The suite runs its example; as a doc test it is compiled.
+#[allow(clippy::test_attr_in_doctest)]
+#[cfg_attr(feature = "testing", doc = include_str!("../docs/guide/10-ci.md"))]
+#[cfg_attr(
+    not(feature = "testing"),
+    doc = "Chapter 10 is in `docs/guide/10-ci.md`; its example needs the feature `testing`."
+)]
+pub mod ci {}
 
 #[doc = include_str!("../docs/guide/11-planning.md")]
 pub mod planning {}

@@ -30,6 +30,8 @@ pub mod report;
 pub mod score;
 pub mod study;
 pub mod tables;
+#[cfg(feature = "testing")]
+pub mod testing;
 pub mod validate;
 
 pub use apply::{CloudFrame, PointCloud, apply};

@@ -91,7 +91,7 @@ pub(super) fn solved(estimate: &BeamEstimate) -> Option<Deflection> {
 }
 
 /// Brings a difference of azimuths into (−π, π]; one that is there already stays as it is, to the last bit.
-pub(super) fn wrap(difference: f64) -> f64 {
+pub(crate) fn wrap(difference: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
     if -PI < difference && difference <= PI {
         return difference;

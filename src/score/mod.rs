@@ -40,6 +40,11 @@ use element::compare;
 use statistics::{largest, mean, rms};
 use std::collections::BTreeMap;
 
+#[cfg(feature = "testing")]
+pub(crate) use element::wrap;
+#[cfg(feature = "testing")]
+pub(crate) use statistics::mahalanobis_squared;
+
 pub use bound::{Knowable, knowable};
 pub use element::ElementError;
 pub use figures::{ApartScore, BeamCounts, DistanceError, OpenCounts, PointError, Score, Spread, Verdict};

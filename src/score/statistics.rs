@@ -47,7 +47,7 @@ pub fn percentile(values: &[f64], share: f64) -> f64 {
 ///
 /// Zero for an error that is exactly zero; infinite for any other error under a covariance that is not positive
 /// definite, since such a covariance claims that the error cannot happen.
-pub(super) fn mahalanobis_squared(error: &Vector2<f64>, covariance: &Matrix2<f64>) -> f64 {
+pub(crate) fn mahalanobis_squared(error: &Vector2<f64>, covariance: &Matrix2<f64>) -> f64 {
     if error.norm_squared() == 0.0 {
         return 0.0;
     }

@@ -40,8 +40,12 @@ pub use elements::{ELEMENTS_HEADER, ElementAngles, elements_from_csv, elements_t
 pub use merge::{in_order, merge};
 pub use oracle::Oracle;
 pub use program::Program;
+#[cfg(feature = "testing")]
+pub(crate) use run::drawn;
 pub use run::{Run, run, run_with_elements};
 pub use spread::{Spread, spread, spread_to_csv};
+#[cfg(feature = "testing")]
+pub(crate) use statistics::{mean_bounds, share_bounds};
 pub use summary::{MethodSummary, Summary, summarize};
 pub use table::{HEADER, from_csv, to_csv};
 

@@ -195,7 +195,7 @@ impl Experiment {
 }
 
 /// One element by the seed: a multiple of the golden section, so that successive seeds go all over the scan.
-fn drawn<'e>(scored: &[&'e ElementError], seed: u64) -> Option<&'e ElementError> {
+pub(crate) fn drawn<'e>(scored: &[&'e ElementError], seed: u64) -> Option<&'e ElementError> {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     // Below the number of elements.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]

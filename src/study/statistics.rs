@@ -4,7 +4,7 @@ use statrs::distribution::{Beta, ChiSquared, ContinuousCDF, FisherSnedecor};
 
 /// Bounds within which a mean of n squared errors in two dimensions, over 2, lies with the given probability if their
 /// covariance is honest: χ² quantiles with 2n degrees of freedom over 2n.
-pub(super) fn mean_bounds(n: usize, probability: f64) -> [f64; 2] {
+pub(crate) fn mean_bounds(n: usize, probability: f64) -> [f64; 2] {
     let freedom = 2.0 * n as f64;
     let outside = 0.5 * (1.0 - probability);
     ChiSquared::new(freedom).map_or([f64::NAN; 2], |d| {
@@ -17,17 +17,23 @@ pub(super) fn mean_bounds(n: usize, probability: f64) -> [f64; 2] {
 
 /// The interval of Clopper and Pearson for a share of which `hits` of n were seen, at 95 %.
 pub(super) fn clopper_pearson(hits: usize, n: usize) -> [f64; 2] {
+    share_bounds(hits, n, 0.95)
+}
+
+/// The same interval at another probability.
+pub(crate) fn share_bounds(hits: usize, n: usize, probability: f64) -> [f64; 2] {
+    let outside = 0.5 * (1.0 - probability);
     let (k, n) = (hits as f64, n as f64);
     let quantile = |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |d| d.inverse_cdf(p));
     let low = if hits == 0 {
         0.0
     } else {
-        quantile(k, n - k + 1.0, 0.025)
+        quantile(k, n - k + 1.0, outside)
     };
     let high = if k >= n {
         1.0
     } else {
-        quantile(k + 1.0, n - k, 0.975)
+        quantile(k + 1.0, n - k, 1.0 - outside)
     };
     [low, high]
 }

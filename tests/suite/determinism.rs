@@ -2,6 +2,7 @@
 
 use crate::scenes::{PROTOTYPE, scene};
 use catoptric::sim::Laboratory;
+use catoptric::testing::same_result;
 
 #[test]
 fn a_stretch_recorded_alone_is_the_stretch_recorded_in_turn() {
@@ -24,20 +25,12 @@ fn the_number_of_threads_changes_nothing() {
     let mut scene = scene(PROTOTYPE);
     scene.experiment.scans_per_pose = 2;
     scene.experiment.poses_per_group = 3;
-    let record = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("threads can be had");
-        pool.install(|| {
-            let laboratory = Laboratory::new(&scene, 1).expect("the scene is good");
-            (
-                laboratory.dataset().expect("recorded"),
-                laboratory.truth().expect("known"),
-            )
-        })
+    let record = || {
+        let laboratory = Laboratory::new(&scene, 1).expect("the scene is good");
+        (
+            laboratory.dataset().expect("recorded"),
+            laboratory.truth().expect("known"),
+        )
     };
-    let one = record(1);
-    assert_eq!(one, record(2));
-    assert_eq!(one, record(7));
+    same_result(&[1, 2, 7], record).expect("all are the same");
 }

@@ -192,7 +192,14 @@ fn links_lead_somewhere() {
 #[test]
 fn files_that_documents_name_exist() {
     let folders = [
-        "crates/", "src/", "tests/", "benches/", "scenes/", "docs/", ".ci/",
+        "crates/",
+        "src/",
+        "tests/",
+        "examples/",
+        "benches/",
+        "scenes/",
+        "docs/",
+        ".ci/",
     ];
     let mut named = 0;
     for (path, text) in documents() {
@@ -592,6 +599,12 @@ fn files_of_dataset(text: &str) -> Vec<String> {
         .collect();
     assert!(files.len() > 4, "{picture}");
     files
+}
+
+#[test]
+fn the_ci_chapter_shows_the_example_that_is_run() {
+    let shown = code_blocks(&read("docs/guide/10-ci.md"), "rust");
+    assert_eq!(shown, [read("examples/ci/calibrator.rs")]);
 }
 
 #[test]

@@ -4,6 +4,8 @@
 mod bad_geometry;
 mod bad_input;
 mod characterize;
+#[path = "../../examples/ci/calibrator.rs"]
+mod ci_example;
 mod cli;
 mod closure;
 mod common;
@@ -13,6 +15,7 @@ mod detection;
 mod determinism;
 mod docs;
 mod energy;
+mod gates;
 mod mishaps;
 mod motion;
 mod noise;
