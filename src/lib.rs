@@ -25,6 +25,7 @@ pub mod apply;
 pub mod compare;
 pub mod guide;
 pub mod io;
+pub mod layout;
 pub mod plan;
 pub mod report;
 pub mod score;
