@@ -10,6 +10,7 @@ mod demo;
 mod error;
 mod files;
 mod interrupt;
+mod layout;
 mod man;
 mod new;
 mod output;
@@ -84,6 +85,8 @@ enum Verb {
     Study(study::Arguments),
     /// Say which board poses to record next, and what each gains
     Plan(plan::Arguments),
+    /// Say what a mirror layout sees, loses and allows; several side by side
+    Layout(layout::Arguments),
     /// Turn a scan into a point cloud
     Apply(apply::Arguments),
     /// Write a page to read about calibrations and their scores
@@ -155,6 +158,7 @@ fn run(cli: Cli) -> Result<(), CliError> {
         Verb::Compare(arguments) => compare::run(&arguments),
         Verb::Study(arguments) => study::run(&arguments, &context),
         Verb::Plan(arguments) => plan::run(&arguments, &context),
+        Verb::Layout(arguments) => layout::run(&arguments, &context),
         Verb::Apply(arguments) => apply::run(&arguments, &context),
         Verb::Report(arguments) => report::run(&arguments, &context),
         Verb::New(arguments) => new::run(&arguments),

@@ -91,6 +91,22 @@ pub(crate) struct Traced {
     pub(crate) sees: bool,
 }
 
+impl Traced {
+    /// What becomes of it.
+    pub(crate) fn class(&self) -> Class {
+        match self.status {
+            BeamClass::Split => Class::Split,
+            BeamClass::Blocked if !self.chief.facets().is_empty() => Class::Shaded,
+            BeamClass::Blocked => Class::HitsStructure,
+            BeamClass::Lost => Class::Trapped,
+            _ if !self.sees => Class::TooFaint,
+            BeamClass::Direct => Class::Direct,
+            BeamClass::Deflected => Class::Deflected,
+            BeamClass::MultiBounce => Class::MultiBounce,
+        }
+    }
+}
+
 impl Class {
     /// All classes.
     pub const ALL: [Self; 8] = [
@@ -220,20 +236,10 @@ pub(crate) fn elements(
     let of_one = |t: &Traced| {
         let leaves = exit(&t.chief);
         let reach = |reflectivity| t.sees.then(|| farthest(scene, t, reflectivity));
-        let mirrored = !t.chief.facets().is_empty();
         Element {
             beam: t.beam,
             scan_azimuth_deg: beam::azimuth(t.beam).to_degrees(),
-            class: match t.status {
-                BeamClass::Split => Class::Split,
-                BeamClass::Blocked if mirrored => Class::Shaded,
-                BeamClass::Blocked => Class::HitsStructure,
-                BeamClass::Lost => Class::Trapped,
-                _ if !t.sees => Class::TooFaint,
-                BeamClass::Direct => Class::Direct,
-                BeamClass::Deflected => Class::Deflected,
-                BeamClass::MultiBounce => Class::MultiBounce,
-            },
+            class: t.class(),
             status: t.status,
             facets: t
                 .chief

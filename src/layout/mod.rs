@@ -2,7 +2,8 @@
 //!
 //! Without noise, through the same beams of sub-rays as [`simulate`](catoptric_sim::Laboratory), so that the class of
 //! every element is the one the truth of a recording states. [`analyze`] is cheap: with [`Detail::Coarse`] (one ray per
-//! beam) it takes a few milliseconds, and a search can call it thousands of times.
+//! beam) it takes a few milliseconds, and a search can call it thousands of times. [`predict`], the accuracy that a
+//! calibration can reach, looks at every board of the experiment and takes longer.
 //!
 //! **Field of regard.** A scanner's beams are discrete, so an element is given a cell of directions: along the scan half-way
 //! to its neighbors, across it as far as the 1/e² contour of its own beam reaches,
@@ -29,17 +30,24 @@
 //! # }
 //! ```
 
+mod accuracy;
+mod drawing;
 mod element;
 mod facet;
 mod field;
 mod footprint;
+mod require;
 mod sensitivity;
 mod size;
 
+pub use accuracy::{Accuracy, FacetAccuracy, predict};
+pub use drawing::{Drawing, DrawnPart, DrawnRay};
 pub use element::{Class, DARK, Element};
 pub use facet::FacetView;
 pub use field::{Cell, NEAR_DEG};
 pub use footprint::{Footprint, OUTLINE};
+pub use require::{Requirement, RequirementError, Unmet, figures};
+pub(crate) use sensitivity::center;
 pub use size::{MIRROR_DENSITY, POST_DENSITY, Size};
 
 use catoptric_model::beam;
@@ -106,6 +114,8 @@ pub struct Analysis {
     pub spots: Vec<Spot>,
     /// Size, mirror area and mass.
     pub size: Size,
+    /// What a calibration can reach; `None` where nobody asked.
+    pub accuracy: Option<Accuracy>,
     /// Neighboring elements with one fate, in order.
     pub runs: Vec<Run>,
     /// Every element.
@@ -191,6 +201,7 @@ pub fn analyze(scene: &Scene, seed: Option<u64>, detail: Detail) -> Result<Analy
         facets: facet::facets(&structure, &elements, &traced, &cells, &footprints),
         spots: spots(&sensor),
         size: size::size(scene, &structure),
+        accuracy: None,
         runs,
         elements,
     })

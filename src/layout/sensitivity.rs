@@ -68,6 +68,6 @@ pub(super) fn shifts(structure: &Structure, traced: &Traced, range: f64) -> Vec<
 }
 
 /// Mean of the corners, about which a facet is turned.
-pub(super) fn center(corners: &[Point3<f64>]) -> Point3<f64> {
+pub(crate) fn center(corners: &[Point3<f64>]) -> Point3<f64> {
     Point3::from(corners.iter().map(|c| c.coords).sum::<Vector3<f64>>() / corners.len().max(1) as f64)
 }

@@ -6,6 +6,7 @@
 
 mod characterization;
 mod figure;
+mod layout;
 mod page;
 mod plan;
 mod plots;
@@ -15,6 +16,7 @@ mod verdict;
 mod words;
 
 pub use characterization::characterization;
+pub use layout::{Drawn, layout, layout_pictures};
 pub use plan::plan;
 pub use study::study;
 

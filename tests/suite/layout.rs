@@ -517,3 +517,27 @@ fn size_and_mass_of_a_plain_structure_are_by_hand() {
     assert!((size.structure_mass_g - 11.44).abs() < 1e-9);
     assert_eq!(size.scanner_mass_g, Some(130.0));
 }
+
+#[test]
+fn the_predicted_accuracy_is_the_bound_that_recordings_are_scored_by() {
+    for name in ["two-mirror.toml", "reference-facet.toml", "prototype.toml"] {
+        let mut scene = load(name);
+        scene.experiment.scans_per_pose = 20;
+        let laboratory = Laboratory::new(&scene, scene.seed).unwrap();
+        let (dataset, truth) = (laboratory.dataset().unwrap(), laboratory.truth().unwrap());
+        let method = catoptric::calib::Method::Joint;
+        let calibration =
+            catoptric::calib::calibrate(&dataset, method, &catoptric::calib::Options::default()).unwrap();
+        let score = catoptric::score(&dataset, &calibration, Some(&truth));
+        let predicted = layout::predict(&scene, scene.seed);
+        let bound = predicted.per_axis_deg.unwrap();
+        assert!(
+            (bound / score.crlb_per_axis_deg - 1.0).abs() < 0.005,
+            "{name}: {bound} {}",
+            score.crlb_per_axis_deg
+        );
+        let elements: usize = predicted.facets.iter().map(|f| f.determined + f.open).sum();
+        assert_eq!(elements, predicted.determined + predicted.open);
+        assert_eq!(predicted.board_poses, laboratory.board_poses());
+    }
+}
