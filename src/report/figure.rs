@@ -1,5 +1,9 @@
 //! The plots, as inline SVG without a color scheme of their own: black follows the page's ink, [`GRID`] its grid.
 
+mod fine;
+
+pub(super) use fine::{Area, Shapes, fine, round_numbers};
+
 use crate::score::percentile;
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
@@ -29,7 +33,6 @@ const MARGIN: u32 = 10;
 
 type Sheet<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
-type Mesh<'a, 'm> = plotters::chart::MeshStyle<'a, 'm, RangedCoordf64, RangedCoordf64, SVGBackend<'a>>;
 type Failure = Box<dyn std::error::Error>;
 
 /// The color of the facet of a given number.
@@ -92,39 +95,20 @@ pub(super) struct Bar {
     pub(super) color: RGBColor,
 }
 
-/// A filled outline.
-pub(super) struct Area {
-    pub(super) points: Vec<(f64, f64)>,
-    pub(super) color: RGBColor,
-}
-
-/// A map of directions: filled outlines over the negative of azimuth, so that left is on the left, and words.
-pub(super) fn map(size: (u32, u32), axes: &Axes, title: &str, areas: &[Area], words: &[Word]) -> String {
-    draw(size, title, |area| {
-        let mut chart = chart(area, axes)?;
-        let azimuth = |value: &f64| tick(-value);
-        let elevation = |value: &f64| tick(*value);
-        let mut mesh = chart.configure_mesh();
-        styled(&mut mesh, axes);
-        mesh.x_labels(13).y_labels(7);
-        mesh.x_label_formatter(&azimuth).y_label_formatter(&elevation);
-        mesh.draw()?;
-        for a in areas {
-            chart.draw_series([Polygon::new(a.points.clone(), a.color.filled())])?;
-            // Fans are thinner than a pixel far off: their outline keeps them in sight.
-            let closed = a.points.iter().chain(a.points.first()).copied();
-            chart.draw_series(LineSeries::new(closed, a.color.stroke_width(1)))?;
-        }
-        draw_words(&mut chart, words)
-    })
-}
-
 /// A plan of lines and words, as wide as high in units if the axes are.
 pub(super) fn plan(size: (u32, u32), axes: &Axes, title: &str, strokes: &[Stroke], words: &[Word]) -> String {
     draw(size, title, |area| {
         let mut chart = frame(area, axes, true)?;
         draw_strokes(&mut chart, strokes)?;
-        draw_words(&mut chart, words)
+        for w in words {
+            let style = (FONT, LABEL_SIZE).into_font().color(&w.color);
+            let anchor = plotters::style::text_anchor::Pos::new(
+                plotters::style::text_anchor::HPos::Center,
+                plotters::style::text_anchor::VPos::Center,
+            );
+            chart.draw_series([Text::new(w.text.clone(), w.at, style.pos(anchor))])?;
+        }
+        Ok(())
     })
 }
 
@@ -217,45 +201,24 @@ fn draw_strokes(chart: &mut Chart, strokes: &[Stroke]) -> Result<(), Failure> {
     Ok(())
 }
 
-fn draw_words(chart: &mut Chart, words: &[Word]) -> Result<(), Failure> {
-    for w in words {
-        let style = (FONT, LABEL_SIZE).into_font().color(&w.color);
-        let anchor = plotters::style::text_anchor::Pos::new(
-            plotters::style::text_anchor::HPos::Center,
-            plotters::style::text_anchor::VPos::Center,
-        );
-        chart.draw_series([Text::new(w.text.clone(), w.at, style.pos(anchor))])?;
-    }
-    Ok(())
-}
-
-/// Coordinates with room for the labels.
-fn chart<'a>(area: &Sheet<'a>, axes: &Axes) -> Result<Chart<'a>, Failure> {
-    Ok(ChartBuilder::on(area)
+/// Coordinate frame with grid and axis labels.
+fn frame<'a>(area: &Sheet<'a>, axes: &Axes, y_labels: bool) -> Result<Chart<'a>, Failure> {
+    let mut chart = ChartBuilder::on(area)
         .margin(MARGIN)
         .x_label_area_size(AXIS_ROOM)
         .y_label_area_size(AXIS_ROOM)
-        .build_cartesian_2d(axes.x.clone(), axes.y.clone())?)
-}
-
-/// Grid and axes as all plots have them.
-fn styled(mesh: &mut Mesh<'_, '_>, axes: &Axes) {
+        .build_cartesian_2d(axes.x.clone(), axes.y.clone())?;
+    let label = |value: &f64| tick(*value);
+    let mut mesh = chart.configure_mesh();
     mesh.x_desc(axes.x_label.as_str())
         .y_desc(axes.y_label.as_str())
         .label_style((FONT, LABEL_SIZE))
         .axis_desc_style((FONT, LABEL_SIZE))
         .axis_style(BLACK.mix(0.6))
         .bold_line_style(GRID.mix(0.6))
-        .max_light_lines(1);
-}
-
-/// Coordinate frame with grid and axis labels.
-fn frame<'a>(area: &Sheet<'a>, axes: &Axes, y_labels: bool) -> Result<Chart<'a>, Failure> {
-    let mut chart = chart(area, axes)?;
-    let label = |value: &f64| tick(*value);
-    let mut mesh = chart.configure_mesh();
-    styled(&mut mesh, axes);
-    mesh.x_label_formatter(&label).y_label_formatter(&label);
+        .max_light_lines(1)
+        .x_label_formatter(&label)
+        .y_label_formatter(&label);
     if !y_labels {
         mesh.disable_y_mesh().y_labels(0);
     }

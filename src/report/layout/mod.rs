@@ -134,7 +134,9 @@ fn field(drawn: &Drawn) -> String {
         &views::map(drawn),
         "Every direction around the scanner, forward in the middle, unrolled like a map of the world. Each element is drawn \
          as the cell of directions that it stands for: grey where the scan passes by the mirrors, in the color of its facet \
-         where it is deflected. White is not looked at; gaps in the grey line are where mirrors and posts stand.",
+         where it is deflected. White is not looked at: gaps in the grey line are where mirrors stand, and black marks are \
+         elements that are lost, at where they would look without the structure. The grey line is thinnest ahead, where the \
+         scanner's spot lies along the scan.",
         &perspective::legend(drawn),
         headings,
         &rows,
@@ -151,7 +153,7 @@ fn scan(drawn: &Drawn) -> String {
     let (headings, rows) = tables::runs(drawn);
     block(
         &views::scan(drawn),
-        "The 1081 elements of the scan over their azimuth. In the upper row those with a direction of their own; in the lower \
+        "The elements of the scan over their azimuth. In the upper row those with a direction of their own; in the lower \
          row those without: what stands there is lost.",
         &legend,
         headings,

@@ -69,7 +69,7 @@ impl Camera {
             turn: Matrix3::from_rows(&[right.transpose(), up.transpose(), towards.transpose()]),
             distance: FAR * radius,
             // The structure and as much around it as its radius fill the height.
-            scale: 0.5 * f64::from(SIZE[1]) * FAR / 2.1,
+            scale: 0.5 * f64::from(SIZE[1]) * FAR / 1.55,
         }
     }
 
@@ -248,7 +248,7 @@ pub(super) fn perspective(drawn: &Drawn) -> Perspective {
         }
     }
     let mut words = axes(&camera, &mut canvas);
-    words.extend(names(drawn, &camera, radius));
+    add_names(drawn, &camera, radius, &mut words);
     let mut png = Vec::new();
     let picture = canvas.picture();
     let encoder = image::codecs::png::PngEncoder::new(&mut png);
@@ -300,8 +300,7 @@ fn axes(camera: &Camera, canvas: &mut Canvas) -> Words {
 }
 
 /// The names of the facets at the ends of their fans; a name that would stand on another moves down by a line.
-fn names(drawn: &Drawn, camera: &Camera, radius: f64) -> Words {
-    let mut words: Words = Vec::new();
+fn add_names(drawn: &Drawn, camera: &Camera, radius: f64, words: &mut Words) {
     for (number, facet) in drawn.drawing.facets.iter().enumerate() {
         let own: Vec<_> = drawn
             .drawing
@@ -320,13 +319,12 @@ fn names(drawn: &Drawn, camera: &Camera, radius: f64) -> Words {
         ];
         while words
             .iter()
-            .any(|(w, _, _)| (w[0] - at[0]).abs() < 60.0 && (w[1] - at[1]).abs() < 15.0)
+            .any(|(w, _, _)| (w[0] - at[0]).abs() < 90.0 && (w[1] - at[1]).abs() < 15.0)
         {
             at[1] += 15.0;
         }
         words.push((at, facet.name.clone(), "middle"));
     }
-    words
 }
 
 /// A color as its triangle is lit from behind the eye, to the left and above.

@@ -1,8 +1,8 @@
 //! Flat pictures of a layout: the map of directions, the scan, three sides of the structure, footprints on the facets.
 
 use super::Drawn;
-use crate::layout::{Class, DrawnRay, Footprint};
-use crate::report::figure::{self, Area, Axes, Bar, GRID, Stroke, Word, color};
+use crate::layout::{Class, DrawnRay, Footprint, Run};
+use crate::report::figure::{self, Area, Axes, GRID, Shapes, Stroke, Word, color, fine, round_numbers};
 use catoptric_model::beam;
 use nalgebra::{Matrix3, Point3, Vector3};
 use plotters::style::{BLACK, RGBColor};
@@ -56,8 +56,28 @@ pub(super) fn map(drawn: &Drawn) -> String {
         y_label: "elevation, up (°)".to_owned(),
     };
     let drawing = &drawn.drawing;
-    let mut areas = Vec::new();
-    let mut words = Vec::new();
+    let mut shapes = Shapes {
+        ticks: [
+            (-5..=5).map(|k| 30.0 * f64::from(k)).collect(),
+            (-3..=3).map(|k| 30.0 * f64::from(k)).collect(),
+        ],
+        mirrored: true,
+        ..Shapes::default()
+    };
+    // Where a lost element would look without the structure.
+    for ray in drawing.rays.iter().filter(|r| !r.class.sees()) {
+        let (at, half) = (
+            beam::azimuth(ray.beam).to_degrees(),
+            0.5 * beam::STEP.to_degrees(),
+        );
+        let points = vec![
+            (-at - half, -1.2),
+            (-at + half, -1.2),
+            (-at + half, 1.2),
+            (-at - half, 1.2),
+        ];
+        shapes.areas.push(Area { points, color: LOST });
+    }
     for ray in drawing.rays.iter().filter(|r| r.class.sees()) {
         let Some(turn) = turn(drawn, ray) else { continue };
         let cell = drawing.cells[ray.beam];
@@ -71,7 +91,7 @@ pub(super) fn map(drawn: &Drawn) -> String {
         } else {
             ray_color(ray)
         };
-        areas.extend(
+        shapes.areas.extend(
             on_map(corners)
                 .into_iter()
                 .map(|points| Area { points, color: fill }),
@@ -80,19 +100,27 @@ pub(super) fn map(drawn: &Drawn) -> String {
     for (number, facet) in drawn.analysis.facets.iter().enumerate() {
         let of = |r: &&DrawnRay| r.class == Class::Deflected && r.facets.first() == Some(&number);
         let own: Vec<&DrawnRay> = drawing.rays.iter().filter(of).collect();
-        let Some(v) = own.get(own.len() / 2).and_then(|ray| ray.exit) else {
+        let exit = |place: usize| own.get(place).and_then(|ray| ray.exit).map(|v| degrees(&v));
+        let middle = own.len() / 2;
+        let (Some(first), Some(at), Some(last)) = (exit(0), exit(middle), exit(own.len().max(1) - 1)) else {
             continue;
         };
-        let (azimuth, elevation) = degrees(&v);
-        // Off the fan, towards the middle of the map.
-        let aside = if elevation > 0.0 { -5.5 } else { 5.5 };
-        words.push(Word {
-            at: ((-azimuth).clamp(-165.0, 165.0), elevation + aside),
+        // Beside the fan, towards the middle of the map.
+        let along = [first.0 - last.0, last.1 - first.1];
+        let length = libm::hypot(along[0], along[1]).max(f64::MIN_POSITIVE);
+        let (x, y) = (-at.0, at.1);
+        let (across, up) = (-along[1] / length, along[0] / length);
+        let sign = if across * x + up * y > 0.0 { -1.0 } else { 1.0 };
+        shapes.words.push(Word {
+            at: (
+                (x + 10.0 * sign * across).clamp(-165.0, 165.0),
+                y + 5.5 * sign * up,
+            ),
             text: facet.name.clone(),
             color: BLACK,
         });
     }
-    figure::map(MAP, &axes, "Field of regard", &areas, &words)
+    fine(MAP, &axes, "Field of regard", &shapes)
 }
 
 /// The product of the reflections on a ray's way: from directions of the scan to where it looks.
@@ -136,35 +164,37 @@ fn on_map(corners: [(f64, f64); 4]) -> Vec<Vec<(f64, f64)>> {
         .collect()
 }
 
-/// The scan from right to left: what becomes of every element.
+/// The scan, with its left on the left: what becomes of every element.
 pub(super) fn scan(drawn: &Drawn) -> String {
     let axes = Axes {
-        x: -135.25..135.25,
+        x: -136.0..136.0,
         y: 0.0..2.0,
-        x_label: "azimuth in the scan (°)".to_owned(),
+        x_label: "azimuth in the scan, to the left (°)".to_owned(),
         y_label: String::new(),
     };
-    let half = 0.5 * beam::STEP.to_degrees();
-    let bars: Vec<Bar> = drawn
-        .analysis
-        .elements
-        .iter()
-        .zip(&drawn.drawing.rays)
-        .map(|(element, ray)| {
-            let (row, color) = match element.class {
-                Class::Direct => (0, DIRECT),
-                Class::Deflected | Class::MultiBounce => (0, ray_color(ray)),
-                Class::Split => (1, SPLIT),
-                _ => (1, LOST),
-            };
-            Bar {
-                x: element.scan_azimuth_deg - half..element.scan_azimuth_deg + half,
-                row,
-                color,
-            }
-        })
-        .collect();
-    figure::strip(STRIP, &axes, "What becomes of the scan", &bars, 2)
+    let area = |run: &Run| {
+        let ray = &drawn.drawing.rays[run.beams[0]];
+        let (bottom, color) = match run.class {
+            Class::Direct => (1.1, DIRECT),
+            Class::Deflected | Class::MultiBounce => (1.1, ray_color(ray)),
+            Class::Split => (0.1, SPLIT),
+            _ => (0.1, LOST),
+        };
+        let [from, to] = run.azimuth_deg;
+        let (left, right, top) = (-to, -from, bottom + 0.8);
+        Area {
+            points: vec![(left, bottom), (right, bottom), (right, top), (left, top)],
+            color,
+        }
+    };
+    let shapes = Shapes {
+        areas: drawn.analysis.runs.iter().map(area).collect(),
+        row_names: vec![(1.5, "sees"), (0.5, "lost")],
+        ticks: [(-4..=4).map(|k| 30.0 * f64::from(k)).collect(), Vec::new()],
+        mirrored: true,
+        ..Shapes::default()
+    };
+    fine(STRIP, &axes, "What becomes of the scan", &shapes)
 }
 
 /// A side to look from: file name, title, the axes of the sensor frame to the right and up with their signs.
@@ -342,5 +372,13 @@ pub(super) fn footprints(drawn: &Drawn, facet: usize) -> Option<String> {
         y_label: "across (mm)".to_owned(),
     };
     let title = format!("Footprints on {}", drawn.analysis.facets[facet].name);
-    Some(figure::plan((400, 400), &axes, &title, &strokes, &[]))
+    let shapes = Shapes {
+        strokes,
+        ticks: [
+            round_numbers(axes.x.clone(), 6.0),
+            round_numbers(axes.y.clone(), 6.0),
+        ],
+        ..Shapes::default()
+    };
+    Some(fine((400, 400), &axes, &title, &shapes))
 }
