@@ -23,6 +23,7 @@
 
 pub mod apply;
 pub mod compare;
+pub mod export;
 pub mod guide;
 pub mod io;
 pub mod layout;

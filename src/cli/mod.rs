@@ -8,6 +8,7 @@ mod compare;
 mod completions;
 mod demo;
 mod error;
+mod export;
 mod files;
 mod interrupt;
 mod layout;
@@ -87,6 +88,8 @@ enum Verb {
     Plan(plan::Arguments),
     /// Say what a mirror layout sees, loses and allows; several side by side
     Layout(layout::Arguments),
+    /// Write a layout as solids, a 3D scene, a drawing table or frames
+    Export(export::Arguments),
     /// Turn a scan into a point cloud
     Apply(apply::Arguments),
     /// Write a page to read about calibrations and their scores
@@ -159,6 +162,7 @@ fn run(cli: Cli) -> Result<(), CliError> {
         Verb::Study(arguments) => study::run(&arguments, &context),
         Verb::Plan(arguments) => plan::run(&arguments, &context),
         Verb::Layout(arguments) => layout::run(&arguments, &context),
+        Verb::Export(arguments) => export::run(&arguments, &context),
         Verb::Apply(arguments) => apply::run(&arguments, &context),
         Verb::Report(arguments) => report::run(&arguments, &context),
         Verb::New(arguments) => new::run(&arguments),

@@ -36,7 +36,7 @@ type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, Ra
 type Failure = Box<dyn std::error::Error>;
 
 /// The color of the facet of a given number.
-pub(super) fn color(facet: usize) -> RGBColor {
+pub(crate) fn color(facet: usize) -> RGBColor {
     PALETTE[facet % PALETTE.len()]
 }
 

@@ -16,6 +16,7 @@ mod verdict;
 mod words;
 
 pub use characterization::characterization;
+pub(crate) use figure::color as facet_color;
 pub use layout::{Drawn, layout, layout_pictures};
 pub use plan::plan;
 pub use study::study;
