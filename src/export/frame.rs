@@ -3,8 +3,8 @@
 //!
 //! The bodies overlap where they join; a slicer makes one of them. Holes for screws are for whoever knows his screws.
 
-use super::{Solid, thickness};
-use crate::layout::{Detail, Drawing, analyze, center};
+use super::Solid;
+use crate::layout::{Detail, Drawing, analyze, center, plate_thickness};
 use catoptric_sim::scene::{MeshShape, MeshUnits, Post, PostShape};
 use catoptric_sim::{Mesh, Scene, SimError};
 use nalgebra::{Point3, Unit, Vector3};
@@ -128,7 +128,7 @@ pub fn shaded_by_frame(scene: &Scene, seed: Option<u64>) -> Result<Vec<usize>, S
     /// What no file is called.
     const FRAME: &str = "\0frame";
     let drawing = Drawing::new(scene, seed)?;
-    let bodies = frame(&drawing, thickness(scene));
+    let bodies = frame(&drawing, plate_thickness(scene));
     let triangles: Vec<_> = bodies.iter().flat_map(|b| b.triangles.iter().copied()).collect();
     let vertices: Vec<Point3<f64>> = triangles.iter().flatten().copied().collect();
     let count = u32::try_from(triangles.len()).unwrap_or(0);

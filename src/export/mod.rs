@@ -34,7 +34,7 @@ pub use stl::stl;
 pub use table::drawing_table;
 pub use urdf::urdf;
 
-use crate::layout::Drawing;
+use crate::layout::{Drawing, plate_thickness};
 use catoptric_sim::Scene;
 
 /// Which solids.
@@ -48,19 +48,9 @@ pub enum Part {
     All,
 }
 
-/// Thickness of mirrors that are drawn without one, in metres.
-const LEAST_THICKNESS: f64 = 1e-3;
-
-/// Thickness of a mirror plate, in metres.
-fn thickness(scene: &Scene) -> f64 {
-    let mirror = &scene.superstructure.mirror;
-    let glass = mirror.glass.map_or(0.0, |g| g.thickness_mm);
-    (1e-3 * mirror.thickness_mm.max(glass)).max(LEAST_THICKNESS)
-}
-
 /// The solids of a layout, each closed, in the sensor frame.
 pub fn solids(scene: &Scene, drawing: &Drawing, part: Part) -> Vec<Solid> {
-    let thickness = thickness(scene);
+    let thickness = plate_thickness(scene);
     let mut solids = Vec::new();
     if part != Part::Frame {
         solids.extend(drawing.facets.iter().map(|facet| {

@@ -1,7 +1,6 @@
 //! The drawing as a table: one row for every corner of every mirror, with the mirror's angles and tolerances.
 
-use super::thickness;
-use crate::layout::Drawing;
+use crate::layout::{Drawing, plate_thickness};
 use catoptric_sim::Scene;
 use catoptric_sim::layout::area_vector;
 
@@ -61,7 +60,7 @@ pub fn drawing_table(scene: &Scene, drawing: &Drawing) -> Result<Vec<u8>, csv::E
                 libm::atan2(m.z, libm::hypot(m.x, m.y)).to_degrees(),
                 1e3 * m.dot(&facet.face.origin.coords),
                 0.5e6 * area_vector(corners).norm(),
-                1e3 * thickness(scene),
+                1e3 * plate_thickness(scene),
                 as_built.tilt_sd_deg,
                 as_built.shift_sd_mm,
                 as_built.slope_rms_mrad,

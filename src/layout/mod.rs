@@ -48,6 +48,7 @@ pub use field::{Cell, NEAR_DEG};
 pub use footprint::{Footprint, OUTLINE};
 pub use require::{Requirement, RequirementError, Unmet, figures};
 pub(crate) use sensitivity::center;
+pub(crate) use size::plate_thickness;
 pub use size::{MIRROR_DENSITY, POST_DENSITY, Size};
 
 use catoptric_model::beam;

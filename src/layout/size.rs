@@ -14,7 +14,7 @@ pub const MIRROR_DENSITY: f64 = 2500.0;
 /// Density of posts and frame, in kg/m³: solid polylactide as printed (NatureWorks Ingeo 4043D, data sheet).
 pub const POST_DENSITY: f64 = 1240.0;
 
-/// Thickness taken for the mass of mirrors that are drawn without one, in metres.
+/// Thickness taken for mirrors that are drawn without one, in metres.
 const LEAST_THICKNESS: f64 = 1e-3;
 
 /// Size, mirror area and mass.
@@ -63,13 +63,7 @@ pub(crate) fn size(scene: &Scene, structure: &Structure) -> Size {
     let area: f64 = (structure.facets.iter())
         .map(|f| 0.5 * area_vector(&f.face.corners).norm())
         .sum();
-    let thickness = scene.superstructure.mirror.thickness_mm * 1e-3;
-    let glass = scene
-        .superstructure
-        .mirror
-        .glass
-        .map_or(0.0, |g| g.thickness_mm * 1e-3);
-    let thickness = thickness.max(glass).max(LEAST_THICKNESS);
+    let thickness = plate_thickness(scene);
     let (mirror_mass, post_mass) = (area * thickness * MIRROR_DENSITY, post_volume * POST_DENSITY);
     Size {
         extent_mm: extent.into(),
@@ -86,6 +80,14 @@ pub(crate) fn size(scene: &Scene, structure: &Structure) -> Size {
             Preset::Custom => None,
         },
     }
+}
+
+/// Thickness of a mirror as a plate, in metres: with its glass, if that is thicker.
+pub(crate) fn plate_thickness(scene: &Scene) -> f64 {
+    let mirror = &scene.superstructure.mirror;
+    let glass = mirror.glass.map_or(0.0, |g| g.thickness_mm);
+    let drawn = 1e-3 * mirror.thickness_mm.max(glass);
+    if drawn > 0.0 { drawn } else { LEAST_THICKNESS }
 }
 
 /// What the parts of the scanner's own housing are called.

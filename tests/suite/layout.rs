@@ -4,6 +4,7 @@
 //! regard with closed forms and with the simulator itself. These do not prove that the simulator's optics are right:
 //! `physics` does.
 
+use crate::common::{VALID, folder_with, run, stderr, stdout};
 use catoptric::io::scene as scenes;
 use catoptric::layout::{self, Analysis, Class, Detail};
 use catoptric::model::beam;
@@ -540,4 +541,196 @@ fn the_predicted_accuracy_is_the_bound_that_recordings_are_scored_by() {
         assert_eq!(elements, predicted.determined + predicted.open);
         assert_eq!(predicted.board_poses, laboratory.board_poses());
     }
+}
+
+fn root(path: &str) -> String {
+    format!("{}/{path}", env!("CARGO_MANIFEST_DIR"))
+}
+
+#[test]
+fn the_verb_prints_judges_and_writes() {
+    let folder = tempfile::tempdir().unwrap();
+    let prototype = root("scenes/prototype.toml");
+    let output = run(folder.path(), &["layout", &prototype, "--json"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let json: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let analysis = layout::analyze(&load("prototype.toml"), None, Detail::Full).unwrap();
+    assert_eq!(json["schema_version"], 1);
+    assert_eq!(json["field_of_regard"].as_f64(), Some(analysis.field_of_regard));
+    assert_eq!(json["elements"].as_array().unwrap().len(), 1081);
+    assert!(json["accuracy"]["per_axis_deg"].as_f64().unwrap() > 0.01);
+    // As built is another structure.
+    let built = run(
+        folder.path(),
+        &[
+            "layout",
+            &prototype,
+            "--coarse",
+            "--as-built",
+            "--seed",
+            "3",
+            "--json",
+        ],
+    );
+    let built: serde_json::Value = serde_json::from_str(&stdout(&built)).unwrap();
+    assert_eq!(
+        (&built["seed"], &built["accuracy"]),
+        (&3.into(), &serde_json::Value::Null)
+    );
+    assert_ne!(built["field_of_regard"], json["field_of_regard"]);
+
+    let met = run(
+        folder.path(),
+        &[
+            "layout",
+            &prototype,
+            "--coarse",
+            "--require",
+            "field_of_regard>=0.004",
+            "--require",
+            "facets.*.elements > 50",
+        ],
+    );
+    assert!(met.status.success(), "{}", stderr(&met));
+    let unmet = run(
+        folder.path(),
+        &[
+            "layout",
+            &prototype,
+            "--coarse",
+            "--require",
+            "field_of_regard>=0.3",
+            "--require",
+            "facets.left-1.elements<60",
+        ],
+    );
+    assert_eq!(unmet.status.code(), Some(1));
+    let said = stderr(&unmet);
+    assert!(
+        said.contains("not met: prototype: field_of_regard is 0.00")
+            && said.contains("facets.left-1.elements is 60")
+    );
+    // A figure that is not there meets no limit.
+    let none = run(
+        folder.path(),
+        &["layout", &prototype, "--coarse", "--require", "accuracy<1"],
+    );
+    assert_eq!(none.status.code(), Some(1), "{}", stderr(&none));
+}
+
+#[test]
+fn bad_requirements_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let prototype = root("scenes/prototype.toml");
+    for (requirement, said) in [
+        ("field_of_regrad>=0.3", "did you mean field_of_regard?"),
+        ("facets.*.margin_m>=0.3", "did you mean facets.*.margin_mm?"),
+        ("field_of_regard", "is no requirement"),
+        ("field_of_regard>=much", "is no requirement"),
+        (">=1", "is no requirement"),
+        ("field_of_regard>=inf", "is no requirement"),
+        ("wings>=2", "every number of --json has a name"),
+    ] {
+        let output = run(
+            folder.path(),
+            &["layout", &prototype, "--coarse", "--require", requirement],
+        );
+        assert_eq!(
+            output.status.code(),
+            Some(2),
+            "{requirement}: {}",
+            stderr(&output)
+        );
+        assert!(
+            stderr(&output).contains(said),
+            "{requirement}: {}",
+            stderr(&output)
+        );
+    }
+}
+
+#[test]
+fn pages_and_pictures_are_the_same_on_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenes = [root("scenes/prototype.toml"), root("scenes/two-mirror.toml")];
+    for threads in ["1", "3"] {
+        let output = run(
+            folder.path(),
+            &[
+                "layout",
+                &scenes[0],
+                &scenes[1],
+                "--out",
+                threads,
+                "--threads",
+                threads,
+            ],
+        );
+        assert!(output.status.success(), "{}", stderr(&output));
+    }
+    let files = |name: &str| -> Vec<(String, Vec<u8>)> {
+        let entries = std::fs::read_dir(folder.path().join(name)).unwrap();
+        let mut files: Vec<_> = entries
+            .map(|e| e.unwrap())
+            .map(|e| {
+                (
+                    e.file_name().into_string().unwrap(),
+                    std::fs::read(e.path()).unwrap(),
+                )
+            })
+            .collect();
+        files.sort();
+        files
+    };
+    let (one, three) = (files("1"), files("3"));
+    assert_eq!(one, three);
+    let names: Vec<&str> = one.iter().map(|(name, _)| name.as_str()).collect();
+    for name in [
+        "layout.json",
+        "report.html",
+        "1-field.svg",
+        "2-perspective.png",
+        "1-footprints-left-1.svg",
+        "2-scan.svg",
+    ] {
+        assert!(names.contains(&name), "{names:?}");
+    }
+    let page = String::from_utf8(one.iter().find(|(n, _)| n == "report.html").unwrap().1.clone()).unwrap();
+    // Self-contained: nothing is fetched.
+    assert!(!page.contains("http") && !page.contains("<script") && page.contains("data:image/png;base64,"));
+    assert!(
+        !page.contains("could not be drawn")
+            && page.contains("two-mirror")
+            && page.contains("Field of regard")
+    );
+    let json: serde_json::Value =
+        serde_json::from_slice(&one.iter().find(|(n, _)| n == "layout.json").unwrap().1).unwrap();
+    assert_eq!(json["layouts"].as_array().unwrap().len(), 2);
+    // Every SVG is a file of its own.
+    for (name, bytes) in one.iter().filter(|(n, _)| n.ends_with(".svg")) {
+        let text = String::from_utf8_lossy(bytes);
+        assert!(
+            text.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\""),
+            "{name}"
+        );
+        assert!(text.trim_end().ends_with("</svg>"), "{name}");
+    }
+}
+
+#[test]
+fn where_nothing_bounds_a_calibration_the_reason_is_said() {
+    let (folder, _) = folder_with(VALID);
+    for (set, reason) in [
+        ("errors.model=\"none\"", "no bound: the scene has no errors"),
+        ("superstructure.facet.0.two_sided=true", "per axis"),
+    ] {
+        let output = run(folder.path(), &["layout", "scene.toml", "--set", set]);
+        assert!(output.status.success(), "{}", stderr(&output));
+        assert!(stdout(&output).contains(reason), "{}", stdout(&output));
+    }
+    let predicted = layout::predict(&load("traps/ridge.toml"), 1);
+    assert!(
+        predicted.per_axis_deg.is_none() && predicted.reason.is_some(),
+        "{predicted:?}"
+    );
 }

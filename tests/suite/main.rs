@@ -13,6 +13,7 @@ mod detection;
 mod determinism;
 mod docs;
 mod energy;
+mod export;
 mod layout;
 mod motion;
 mod noise;

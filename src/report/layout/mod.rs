@@ -8,7 +8,7 @@ use super::figure::{css, standalone};
 use super::page::{escape, figure as block, page, table};
 use crate::layout::{Analysis, Drawing};
 use catoptric_sim::{Scene, SimError};
-use views::{DIRECT, LOST, SIDES, SPLIT};
+use views::{LOST, SIDES};
 
 /// A layout with what was found out about it and the geometry to draw.
 #[derive(Debug, Clone)]
@@ -145,16 +145,12 @@ fn field(drawn: &Drawn) -> String {
 
 fn scan(drawn: &Drawn) -> String {
     let mut legend = perspective::legend(drawn);
-    legend.push((css(SPLIT), "split at an edge (lower row)".to_owned()));
-    legend.push((
-        css(LOST),
-        "ending on the structure, trapped or too faint (lower row)".to_owned(),
-    ));
+    legend.push((css(LOST), "lost".to_owned()));
     let (headings, rows) = tables::runs(drawn);
     block(
         &views::scan(drawn),
-        "The elements of the scan over their azimuth. In the upper row those with a direction of their own; in the lower \
-         row those without: what stands there is lost.",
+        "The elements of the scan over their azimuth: those with a direction of their own, those that an edge splits, and \
+         those that end on the structure, stay between mirrors or are too faint.",
         &legend,
         headings,
         &rows,
@@ -190,16 +186,12 @@ fn mirrors(drawn: &Drawn) -> String {
     }
     svgs += "</div>";
     let (headings, rows) = tables::margins(drawn);
-    let legend = [
-        (css(SPLIT), "split at an edge".to_owned()),
-        (css(LOST), "ending on the structure or too faint".to_owned()),
-        (css(DIRECT), "in the facet's color: whole".to_owned()),
-    ];
+    let legend = [(css(LOST), "split at an edge, or lost otherwise".to_owned())];
     block(
         &svgs,
         "Each mirror seen from before it, its outline in black. An ellipse is the 1/e² contour of a beam, of every second \
          whole one and of every one that is lost. A whole ellipse may move by its margin before an edge cuts it.",
-        &legend[..2],
+        &legend,
         headings,
         &rows,
     )

@@ -29,7 +29,7 @@ const AXIS_M: f64 = 0.05;
 pub(super) struct Perspective {
     /// A PNG file.
     pub(super) png: Vec<u8>,
-    words: Vec<([f64; 2], String, &'static str)>,
+    words: Words,
 }
 
 impl Perspective {
@@ -41,9 +41,9 @@ impl Perspective {
              perspective</title><image width=\"{width}\" height=\"{height}\" href=\"data:image/png;base64,{}\"/>",
             base64(&self.png)
         );
-        for ([x, y], text, anchor) in &self.words {
+        for ([x, y], text) in &self.words {
             svg += &format!(
-                "<text x=\"{x:.0}\" y=\"{y:.0}\" text-anchor=\"{anchor}\" font-family=\"sans-serif\" font-size=\"14\" \
+                "<text x=\"{x:.0}\" y=\"{y:.0}\" text-anchor=\"middle\" font-family=\"sans-serif\" font-size=\"14\" \
                  fill=\"#000000\">{}</text>",
                 escape(text)
             );
@@ -265,7 +265,8 @@ pub(super) fn perspective(drawn: &Drawn) -> Perspective {
     Perspective { png, words }
 }
 
-type Words = Vec<([f64; 2], String, &'static str)>;
+/// Words by their middle.
+type Words = Vec<([f64; 2], String)>;
 
 /// The axes of the sensor frame at the scanner, over everything, with their names and length.
 fn axes(camera: &Camera, canvas: &mut Canvas) -> Words {
@@ -286,15 +287,14 @@ fn axes(camera: &Camera, canvas: &mut Canvas) -> Words {
             ];
             canvas.line(tip, barb, 2.5, black);
         }
-        let at = [tip[0] + 14.0 * along.x, tip[1] + 16.0 * along.y + 4.0];
-        let anchor = if along.x < -0.3 {
-            "end"
-        } else if along.x > 0.3 {
-            "start"
+        // Half of the words beside the tip, where the axis points to a side.
+        let aside = if along.x.abs() > 0.3 {
+            66.0 * along.x.signum()
         } else {
-            "middle"
+            0.0
         };
-        words.push((at, format!("{name} ({:.0} mm)", 1e3 * AXIS_M), anchor));
+        let at = [tip[0] + aside, tip[1] + 16.0 * along.y + 4.0];
+        words.push((at, format!("{name} ({:.0} mm)", 1e3 * AXIS_M)));
     }
     words
 }
@@ -319,11 +319,11 @@ fn add_names(drawn: &Drawn, camera: &Camera, radius: f64, words: &mut Words) {
         ];
         while words
             .iter()
-            .any(|(w, _, _)| (w[0] - at[0]).abs() < 90.0 && (w[1] - at[1]).abs() < 15.0)
+            .any(|(w, _)| (w[0] - at[0]).abs() < 90.0 && (w[1] - at[1]).abs() < 15.0)
         {
             at[1] += 15.0;
         }
-        words.push((at, facet.name.clone(), "middle"));
+        words.push((at, facet.name.clone()));
     }
 }
 

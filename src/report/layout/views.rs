@@ -11,7 +11,7 @@ use plotters::style::{BLACK, RGBColor};
 const MAP: (u32, u32) = (1000, 540);
 
 /// Size of the strip, in pixels.
-const STRIP: (u32, u32) = (1000, 150);
+const STRIP: (u32, u32) = (1000, 180);
 
 /// Size of a view, in pixels.
 const SQUARE: (u32, u32) = (500, 500);
@@ -19,10 +19,7 @@ const SQUARE: (u32, u32) = (500, 500);
 /// Undeflected directions on the map, and beams that pass by in the views.
 pub(super) const DIRECT: RGBColor = RGBColor(0x7A, 0x80, 0x87);
 
-/// Elements that an edge cuts.
-pub(super) const SPLIT: RGBColor = RGBColor(0xD5, 0x5E, 0x00);
-
-/// Elements that see nothing.
+/// Elements that are lost.
 pub(super) const LOST: RGBColor = RGBColor(0x20, 0x20, 0x20);
 
 /// Every n-th beam is drawn as a ray; fewer of those that no mirror deflects.
@@ -168,16 +165,16 @@ fn on_map(corners: [(f64, f64); 4]) -> Vec<Vec<(f64, f64)>> {
 pub(super) fn scan(drawn: &Drawn) -> String {
     let axes = Axes {
         x: -136.0..136.0,
-        y: 0.0..2.0,
+        y: 0.0..3.0,
         x_label: "azimuth in the scan, to the left (°)".to_owned(),
         y_label: String::new(),
     };
     let area = |run: &Run| {
         let ray = &drawn.drawing.rays[run.beams[0]];
         let (bottom, color) = match run.class {
-            Class::Direct => (1.1, DIRECT),
-            Class::Deflected | Class::MultiBounce => (1.1, ray_color(ray)),
-            Class::Split => (0.1, SPLIT),
+            Class::Direct => (2.1, DIRECT),
+            Class::Deflected | Class::MultiBounce => (2.1, ray_color(ray)),
+            Class::Split => (1.1, LOST),
             _ => (0.1, LOST),
         };
         let [from, to] = run.azimuth_deg;
@@ -189,7 +186,7 @@ pub(super) fn scan(drawn: &Drawn) -> String {
     };
     let shapes = Shapes {
         areas: drawn.analysis.runs.iter().map(area).collect(),
-        row_names: vec![(1.5, "sees"), (0.5, "lost")],
+        row_names: vec![(2.5, "sees"), (1.5, "split"), (0.5, "ends")],
         ticks: [(-4..=4).map(|k| 30.0 * f64::from(k)).collect(), Vec::new()],
         mirrored: true,
         ..Shapes::default()
@@ -206,7 +203,7 @@ pub(super) const SIDES: [(&str, &str, [(usize, f64); 2], [&str; 2]); 3] = [
         ["−y, right (mm)", "x, forward (mm)"],
     ),
     (
-        "left",
+        "right",
         "From the right",
         [(0, 1.0), (2, 1.0)],
         ["x, forward (mm)", "z, up (mm)"],
@@ -337,18 +334,13 @@ pub(super) fn footprints(drawn: &Drawn, facet: usize) -> Option<String> {
     });
     let reach = spot_reach.fold(reach, f64::max).min(1.6 * reach);
     for footprint in &own {
-        let class = drawn.drawing.rays[footprint.beam].class;
-        let cut = !class.sees();
+        let cut = !drawn.drawing.rays[footprint.beam].class.sees();
         if !cut && !footprint.beam.is_multiple_of(2) {
             continue;
         }
         let mut points: Vec<(f64, f64)> = footprint.outline.iter().map(flat).collect();
         points.extend(points.first().copied());
-        let (color, width) = match class {
-            Class::Split => (SPLIT, 2),
-            _ if cut => (LOST, 2),
-            _ => (color(facet), 1),
-        };
+        let (color, width) = if cut { (LOST, 2) } else { (color(facet), 1) };
         let inside = points.iter().all(|(x, y)| x.abs() <= reach && y.abs() <= reach);
         if inside {
             strokes.push(Stroke {
