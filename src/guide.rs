@@ -10,6 +10,7 @@
 //! 8. [`studies`]: what holds over many experiments, the reference setting, Figure 10
 //! 9. [`test_your_own`]: a calibrator of your own, tiers, comparing
 //! 11. [`planning`]: which board poses to record next
+//! 12. [`layouts`]: what a mirror layout sees, loses and allows, and files for making it
 //!
 //! The chapters are Markdown files in `docs/guide/`; their Rust examples are run by the tests.
 
@@ -42,3 +43,6 @@ pub mod test_your_own {}
 
 #[doc = include_str!("../docs/guide/11-planning.md")]
 pub mod planning {}
+
+#[doc = include_str!("../docs/guide/12-layouts.md")]
+pub mod layouts {}
