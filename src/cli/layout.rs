@@ -145,10 +145,10 @@ fn write(out: &Path, json: &str, drawn: &[Drawn]) -> Result<(), CliError> {
     std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
     for (name, bytes) in report::layout_pictures(drawn) {
         interrupt::check()?;
-        io::write_file(&out.join(name), &bytes)?;
+        io::write_file(out.join(name), &bytes)?;
     }
-    io::write_file(&out.join(PAGE), report::layout(drawn).as_bytes())?;
-    io::write_file(&out.join(JSON), json.as_bytes())?;
+    io::write_file(out.join(PAGE), report::layout(drawn).as_bytes())?;
+    io::write_file(out.join(JSON), json.as_bytes())?;
     Ok(())
 }
 

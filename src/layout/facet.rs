@@ -87,9 +87,7 @@ fn view(
     let meets = |t: &Traced| t.chief.facets().contains(&facet);
     let of_class = |class: Class| {
         let met = elements.iter().zip(traced).filter(|(_, t)| meets(t));
-        met.filter(|(e, _)| e.class == class)
-            .map(|(e, t)| (e, t))
-            .collect::<Vec<_>>()
+        met.filter(|(e, _)| e.class == class).collect::<Vec<_>>()
     };
     let own = of_class(Class::Deflected);
     let extremes = |value: &dyn Fn(&Element) -> Option<f64>| {

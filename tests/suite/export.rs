@@ -116,6 +116,11 @@ fn an_stl_is_read_back_in_millimetres() {
     assert!((read / (1e3 * drawn) - 1.0).abs() < 1e-6, "{read} {drawn}");
 }
 
+/// A number of the JSON that counts or points.
+fn whole(value: &serde_json::Value) -> usize {
+    usize::try_from(value.as_u64().unwrap()).unwrap()
+}
+
 /// The JSON and the binary part of a GLB.
 fn parts(glb: &[u8]) -> (serde_json::Value, Vec<u8>) {
     let number = |at: usize| u32::from_le_bytes(glb[at..at + 4].try_into().unwrap()) as usize;
@@ -136,13 +141,10 @@ fn a_glb_holds_what_its_accessors_say_in_metres() {
     let (json, data) = parts(&export::glb(&scene, &drawing, 0.5));
     let accessors = json["accessors"].as_array().unwrap();
     for accessor in accessors {
-        let view = &json["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
-        let (begin, length) = (
-            view["byteOffset"].as_u64().unwrap(),
-            view["byteLength"].as_u64().unwrap(),
-        );
-        assert_eq!(length, 12 * accessor["count"].as_u64().unwrap());
-        let bytes = &data[begin as usize..(begin + length) as usize];
+        let view = &json["bufferViews"][whole(&accessor["bufferView"])];
+        let (begin, length) = (whole(&view["byteOffset"]), whole(&view["byteLength"]));
+        assert_eq!(length, 12 * whole(&accessor["count"]));
+        let bytes = &data[begin..begin + length];
         let floats: Vec<f32> = bytes
             .chunks(4)
             .map(|c| f32::from_le_bytes(c.try_into().unwrap()))
@@ -163,7 +165,7 @@ fn a_glb_holds_what_its_accessors_say_in_metres() {
     // Undeflected beams end half a metre from the scanner, the one ahead on the x axis.
     let lines = &find("beams undeflected")["primitives"][0];
     assert_eq!(lines["mode"], 1);
-    let accessor = &accessors[lines["attributes"]["POSITION"].as_u64().unwrap() as usize];
+    let accessor = &accessors[whole(&lines["attributes"]["POSITION"])];
     assert!((accessor["max"][0].as_f64().unwrap() - 0.5).abs() < 1e-6);
     for facet in &drawing.facets {
         assert_eq!(find(&facet.name)["primitives"][0]["mode"], 4);

@@ -312,7 +312,7 @@ fn sensitivities_are_the_simulators_finite_differences() {
                     .map(|sign| point_at(&moved(&scene, number, turn * sign, shift * sign), beam, 4.0));
                 (ahead - behind) * 0.5
             };
-            let (mut square, mut count, mut worst) = (0.0, 0.0, 0.0_f64);
+            let (mut square, mut count, mut worst) = (0.0, 0.0_f64, 0.0_f64);
             let turn = 1e-4;
             for beam in first + 2..last - 1 {
                 if !analysis.elements[beam].class.sees() {
@@ -329,7 +329,7 @@ fn sensitivities_are_the_simulators_finite_differences() {
             let rms = facet.point_at_4m_per_0_1_deg_rms_mm.unwrap();
             // Central differences of 0.1 mrad depart from the derivative by their square; the elements at both ends, which
             // a turn may take off the mirror, are left out of the differences.
-            let found: f64 = (square / count as f64).sqrt();
+            let found: f64 = (square / count).sqrt();
             assert!(
                 (rms / found - 1.0).abs() < 1e-3,
                 "{name} {}: {rms} {found}",

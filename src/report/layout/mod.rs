@@ -1,6 +1,8 @@
 //! The page about mirror layouts, one or several side by side, and its pictures as files.
 
+mod canvas;
 mod perspective;
+mod sides;
 mod tables;
 mod views;
 
@@ -8,7 +10,8 @@ use super::figure::{css, standalone};
 use super::page::{escape, figure as block, page, table};
 use crate::layout::{Analysis, Drawing};
 use catoptric_sim::{Scene, SimError};
-use views::{LOST, SIDES};
+use sides::SIDES;
+use views::LOST;
 
 /// A layout with what was found out about it and the geometry to draw.
 #[derive(Debug, Clone)]
@@ -80,8 +83,8 @@ pub fn layout_pictures(layouts: &[Drawn]) -> Vec<(String, Vec<u8>)> {
         };
         add("field".to_owned(), &views::map(drawn));
         add("scan".to_owned(), &views::scan(drawn));
-        for (name, title, axes, labels) in SIDES {
-            add(name.to_owned(), &views::side(drawn, title, axes, labels));
+        for side in &SIDES {
+            add(side.name.to_owned(), &sides::side(drawn, side));
         }
         for (facet, view) in drawn.analysis.facets.iter().enumerate() {
             if let Some(svg) = views::footprints(drawn, facet) {
@@ -160,11 +163,8 @@ fn scan(drawn: &Drawn) -> String {
 fn structure(drawn: &Drawn) -> String {
     let perspective = perspective::perspective(drawn);
     let mut svgs = perspective.svg() + "<div class=\"views\">\n";
-    for (_, title, axes, labels) in SIDES {
-        svgs += &format!(
-            "<div><h4>{title}</h4>{}</div>\n",
-            views::side(drawn, title, axes, labels)
-        );
+    for side in &SIDES {
+        svgs += &format!("<div><h4>{}</h4>{}</div>\n", side.title, sides::side(drawn, side));
     }
     svgs += "</div>";
     let (headings, rows) = tables::sizes(drawn);
