@@ -11,6 +11,7 @@
 //! 9. [`test_your_own`]: a calibrator of your own, tiers, comparing
 //! 10. [`ci`]: property tests and gates, jobs to copy
 //! 11. [`planning`]: which board poses to record next
+//! 12. [`layouts`]: what a mirror layout sees, loses and allows, and files for making it
 //!
 //! The chapters are Markdown files in `docs/guide/`; their Rust examples are run by the tests.
 
@@ -52,3 +53,6 @@ pub mod ci {}
 
 #[doc = include_str!("../docs/guide/11-planning.md")]
 pub mod planning {}
+
+#[doc = include_str!("../docs/guide/12-layouts.md")]
+pub mod layouts {}

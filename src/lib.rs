@@ -23,8 +23,10 @@
 
 pub mod apply;
 pub mod compare;
+pub mod export;
 pub mod guide;
 pub mod io;
+pub mod layout;
 pub mod plan;
 pub mod report;
 pub mod score;

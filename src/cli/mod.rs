@@ -8,8 +8,10 @@ mod compare;
 mod completions;
 mod demo;
 mod error;
+mod export;
 mod files;
 mod interrupt;
+mod layout;
 mod man;
 mod new;
 mod output;
@@ -84,6 +86,10 @@ enum Verb {
     Study(study::Arguments),
     /// Say which board poses to record next, and what each gains
     Plan(plan::Arguments),
+    /// Say what a mirror layout sees, loses and allows; several side by side
+    Layout(layout::Arguments),
+    /// Write a layout as solids, a 3D scene, a drawing table or frames
+    Export(export::Arguments),
     /// Turn a scan into a point cloud
     Apply(apply::Arguments),
     /// Write a page to read about calibrations and their scores
@@ -155,6 +161,8 @@ fn run(cli: Cli) -> Result<(), CliError> {
         Verb::Compare(arguments) => compare::run(&arguments),
         Verb::Study(arguments) => study::run(&arguments, &context),
         Verb::Plan(arguments) => plan::run(&arguments, &context),
+        Verb::Layout(arguments) => layout::run(&arguments, &context),
+        Verb::Export(arguments) => export::run(&arguments, &context),
         Verb::Apply(arguments) => apply::run(&arguments, &context),
         Verb::Report(arguments) => report::run(&arguments, &context),
         Verb::New(arguments) => new::run(&arguments),

@@ -1,5 +1,9 @@
 //! The plots, as inline SVG without a color scheme of their own: black follows the page's ink, [`GRID`] its grid.
 
+mod fine;
+
+pub(super) use fine::{Area, Shapes, fine, round_numbers};
+
 use crate::score::percentile;
 use plotters::coord::Shift;
 use plotters::coord::types::RangedCoordf64;
@@ -27,12 +31,12 @@ const LABEL_SIZE: i32 = 13;
 const AXIS_ROOM: u32 = 52;
 const MARGIN: u32 = 10;
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type Sheet<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 type Failure = Box<dyn std::error::Error>;
 
 /// The color of the facet of a given number.
-pub(super) fn color(facet: usize) -> RGBColor {
+pub(crate) fn color(facet: usize) -> RGBColor {
     PALETTE[facet % PALETTE.len()]
 }
 
@@ -198,7 +202,7 @@ fn draw_strokes(chart: &mut Chart, strokes: &[Stroke]) -> Result<(), Failure> {
 }
 
 /// Coordinate frame with grid and axis labels.
-fn frame<'a>(area: &Area<'a>, axes: &Axes, y_labels: bool) -> Result<Chart<'a>, Failure> {
+fn frame<'a>(area: &Sheet<'a>, axes: &Axes, y_labels: bool) -> Result<Chart<'a>, Failure> {
     let mut chart = ChartBuilder::on(area)
         .margin(MARGIN)
         .x_label_area_size(AXIS_ROOM)
@@ -235,7 +239,7 @@ fn tick(value: f64) -> String {
 }
 
 /// An SVG for inlining: without a name space, which HTML supplies, with a title, and as wide as the page lets it.
-fn draw(size: (u32, u32), title: &str, content: impl FnOnce(&Area) -> Result<(), Failure>) -> String {
+fn draw(size: (u32, u32), title: &str, content: impl FnOnce(&Sheet) -> Result<(), Failure>) -> String {
     let mut svg = String::new();
     let outcome = {
         let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
@@ -254,6 +258,16 @@ fn draw(size: (u32, u32), title: &str, content: impl FnOnce(&Area) -> Result<(),
         super::page::escape(title),
         svg[start..].trim_start()
     )
+}
+
+/// An SVG that stands by itself as a file: with its name space, on white.
+pub(super) fn standalone(svg: &str) -> String {
+    svg.replacen("<svg ", "<svg xmlns=\"http://www.w3.org/2000/svg\" ", 1)
+        .replacen(
+            "</title>",
+            "</title><rect width=\"100%\" height=\"100%\" fill=\"#FFFFFF\"/>",
+            1,
+        )
 }
 
 /// Limits around zero that hold the values, save for a few that are far beyond the others; −1…1 for nothing.

@@ -7,6 +7,7 @@
 mod angles;
 mod characterization;
 mod figure;
+mod layout;
 mod page;
 mod plan;
 mod plots;
@@ -17,6 +18,8 @@ mod verdict;
 mod words;
 
 pub use characterization::characterization;
+pub(crate) use figure::color as facet_color;
+pub use layout::{Drawn, layout, layout_pictures};
 pub use plan::plan;
 pub use study::study;
 

@@ -589,6 +589,22 @@ moved_mm = [0, 0, 4]
     );
 }
 
+#[test]
+fn documented_figures_of_a_layout_are_those_of_its_json() {
+    let text = read("docs/guide/12-layouts.md");
+    let scene = scene::load(&root().join("scenes/two-mirror.toml"), &[]).unwrap();
+    let mut analysis = catoptric::layout::analyze(&scene, None, catoptric::layout::Detail::Full).unwrap();
+    analysis.accuracy = Some(catoptric::layout::predict(&scene, scene.seed));
+    let written = keys(&serde_json::to_value(&analysis).unwrap(), &["counts"]);
+    assert_eq!(
+        first_column(&text, "## layout --json"),
+        written,
+        "documented (left) and written (right)"
+    );
+    let classes: BTreeSet<String> = catoptric::layout::Class::ALL.map(|c| c.name().to_owned()).into();
+    assert_eq!(first_column(&text, "## What becomes of each element"), classes);
+}
+
 /// The files that the picture of a dataset's folder lists.
 fn files_of_dataset(text: &str) -> Vec<String> {
     let picture = &code_blocks(text, "text")[0];

@@ -5,9 +5,11 @@
 //! never by an epsilon.
 
 mod cylinder;
+mod skin;
 mod triangles;
 
 pub use cylinder::Cylinder;
+pub use skin::{CYLINDER_FACES, Triangle, volume};
 pub use triangles::Triangles;
 
 use crate::footprint::Ray;

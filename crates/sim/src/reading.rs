@@ -225,7 +225,8 @@ impl Sensor {
         &self.sub_rays
     }
 
-    fn paths<'a>(
+    /// The ways of a beam's sub-rays, in the order in which they are cast.
+    pub fn paths<'a>(
         &'a self,
         setting: &'a Setting<'_>,
         beam: usize,
@@ -250,29 +251,9 @@ impl Sensor {
     ///
     /// `bare` is a setting without targets, so that light which leaves the structure escapes.
     pub fn classify(&self, bare: &Setting<'_>, beam: usize) -> (BeamClass, f64) {
-        let class = |path: &Path| match path.end {
-            End::Hit(_) => BeamClass::Blocked,
-            End::Trapped => BeamClass::Lost,
-            End::Escaped => match path.facets().len() {
-                0 => BeamClass::Direct,
-                1 => BeamClass::Deflected,
-                _ => BeamClass::MultiBounce,
-            },
-        };
         let chief = self.chief_path(bare, beam);
-        let mut whole = true;
-        let mut share = 0.0;
-        for (sub_ray, path) in self.paths(bare, beam) {
-            // Light that ends on the structure is lost to the scanner whatever part of it is met.
-            let same = class(&path) == class(&chief)
-                && (class(&path) == BeamClass::Blocked || path.facets() == chief.facets());
-            if same {
-                share += sub_ray.weight;
-            } else {
-                whole = false;
-            }
-        }
-        (if whole { class(&chief) } else { BeamClass::Split }, share)
+        let paths: Vec<_> = self.paths(bare, beam).collect();
+        class(&chief, paths.iter().map(|(sub_ray, path)| (*sub_ray, path)))
     }
 
     /// What a beam brings home; `None` if no echo reaches the threshold.
@@ -463,6 +444,33 @@ impl Sensor {
         let detection = if physical { alone - geometric } else { 0.0 };
         Some((part, read(&edge) - alone, detection))
     }
+}
+
+/// What the structure does to a beam, from the ways of its chief ray and of its sub-rays past it, and the share of its
+/// energy that goes the chief ray's way.
+pub fn class<'p>(chief: &Path, paths: impl IntoIterator<Item = (&'p SubRay, &'p Path)>) -> (BeamClass, f64) {
+    let of = |path: &Path| match path.end {
+        End::Hit(_) => BeamClass::Blocked,
+        End::Trapped => BeamClass::Lost,
+        End::Escaped => match path.facets().len() {
+            0 => BeamClass::Direct,
+            1 => BeamClass::Deflected,
+            _ => BeamClass::MultiBounce,
+        },
+    };
+    let mut whole = true;
+    let mut share = 0.0;
+    for (sub_ray, path) in paths {
+        // Light that ends on the structure is lost to the scanner whatever part of it is met.
+        let same =
+            of(path) == of(chief) && (of(path) == BeamClass::Blocked || path.facets() == chief.facets());
+        if same {
+            share += sub_ray.weight;
+        } else {
+            whole = false;
+        }
+    }
+    (if whole { of(chief) } else { BeamClass::Split }, share)
 }
 
 impl Part {

@@ -7,9 +7,9 @@ use nalgebra::{Point3, Unit, Vector3};
 /// A solid cylinder about the z axis of its own frame, centered on its origin.
 #[derive(Debug, Clone)]
 pub struct Cylinder {
-    frame_from_cylinder: Pose,
-    radius: f64,
-    half_height: f64,
+    pub(super) frame_from_cylinder: Pose,
+    pub(super) radius: f64,
+    pub(super) half_height: f64,
 }
 
 /// A place on a ray, and the outward normal there in the cylinder's own frame.

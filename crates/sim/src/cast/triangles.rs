@@ -62,6 +62,11 @@ impl Triangles {
         &self.vertices
     }
 
+    /// All of its triangles, in metres.
+    pub(super) fn skin(&self) -> Vec<[Point3<f64>; 3]> {
+        (0..self.triangles.len()).map(|t| self.corners(t)).collect()
+    }
+
     /// Distance and normal of the nearest triangle along a ray.
     pub(super) fn cast(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
         let sheared = Sheared::new(ray);

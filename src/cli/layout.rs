@@ -1,0 +1,248 @@
+//! `catoptric layout`: what mirror layouts see, lose and allow; several side by side.
+
+use super::Context;
+use super::error::CliError;
+use super::interrupt;
+use super::output::{print, quoted};
+use catoptric::io::{self, IoError, scene};
+use catoptric::layout::{self, Analysis, Class, Detail, FacetView, Requirement, RequirementError};
+use catoptric::report::{self, Drawn};
+use clap::Args;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Arguments of `layout`.
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
+    /// The scene, TOML or JSON; several are put side by side.
+    #[arg(required = true, value_name = "SCENE")]
+    scenes: Vec<PathBuf>,
+    /// Look at the structure as built under the seed instead of the drawing.
+    #[arg(long)]
+    as_built: bool,
+    /// Seed of the structure as built and of the predicted accuracy; the scene's own by default.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// One ray per beam and no prediction of accuracy: an answer in milliseconds.
+    #[arg(long)]
+    coarse: bool,
+    /// Change a value of every scene first: superstructure.mirror.reflectivity=0.95.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// A limit to keep, else the exit code is 1: "field_of_regard>=0.004", "facets.*.margin_mm>0.5". May be given more
+    /// than once.
+    #[arg(long, value_name = "FIGURE>=NUMBER")]
+    require: Vec<String>,
+    /// Write layout.json, the pictures and a page, report.html, into this folder.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print every figure as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What is printed of several layouts.
+#[derive(Serialize)]
+struct SideBySide<'a> {
+    schema_version: u32,
+    layouts: &'a [Analysis],
+}
+
+pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
+    let requirements = requirements(&arguments.require)?;
+    let mut scenes = Vec::new();
+    for path in &arguments.scenes {
+        scenes.push(scene::load(path, &arguments.set)?);
+    }
+    let begin = Instant::now();
+    let mut analyses = Vec::new();
+    for scene in &scenes {
+        interrupt::check()?;
+        let seed = arguments.seed.unwrap_or(scene.seed);
+        let detail = if arguments.coarse {
+            Detail::Coarse
+        } else {
+            Detail::Full
+        };
+        let mut analysis = layout::analyze(scene, arguments.as_built.then_some(seed), detail)?;
+        if !arguments.coarse {
+            analysis.accuracy = Some(layout::predict(scene, seed));
+        }
+        analyses.push(analysis);
+    }
+    context.detail(&format!("analyzed in {:.3} s", begin.elapsed().as_secs_f64()));
+    let unmet = unmet(&requirements, &analyses)?;
+    let json = json(&analyses)?;
+    let mut said = String::new();
+    if let Some(out) = &arguments.out {
+        let drawn: Result<Vec<Drawn>, _> = scenes
+            .iter()
+            .zip(&analyses)
+            .map(|(scene, analysis)| Drawn::new(scene, analysis))
+            .collect();
+        write(out, &json, &drawn?)?;
+        said = format!("wrote {}\n", quoted(&out.join(PAGE)));
+    }
+    if arguments.json {
+        print(&json)?;
+    } else {
+        let text: Vec<String> = analyses.iter().map(text).collect();
+        print(&(text.join("\n") + &said + &next(arguments)))?;
+    }
+    if unmet.is_empty() {
+        Ok(())
+    } else {
+        Err(CliError::Verdict(unmet.join("\n")))
+    }
+}
+
+fn requirements(texts: &[String]) -> Result<Vec<Requirement>, CliError> {
+    texts
+        .iter()
+        .map(|text| Requirement::parse(text).map_err(refused))
+        .collect()
+}
+
+fn refused(error: RequirementError) -> CliError {
+    CliError::Invalid {
+        message: format!("--require: {error}"),
+        help: Some(match error {
+            RequirementError::Form { .. } => "--require 'field_of_regard>=0.004'".to_owned(),
+            RequirementError::Unknown { help, .. } => help,
+        }),
+    }
+}
+
+fn unmet(requirements: &[Requirement], analyses: &[Analysis]) -> Result<Vec<String>, CliError> {
+    let mut unmet = Vec::new();
+    for analysis in analyses {
+        for requirement in requirements {
+            let found = requirement.judge(analysis).map_err(refused)?;
+            unmet.extend(found.iter().map(|u| format!("not met: {u}")));
+        }
+    }
+    Ok(unmet)
+}
+
+/// One layout by itself, several in a list.
+fn json(analyses: &[Analysis]) -> Result<String, CliError> {
+    let text = match analyses {
+        [one] => serde_json::to_string(one),
+        several => serde_json::to_string(&SideBySide {
+            schema_version: layout::SCHEMA_VERSION,
+            layouts: several,
+        }),
+    };
+    text.map(|t| t + "\n").map_err(|e| CliError::Output(e.into()))
+}
+
+/// Names of what is written.
+const JSON: &str = "layout.json";
+const PAGE: &str = "report.html";
+
+fn write(out: &Path, json: &str, drawn: &[Drawn]) -> Result<(), CliError> {
+    std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
+    for (name, bytes) in report::layout_pictures(drawn) {
+        interrupt::check()?;
+        io::write_file(out.join(name), &bytes)?;
+    }
+    io::write_file(out.join(PAGE), report::layout(drawn).as_bytes())?;
+    io::write_file(out.join(JSON), json.as_bytes())?;
+    Ok(())
+}
+
+fn next(arguments: &Arguments) -> String {
+    let scenes: Vec<String> = arguments.scenes.iter().map(|s| quoted(s)).collect();
+    match (&arguments.out, arguments.scenes.as_slice()) {
+        (None, _) => format!("next: catoptric layout {} --out layout\n", scenes.join(" ")),
+        (Some(_), [one]) => format!(
+            "next: catoptric export {} --format stl --out mirrors.stl\n",
+            quoted(one)
+        ),
+        (Some(_), _) => String::new(),
+    }
+}
+
+/// A layout for people.
+fn text(analysis: &Analysis) -> String {
+    let counts: Vec<String> = Class::ALL
+        .iter()
+        .filter_map(|class| {
+            let count = analysis.counts.get(class).filter(|c| **c > 0)?;
+            Some(format!("{count} {}", class.words()))
+        })
+        .collect();
+    let built = analysis
+        .seed
+        .map_or_else(String::new, |seed| format!(" as built under seed {seed}"));
+    let elevation = analysis.elevation_deg.map_or_else(
+        || "no elevation".to_owned(),
+        |[low, high]| format!("elevation {low:.1}° to {high:.1}°"),
+    );
+    let mut text = format!(
+        "{}{built}: {}\n  largest gap {:.2}° of the scan; field of regard {:.3} % of all directions ({:.4} sr), {:.1} % within \
+         5° of a beam; {elevation}, {:.0} of 360° of azimuth\n",
+        analysis.name,
+        counts.join(", "),
+        analysis.largest_gap_deg,
+        100.0 * analysis.field_of_regard,
+        analysis.solid_angle_sr,
+        100.0 * analysis.share_within_5_deg,
+        analysis.azimuth_covered_deg,
+    );
+    let width = analysis
+        .facets
+        .iter()
+        .map(|f| f.name.chars().count())
+        .max()
+        .unwrap_or(0);
+    text.extend(analysis.facets.iter().map(|f| facet(f, width)));
+    let spots = analysis
+        .spots
+        .iter()
+        .map(|s| format!("{:.0} × {:.0} mm at {:.0} m", s.wide_mm, s.narrow_mm, s.range_m));
+    let size = &analysis.size;
+    let [x, y, z] = size.extent_mm;
+    text += &format!(
+        "  spot {}\n  size {x:.0} × {y:.0} × {z:.0} mm, mirrors {:.1} cm², {:.0} g of mirrors and posts\n",
+        spots.collect::<Vec<_>>().join(", "),
+        size.mirror_area_mm2 / 100.0,
+        size.structure_mass_g,
+    );
+    if let Some(accuracy) = &analysis.accuracy {
+        text += &match (accuracy.per_axis_deg, &accuracy.reason) {
+            (Some(bound), _) => format!(
+                "  calibration from {} board poses can reach {bound:.4}° per axis, {:.1} mm at 4 m; {} elements open\n",
+                accuracy.board_poses,
+                accuracy.point_at_4m_mm.unwrap_or(f64::NAN),
+                accuracy.open,
+            ),
+            (None, reason) => format!(
+                "  calibration: no bound: {}\n",
+                reason.as_deref().unwrap_or("nothing limits it")
+            ),
+        };
+    }
+    text
+}
+
+fn facet(facet: &FacetView, width: usize) -> String {
+    let Some(([low, high], [left, right])) = facet.exit_elevation_deg.zip(facet.exit_azimuth_deg) else {
+        return format!("  {:width$}  serves no element\n", facet.name);
+    };
+    let number = |value: Option<f64>, decimals: usize| {
+        value.map_or_else(|| "–".to_owned(), |v| format!("{v:.decimals$}"))
+    };
+    format!(
+        "  {:width$}  {:3} elements to azimuth {left:.0}° to {right:.0}°, elevation {low:.0}° to {high:.0}°; {} split; margin {} \
+         mm ({} beams); to {} m at 10 %; 0.1° of tilt moves 4 m by {} mm\n",
+        facet.name,
+        facet.elements,
+        facet.split,
+        number(facet.margin_mm, 2),
+        number(facet.margin_beams, 1),
+        number(facet.range_max_dark_m, 1),
+        number(facet.point_at_4m_per_0_1_deg_rms_mm, 1),
+    )
+}

@@ -1,0 +1,104 @@
+//! The geometry of a layout for whoever draws or builds it: mirrors, posts, housing, the ways of all beams.
+
+use super::element::{Class, exit, trace};
+use super::field::{Cell, cells};
+use super::footprint::{Footprint, footprints};
+use super::size::HOUSING;
+use catoptric_sim::cast::Triangle;
+use catoptric_sim::optics::{End, Mirrors, Setting};
+use catoptric_sim::reading::Sensor;
+use catoptric_sim::structure::{BuiltFacet, Structure};
+use catoptric_sim::{Scene, SimError};
+use nalgebra::{Point3, Unit, Vector3};
+
+/// Mirrors, bodies and beams in the sensor frame, in metres.
+#[derive(Debug, Clone)]
+pub struct Drawing {
+    /// Name of the scene.
+    pub name: String,
+    /// The mirrors.
+    pub facets: Vec<BuiltFacet>,
+    /// Posts and housing.
+    pub parts: Vec<DrawnPart>,
+    /// One for every beam.
+    pub rays: Vec<DrawnRay>,
+    /// Where beams fall on facets, in order of beam and bounce.
+    pub footprints: Vec<Footprint>,
+    /// What every beam stands for in the scan.
+    pub cells: Vec<Cell>,
+}
+
+/// An opaque body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DrawnPart {
+    /// Name.
+    pub name: String,
+    /// Its closed surface.
+    pub skin: Vec<Triangle>,
+    /// Whether it belongs to the scanner.
+    pub housing: bool,
+}
+
+/// The way of a beam's chief ray.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DrawnRay {
+    /// The beam.
+    pub beam: usize,
+    /// What becomes of the beam.
+    pub class: Class,
+    /// Facets met, by their number.
+    pub facets: Vec<usize>,
+    /// The scanner, the mirrors met, and the end on the structure if there is one.
+    pub points: Vec<Point3<f64>>,
+    /// Where it goes from the last point; `None` if it ends there.
+    pub exit: Option<Unit<Vector3<f64>>>,
+}
+
+impl Drawing {
+    /// The geometry of a scene as drawn, or as built under a seed.
+    ///
+    /// # Errors
+    /// As [`analyze`](super::analyze).
+    pub fn new(scene: &Scene, seed: Option<u64>) -> Result<Self, SimError> {
+        let structure = match seed {
+            None => Structure::nominal(scene)?,
+            Some(seed) => Structure::as_built(scene, seed)?,
+        };
+        let sensor = Sensor::new(scene)?;
+        let (rays, footprints) = {
+            let setting = Setting::new(scene, &structure, Mirrors::Attached, Vec::new())?;
+            let traced = trace(&sensor, &setting, scene);
+            let rays = traced.iter().map(|t| {
+                let mut points = vec![Point3::origin()];
+                points.extend(t.chief.points());
+                if let End::Hit(hit) = t.chief.end {
+                    points.push(hit.point);
+                }
+                DrawnRay {
+                    beam: t.beam,
+                    class: t.class(),
+                    facets: t.chief.facets().to_vec(),
+                    points,
+                    exit: exit(&t.chief),
+                }
+            });
+            (rays.collect(), footprints(&sensor, &structure, &traced))
+        };
+        Ok(Self {
+            name: scene.name.clone(),
+            rays,
+            footprints,
+            cells: cells(sensor.shape()),
+            parts: structure
+                .parts
+                .iter()
+                .map(|part| DrawnPart {
+                    name: part.name.clone(),
+                    skin: part.shape.triangles(),
+                    housing: part.name == HOUSING,
+                })
+                .collect(),
+            facets: structure.facets,
+        })
+    }
+}

@@ -1,0 +1,266 @@
+//! Element by element: what becomes of its light, where it looks, and how far.
+//!
+//! A face-on target of reflectivity ρ is seen as far as Eq. 1 keeps its echo above the threshold. With the threshold set
+//! by a target of reflectivity ρ_t at R_t, and g = Σ share·(ρ_mirrorⁿ·gain)², what two passes over n mirrors leave of the
+//! light that goes the chief ray's way,
+//!
+//! ```text
+//! R = R_t·√(g·ρ/ρ_t)         at most the scanner's longest range, along the whole way from the scanner
+//! ```
+
+use super::footprint::Footprint;
+use catoptric_model::beam;
+use catoptric_sim::footprint::SubRay;
+use catoptric_sim::optics::{End, Path, Setting};
+use catoptric_sim::reading::{Sensor, class};
+use catoptric_sim::structure::Structure;
+use catoptric_sim::truth::BeamClass;
+use catoptric_sim::{Scene, color};
+use nalgebra::{Unit, Vector3};
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// Reflectivity of the dark target: what data sheets state ranges for.
+pub const DARK: f64 = 0.1;
+
+/// What becomes of an element's light.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Class {
+    /// All of it passes by the structure.
+    Direct,
+    /// All of it leaves by one facet.
+    Deflected,
+    /// All of it leaves after more than one facet.
+    MultiBounce,
+    /// An edge cuts it: its parts take different ways.
+    Split,
+    /// All of it ends on the structure without meeting a mirror first.
+    HitsStructure,
+    /// All of it meets a mirror, and then ends on the structure.
+    Shaded,
+    /// All of it is still between mirrors after the last bounce allowed.
+    Trapped,
+    /// It leaves, and not even a white target returns enough of it.
+    TooFaint,
+}
+
+/// One element of the scan.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Element {
+    /// Index of the beam.
+    pub beam: usize,
+    /// Its azimuth in the scan, in degrees.
+    pub scan_azimuth_deg: f64,
+    /// What becomes of its light.
+    pub class: Class,
+    /// The same in the words of a recording's truth.
+    pub status: BeamClass,
+    /// Facets that its chief ray meets, in order.
+    pub facets: Vec<String>,
+    /// What ends its chief ray's way.
+    pub stopped_by: Option<String>,
+    /// Share of its energy that goes the chief ray's way.
+    pub chief_energy: f64,
+    /// Azimuth in which its chief ray leaves, in degrees.
+    pub exit_azimuth_deg: Option<f64>,
+    /// Elevation in which its chief ray leaves, in degrees.
+    pub exit_elevation_deg: Option<f64>,
+    /// Length of the way to the last mirror, in metres; 0 without any.
+    pub mirror_at_m: f64,
+    /// Shortest range that is reported and beyond the last mirror, in metres from the scanner.
+    pub range_min_m: Option<f64>,
+    /// Farthest face-on white target that is seen, in metres from the scanner.
+    pub range_max_white_m: Option<f64>,
+    /// Farthest face-on target of 10 % that is seen, in metres from the scanner.
+    pub range_max_dark_m: Option<f64>,
+    /// Least distance of its spot from an edge of the mirrors it meets, in millimetres; negative where an edge cuts it.
+    pub margin_mm: Option<f64>,
+    /// The same, over the distance by which neighboring beams are apart there.
+    pub margin_beams: Option<f64>,
+}
+
+/// The ways of one beam.
+pub(crate) struct Traced {
+    pub(crate) beam: usize,
+    pub(crate) chief: Path,
+    pub(crate) status: BeamClass,
+    pub(crate) chief_energy: f64,
+    /// What two passes leave of the light that goes the chief ray's way.
+    pub(crate) light: f64,
+    pub(crate) sees: bool,
+}
+
+impl Traced {
+    /// What becomes of it.
+    pub(crate) fn class(&self) -> Class {
+        match self.status {
+            BeamClass::Split => Class::Split,
+            BeamClass::Blocked if !self.chief.facets().is_empty() => Class::Shaded,
+            BeamClass::Blocked => Class::HitsStructure,
+            BeamClass::Lost => Class::Trapped,
+            _ if !self.sees => Class::TooFaint,
+            BeamClass::Direct => Class::Direct,
+            BeamClass::Deflected => Class::Deflected,
+            BeamClass::MultiBounce => Class::MultiBounce,
+        }
+    }
+}
+
+impl Class {
+    /// All classes.
+    pub const ALL: [Self; 8] = [
+        Self::Direct,
+        Self::Deflected,
+        Self::MultiBounce,
+        Self::Split,
+        Self::HitsStructure,
+        Self::Shaded,
+        Self::Trapped,
+        Self::TooFaint,
+    ];
+
+    /// Whether such an element has a direction of its own.
+    pub fn sees(self) -> bool {
+        matches!(self, Self::Direct | Self::Deflected | Self::MultiBounce)
+    }
+
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Direct => "direct",
+            Self::Deflected => "deflected",
+            Self::MultiBounce => "multi_bounce",
+            Self::Split => "split",
+            Self::HitsStructure => "hits_structure",
+            Self::Shaded => "shaded",
+            Self::Trapped => "trapped",
+            Self::TooFaint => "too_faint",
+        }
+    }
+
+    /// The same for people.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Direct => "direct",
+            Self::Deflected => "deflected by one facet",
+            Self::MultiBounce => "leaving after several facets",
+            Self::Split => "split at an edge",
+            Self::HitsStructure => "ending on the structure",
+            Self::Shaded => "ending on the structure after a mirror",
+            Self::Trapped => "trapped between mirrors",
+            Self::TooFaint => "too faint",
+        }
+    }
+}
+
+/// Direction in which a way leaves; `None` if it does not.
+pub(crate) fn exit(path: &Path) -> Option<Unit<Vector3<f64>>> {
+    matches!(path.end, End::Escaped).then_some(path.last.direction)
+}
+
+/// Length of a way to its last mirror, in metres.
+fn mirror_at(path: &Path) -> f64 {
+    match path.end {
+        End::Escaped | End::Trapped => path.length,
+        End::Hit(hit) => path.length - hit.distance,
+    }
+}
+
+/// Follows every beam through a setting without targets.
+pub(crate) fn trace(sensor: &Sensor, bare: &Setting<'_>, scene: &Scene) -> Vec<Traced> {
+    let of_one = |beam| {
+        let chief = sensor.chief_path(bare, beam);
+        let paths: Vec<(&SubRay, Path)> = sensor.paths(bare, beam).collect();
+        let (status, chief_energy) = class(&chief, paths.iter().map(|(s, p)| (*s, p)));
+        let along = paths.iter();
+        let along = along.filter(|(_, p)| exit(p).is_some() && p.facets() == chief.facets());
+        let light = along.map(|(s, p)| {
+            let pass = libm::pow(scene.superstructure.mirror.reflectivity, p.silvered as f64) * p.gain;
+            s.weight * pass * pass
+        });
+        let mut traced = Traced {
+            beam,
+            status,
+            chief_energy,
+            light: light.sum(),
+            sees: false,
+            chief,
+        };
+        let leaves = matches!(
+            status,
+            BeamClass::Direct | BeamClass::Deflected | BeamClass::MultiBounce
+        );
+        traced.sees = leaves && farthest(scene, &traced, white(scene)) > nearest(scene, &traced);
+        traced
+    };
+    (0..beam::COUNT).into_par_iter().map(of_one).collect()
+}
+
+/// Reflectivity of the white that scenes mean.
+fn white(scene: &Scene) -> f64 {
+    color::paint(scene, "white").map_or(1.0, |paint| paint.reflectivity)
+}
+
+/// Farthest face-on target of a reflectivity, along the whole way.
+fn farthest(scene: &Scene, traced: &Traced, reflectivity: f64) -> f64 {
+    let detection = &scene.detection;
+    let brightness = traced.light * reflectivity / detection.threshold_reflectivity;
+    let seen = detection.threshold_range_m * brightness.sqrt();
+    // Without a threshold everything is seen, and no light at all is not.
+    let seen = if seen.is_nan() { 0.0 } else { seen };
+    seen.min(scene.scanner.limits().range_max_m)
+}
+
+/// Shortest way that is reported and leads beyond the last mirror.
+fn nearest(scene: &Scene, traced: &Traced) -> f64 {
+    scene.scanner.limits().range_min_m.max(mirror_at(&traced.chief))
+}
+
+/// What is told of every element.
+pub(crate) fn elements(
+    scene: &Scene,
+    structure: &Structure,
+    names: &[&str],
+    traced: &[Traced],
+    footprints: &[Footprint],
+) -> Vec<Element> {
+    let white = white(scene);
+    let mut margins: Vec<Option<(f64, f64)>> = vec![None; traced.len()];
+    for footprint in footprints {
+        let margin = &mut margins[footprint.beam];
+        if margin.is_none_or(|(mm, _)| footprint.margin_mm < mm) {
+            *margin = Some((footprint.margin_mm, footprint.margin_beams));
+        }
+    }
+    let of_one = |t: &Traced| {
+        let leaves = exit(&t.chief);
+        let reach = |reflectivity| t.sees.then(|| farthest(scene, t, reflectivity));
+        Element {
+            beam: t.beam,
+            scan_azimuth_deg: beam::azimuth(t.beam).to_degrees(),
+            class: t.class(),
+            status: t.status,
+            facets: t
+                .chief
+                .facets()
+                .iter()
+                .map(|&f| structure.facets[f].name.clone())
+                .collect(),
+            stopped_by: match t.chief.end {
+                End::Hit(hit) => Some(names[hit.surface].to_owned()),
+                End::Escaped | End::Trapped => None,
+            },
+            chief_energy: t.chief_energy,
+            exit_azimuth_deg: leaves.map(|v| libm::atan2(v.y, v.x).to_degrees()),
+            exit_elevation_deg: leaves.map(|v| libm::atan2(v.z, libm::hypot(v.x, v.y)).to_degrees()),
+            mirror_at_m: mirror_at(&t.chief),
+            range_min_m: t.sees.then(|| nearest(scene, t)),
+            range_max_white_m: reach(white),
+            range_max_dark_m: reach(DARK),
+            margin_mm: margins[t.beam].map(|(mm, _)| mm),
+            margin_beams: margins[t.beam].map(|(_, beams)| beams),
+        }
+    };
+    traced.iter().map(of_one).collect()
+}

@@ -1,0 +1,156 @@
+//! Facet by facet: what it serves, where its fan goes, what room it leaves, and what an error of it does.
+
+use super::element::{Class, Element, Traced, exit};
+use super::field::Cell;
+use super::footprint::Footprint;
+use super::sensitivity::{RANGE_M, shifts};
+use catoptric_model::beam;
+use catoptric_sim::layout::area_vector;
+use catoptric_sim::structure::Structure;
+use serde::Serialize;
+
+/// Turn of a facet that its sensitivity is stated for, in degrees.
+const TURN_DEG: f64 = 0.1;
+
+/// Shift of a facet that its sensitivity is stated for, in millimetres.
+const SHIFT_MM: f64 = 0.1;
+
+/// What one facet serves, and what an error of it does.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FacetView {
+    /// The facet.
+    pub name: String,
+    /// Elements that it deflects alone, and that see.
+    pub elements: usize,
+    /// First and last of them.
+    pub beams: Option<[usize; 2]>,
+    /// Elements that meet it and leave after other facets too.
+    pub multi_bounce: usize,
+    /// Elements whose chief ray meets it and that an edge cuts.
+    pub split: usize,
+    /// Elements that meet it and then end on the structure.
+    pub shaded: usize,
+    /// Least and greatest azimuth of its fan, in degrees; the first may be below −180.
+    pub exit_azimuth_deg: Option<[f64; 2]>,
+    /// Least and greatest elevation of its fan, in degrees.
+    pub exit_elevation_deg: Option<[f64; 2]>,
+    /// Solid angle of its elements' cells, in steradians.
+    pub solid_angle_sr: f64,
+    /// The same as a share of 4π.
+    pub field_of_regard: f64,
+    /// Way from the scanner to it, least and greatest, in metres.
+    pub mirror_at_m: Option<[f64; 2]>,
+    /// Farthest face-on white target that all of its elements see, in metres from the scanner.
+    pub range_max_white_m: Option<f64>,
+    /// Farthest face-on target of 10 % that all of its elements see, in metres from the scanner.
+    pub range_max_dark_m: Option<f64>,
+    /// Least distance of an unsplit element's spot from any edge, in millimetres.
+    pub margin_mm: Option<f64>,
+    /// The same over the distance by which neighboring beams are apart on the facet.
+    pub margin_beams: Option<f64>,
+    /// Least distance of an unsplit element's spot from the edges beside the scan's line, in millimetres: how far the scan
+    /// may rise or sink.
+    pub margin_across_mm: Option<f64>,
+    /// Area, in square millimetres.
+    pub area_mm2: f64,
+    /// Movement of the point at 4 m for a turn of the facet by 0.1° about the worst axis, root mean square over its
+    /// elements, in millimetres.
+    pub point_at_4m_per_0_1_deg_rms_mm: Option<f64>,
+    /// The same, the greatest.
+    pub point_at_4m_per_0_1_deg_max_mm: Option<f64>,
+    /// Movement of the point at 4 m for a shift of the facet by 0.1 mm along its normal, in millimetres.
+    pub point_at_4m_per_0_1_mm_mm: Option<f64>,
+}
+
+/// All facets.
+pub(crate) fn facets(
+    structure: &Structure,
+    elements: &[Element],
+    traced: &[Traced],
+    cells: &[Cell],
+    footprints: &[Footprint],
+) -> Vec<FacetView> {
+    (0..structure.facets.len())
+        .map(|facet| view(structure, facet, elements, traced, cells, footprints))
+        .collect()
+}
+
+fn view(
+    structure: &Structure,
+    facet: usize,
+    elements: &[Element],
+    traced: &[Traced],
+    cells: &[Cell],
+    footprints: &[Footprint],
+) -> FacetView {
+    let built = &structure.facets[facet];
+    let meets = |t: &Traced| t.chief.facets().contains(&facet);
+    let of_class = |class: Class| {
+        let met = elements.iter().zip(traced).filter(|(_, t)| meets(t));
+        met.filter(|(e, _)| e.class == class).collect::<Vec<_>>()
+    };
+    let own = of_class(Class::Deflected);
+    let extremes = |value: &dyn Fn(&Element) -> Option<f64>| {
+        let values = || own.iter().filter_map(|(e, _)| value(e));
+        Some([values().reduce(f64::min)?, values().reduce(f64::max)?])
+    };
+    let solid_angle_sr: f64 = own.iter().map(|(e, _)| cells[e.beam].solid_angle()).sum();
+    let sees = |f: &&Footprint| f.facet == facet && elements[f.beam].class.sees();
+    let nearest = footprints
+        .iter()
+        .filter(sees)
+        .min_by(|a, b| a.margin_mm.total_cmp(&b.margin_mm));
+    let across = footprints
+        .iter()
+        .filter(sees)
+        .filter_map(|f| f.across_mm)
+        .reduce(f64::min);
+    let moved: Vec<(f64, f64)> = own
+        .iter()
+        .filter_map(|(_, t)| shifts(structure, t, RANGE_M).first().copied())
+        .map(|s| {
+            let turn = 1e3 * s.worst_turn() * TURN_DEG.to_radians();
+            (turn, s.shift.norm() * SHIFT_MM)
+        })
+        .collect();
+    let square: f64 = moved.iter().map(|(turn, _)| turn * turn).sum();
+    FacetView {
+        name: built.name.clone(),
+        elements: own.len(),
+        beams: own.first().zip(own.last()).map(|(a, b)| [a.0.beam, b.0.beam]),
+        multi_bounce: of_class(Class::MultiBounce).len(),
+        split: of_class(Class::Split).len(),
+        shaded: of_class(Class::Shaded).len(),
+        exit_azimuth_deg: azimuths(&own),
+        exit_elevation_deg: extremes(&|e| e.exit_elevation_deg),
+        solid_angle_sr,
+        field_of_regard: solid_angle_sr / super::SPHERE_SR,
+        mirror_at_m: extremes(&|e| Some(e.mirror_at_m)),
+        range_max_white_m: extremes(&|e| e.range_max_white_m).map(|[least, _]| least),
+        range_max_dark_m: extremes(&|e| e.range_max_dark_m).map(|[least, _]| least),
+        margin_mm: nearest.map(|f| f.margin_mm),
+        margin_beams: nearest.map(|f| f.margin_beams),
+        margin_across_mm: across,
+        area_mm2: 0.5e6 * area_vector(&built.face.corners).norm(),
+        point_at_4m_per_0_1_deg_rms_mm: (!moved.is_empty()).then(|| (square / moved.len() as f64).sqrt()),
+        point_at_4m_per_0_1_deg_max_mm: moved.iter().map(|(turn, _)| *turn).reduce(f64::max),
+        point_at_4m_per_0_1_mm_mm: moved.iter().map(|(_, shift)| *shift).reduce(f64::max),
+    }
+}
+
+/// Least and greatest azimuth of a fan, in degrees, measured from its middle so that no turn is counted twice.
+fn azimuths(own: &[(&Element, &Traced)]) -> Option<[f64; 2]> {
+    let (_, middle) = own.get(own.len() / 2)?;
+    let middle = exit(&middle.chief)?;
+    let from = libm::atan2(middle.y, middle.x);
+    let offsets = || {
+        own.iter().filter_map(|(_, t)| {
+            let v = exit(&t.chief)?;
+            let turn = libm::atan2(v.y, v.x) - from;
+            Some(turn - std::f64::consts::TAU * (turn / std::f64::consts::TAU).round())
+        })
+    };
+    let (low, high) = (offsets().reduce(f64::min)?, offsets().reduce(f64::max)?);
+    debug_assert!(own.len() <= beam::COUNT);
+    Some([(from + low).to_degrees(), (from + high).to_degrees()])
+}

@@ -1,0 +1,247 @@
+//! Field of regard: the directions that the elements' cells cover, each counted once.
+//!
+//! Elements that meet the same facets in the same order share one isometry of directions, the product of their
+//! reflections (facets as planes, their unevenness aside). Whether a direction lies in a cell is asked where cells are
+//! plain rectangles: turned back into the scan. Every cell is cut into parts; a part that n ways see counts 1/n for each of
+//! them, so that cells that nothing overlaps keep their solid angle exactly.
+
+use super::element::{Traced, exit};
+use catoptric_model::beam;
+use catoptric_sim::scene::BeamShape;
+use catoptric_sim::structure::Structure;
+use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
+
+/// Angle within which a direction is near a beam, in degrees.
+pub const NEAR_DEG: f64 = 5.0;
+
+/// Parts of a cell along the scan and across it.
+const PARTS: [usize; 2] = [3, 6];
+
+/// Directions of the lattice on which nearness is counted: the share is right to about 1e-3.
+const LATTICE: usize = 8000;
+
+/// What one element stands for in the scan: half-way to its neighbors, and across as far as its beam reaches.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cell {
+    /// Azimuth of its middle, in radians.
+    pub azimuth: f64,
+    /// Half its extent across the scan, in radians.
+    pub half_height: f64,
+}
+
+impl Cell {
+    /// Its solid angle, in steradians: step·2·sin(δ/2).
+    pub fn solid_angle(&self) -> f64 {
+        2.0 * beam::STEP * libm::sin(self.half_height)
+    }
+}
+
+/// Elements that see by the same facets.
+pub(crate) struct Way {
+    /// The facets in the order in which they are met.
+    pub(crate) facets: Vec<usize>,
+    /// From the scan to where it looks.
+    pub(crate) turn: Matrix3<f64>,
+    /// Number of its elements below each beam: `below[j] - below[i]` of them are in i..j.
+    below: Vec<usize>,
+    pub(crate) beams: Vec<usize>,
+}
+
+/// All ways of seeing elements.
+pub(crate) struct Ways(pub(crate) Vec<Way>);
+
+/// What the elements see together.
+pub(crate) struct Field {
+    pub(crate) covered_sr: f64,
+    pub(crate) direct_sr: f64,
+    pub(crate) near: f64,
+    pub(crate) elevation_deg: Option<[f64; 2]>,
+    pub(crate) elevation_covered_deg: f64,
+    pub(crate) azimuth_covered_deg: f64,
+}
+
+/// The cells of all beams.
+pub(crate) fn cells(shape: &BeamShape) -> Vec<Cell> {
+    let tan = |full_mrad: f64| libm::tan(0.5e-3 * full_mrad);
+    let (wide, narrow) = (tan(shape.wide_full_mrad), tan(shape.narrow_full_mrad));
+    let cell = |beam| {
+        let azimuth = beam::azimuth(beam);
+        let (sin, cos) = if shape.turns {
+            libm::sincos(azimuth)
+        } else {
+            (0.0, 1.0)
+        };
+        Cell {
+            azimuth,
+            half_height: libm::atan(libm::hypot(wide * sin, narrow * cos)),
+        }
+    };
+    (0..beam::COUNT).map(cell).collect()
+}
+
+impl Ways {
+    pub(crate) fn new(structure: &Structure, traced: &[Traced]) -> Self {
+        let mut beams: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
+        for t in traced.iter().filter(|t| t.sees) {
+            beams.entry(t.chief.facets().to_vec()).or_default().push(t.beam);
+        }
+        let way = |(facets, beams): (Vec<usize>, Vec<usize>)| {
+            let turn = facets.iter().fold(Matrix3::identity(), |turn, &facet| {
+                let m = structure.facets[facet].face.normal.into_inner();
+                (Matrix3::identity() - m * m.transpose() * 2.0) * turn
+            });
+            let mut below = vec![0; beam::COUNT + 1];
+            for &beam in &beams {
+                below[beam + 1] = 1;
+            }
+            for beam in 0..beam::COUNT {
+                below[beam + 1] += below[beam];
+            }
+            Way {
+                facets,
+                turn,
+                below,
+                beams,
+            }
+        };
+        Self(beams.into_iter().map(way).collect())
+    }
+}
+
+impl Way {
+    fn holds(&self, beam: usize) -> bool {
+        self.below[beam + 1] > self.below[beam]
+    }
+
+    /// Elevation in the scan of a direction out there; its sine is one product.
+    fn sin_elevation(&self, direction: &Vector3<f64>) -> f64 {
+        self.turn.column(2).dot(direction)
+    }
+
+    /// The place in the scan, in steps from beam 0, of a direction out there.
+    fn step(&self, direction: &Vector3<f64>) -> f64 {
+        let along = [0, 1].map(|axis| self.turn.column(axis).dot(direction));
+        libm::atan2(along[1], along[0]) / beam::STEP + beam::FORWARD as f64
+    }
+
+    /// Whether one of its cells holds a direction out there.
+    fn sees(&self, direction: &Vector3<f64>, cells: &[Cell], highest: f64) -> bool {
+        let sin = self.sin_elevation(direction);
+        if sin.abs() > highest {
+            return false;
+        }
+        let step = self.step(direction).round();
+        if !(0.0..beam::COUNT as f64).contains(&step) {
+            return false;
+        }
+        // A whole number within the scan.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let beam = step as usize;
+        self.holds(beam) && libm::asin(sin).abs() <= cells[beam].half_height
+    }
+
+    /// Whether one of its beams is within an angle of a direction out there; its sine and cosine are given.
+    fn is_near(&self, direction: &Vector3<f64>, sin_near: f64, cos_near: f64) -> bool {
+        let sin = self.sin_elevation(direction);
+        if sin.abs() > sin_near {
+            return false;
+        }
+        // cos(angle) = cos(elevation)·cos(difference of azimuth).
+        let reach = libm::acos((cos_near / (1.0 - sin * sin).sqrt()).min(1.0)) / beam::STEP;
+        let step = self.step(direction);
+        let (first, last) = ((step - reach).ceil().max(0.0), (step + reach).floor());
+        let last = last.min((beam::COUNT - 1) as f64);
+        if first > last {
+            return false;
+        }
+        // Whole numbers within the scan.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let (first, last) = (first as usize, last as usize);
+        self.below[last + 1] > self.below[first]
+    }
+}
+
+/// What all ways see together.
+pub(crate) fn field(ways: &Ways, cells: &[Cell], traced: &[Traced]) -> Field {
+    let highest = cells.iter().fold(0.0_f64, |h, c| h.max(libm::sin(c.half_height)));
+    let mut covered_sr = 0.0;
+    let mut direct_sr = 0.0;
+    for (own, way) in ways.0.iter().enumerate() {
+        for &beam in &way.beams {
+            let cell = &cells[beam];
+            let seen = part_directions(cell).map(|(in_scan, weight)| {
+                let direction = way.turn * in_scan;
+                let others = ways.0.iter().enumerate().filter(|(other, _)| *other != own);
+                let others = others.filter(|(_, w)| w.sees(&direction, cells, highest)).count();
+                weight / (1 + others) as f64
+            });
+            covered_sr += seen.sum::<f64>();
+            if way.facets.is_empty() {
+                direct_sr += cell.solid_angle();
+            }
+        }
+    }
+    let seeing = || traced.iter().filter(|t| t.sees).filter_map(|t| exit(&t.chief));
+    let elevations: Vec<f64> = seeing()
+        .map(|v| libm::atan2(v.z, libm::hypot(v.x, v.y)).to_degrees())
+        .collect();
+    let azimuths = seeing().map(|v| libm::atan2(v.y, v.x).to_degrees());
+    let low = elevations.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = elevations.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    Field {
+        covered_sr,
+        direct_sr,
+        near: near(ways),
+        elevation_deg: (low <= high).then_some([low, high]),
+        elevation_covered_deg: covered(elevations.iter().copied(), 90.0),
+        azimuth_covered_deg: covered(azimuths, 180.0),
+    }
+}
+
+/// The parts of a cell: a direction in the scan and a solid angle, which sum to the cell's.
+fn part_directions(cell: &Cell) -> impl Iterator<Item = (Vector3<f64>, f64)> {
+    let [along, across] = PARTS;
+    let (azimuth, top) = (cell.azimuth, libm::sin(cell.half_height));
+    (0..across).flat_map(move |j| {
+        // Slices of equal solid angle are slices of equal sine.
+        let z = top * ((2 * j + 1) as f64 / across as f64 - 1.0);
+        let radius = (1.0 - z * z).sqrt();
+        (0..along).map(move |i| {
+            let at = azimuth + beam::STEP * ((2 * i + 1) as f64 / (2 * along) as f64 - 0.5);
+            let (sin, cos) = libm::sincos(at);
+            let weight = 2.0 * top * beam::STEP / (along * across) as f64;
+            (Vector3::new(radius * cos, radius * sin, z), weight)
+        })
+    })
+}
+
+/// Share of all directions within [`NEAR_DEG`] of a beam, on a spiral of even density.
+fn near(ways: &Ways) -> f64 {
+    // π·(3 − √5): each turn of the spiral falls between those before.
+    const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
+    let (sin_near, cos_near) = libm::sincos(NEAR_DEG.to_radians());
+    let is_near = |k: &usize| {
+        let z = 1.0 - (2 * k + 1) as f64 / LATTICE as f64;
+        let (sin, cos) = libm::sincos(GOLDEN_ANGLE * *k as f64);
+        let radius = (1.0 - z * z).sqrt();
+        let direction = Vector3::new(radius * cos, radius * sin, z);
+        ways.0
+            .iter()
+            .any(|way| way.is_near(&direction, sin_near, cos_near))
+    };
+    (0..LATTICE).filter(is_near).count() as f64 / LATTICE as f64
+}
+
+/// Number of whole degrees between −limit and limit in which a value lies.
+fn covered(values: impl Iterator<Item = f64>, limit: f64) -> f64 {
+    let degrees: std::collections::BTreeSet<i64> = values
+        // Within ±180.
+        .map(|v| {
+            #[allow(clippy::cast_possible_truncation)]
+            let degree = v.min(limit - 0.5).floor() as i64;
+            degree
+        })
+        .collect();
+    degrees.len() as f64
+}

@@ -1,0 +1,131 @@
+//! Footprints: where the 1/e² contour of a beam falls on each facet that its chief ray meets, and how far that is from the
+//! facet's edges.
+//!
+//! The contour's rays are taken along the chief ray's facets as if those were unbounded planes, so that an outline that an
+//! edge cuts is whole and its margin negative. Glass moves a footprint by less than its own thickness; it is left out.
+
+use super::element::Traced;
+use catoptric_model::{beam, mirror};
+use catoptric_sim::cast::Polygon;
+use catoptric_sim::footprint::{Ray, SubRay, ray};
+use catoptric_sim::reading::Sensor;
+use catoptric_sim::structure::Structure;
+use nalgebra::{Point3, Vector3};
+
+/// Rays of a contour.
+pub const OUTLINE: usize = 16;
+
+/// Where a beam falls on a facet.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Footprint {
+    /// The beam.
+    pub beam: usize,
+    /// The facet, by its number.
+    pub facet: usize,
+    /// Facets met before it.
+    pub bounce: usize,
+    /// Where the chief ray meets it, in the sensor frame, in metres.
+    pub center: Point3<f64>,
+    /// Where the contour does.
+    pub outline: [Point3<f64>; OUTLINE],
+    /// Least distance from the contour to an edge, in millimetres; negative beyond it.
+    pub margin_mm: f64,
+    /// Least distance from the contour to an edge that runs more along the scan's line on the facet than across it: above
+    /// and below; `None` without such an edge.
+    pub across_mm: Option<f64>,
+    /// Distance between neighboring beams on the facet, in millimetres.
+    pub spacing_mm: f64,
+    /// `margin_mm` over `spacing_mm`.
+    pub margin_beams: f64,
+}
+
+/// The footprints of all beams, in order of beam and bounce.
+pub(crate) fn footprints(sensor: &Sensor, structure: &Structure, traced: &[Traced]) -> Vec<Footprint> {
+    let edges: Vec<Vec<Edge>> = structure.facets.iter().map(|f| edges(&f.face)).collect();
+    let shape = sensor.shape();
+    let contour: [SubRay; OUTLINE] = std::array::from_fn(|k| {
+        let (sin, cos) = libm::sincos(std::f64::consts::TAU * k as f64 / OUTLINE as f64);
+        SubRay {
+            wide: cos,
+            narrow: sin,
+            weight: 0.0,
+        }
+    });
+    let chief = SubRay {
+        wide: 0.0,
+        narrow: 0.0,
+        weight: 1.0,
+    };
+    let mut footprints = Vec::new();
+    for t in traced {
+        let facets = t.chief.facets();
+        if facets.is_empty() {
+            continue;
+        }
+        let azimuth = beam::azimuth(t.beam);
+        let mut rays: [Ray; OUTLINE] = std::array::from_fn(|k| ray(shape, azimuth, &contour[k]));
+        let mut center = ray(shape, azimuth, &chief);
+        let mut neighbor = ray(shape, azimuth + beam::STEP, &chief);
+        for (bounce, &facet) in facets.iter().enumerate() {
+            let face = &structure.facets[facet].face;
+            for ray in rays.iter_mut().chain([&mut center, &mut neighbor]) {
+                *ray = reflected(ray, face);
+            }
+            let outline = rays.map(|r| r.origin);
+            let step = neighbor.origin - center.origin;
+            let margin = |edge: &Edge| {
+                let each = outline.iter().map(|p| edge.inwards.dot(&p.coords) - edge.offset);
+                1e3 * each.fold(f64::INFINITY, f64::min)
+            };
+            let along = step.normalize();
+            let beside = edges[facet]
+                .iter()
+                .filter(|e| e.inwards.dot(&along).abs() < std::f64::consts::FRAC_1_SQRT_2);
+            let margin_mm = edges[facet].iter().map(margin).fold(f64::INFINITY, f64::min);
+            let spacing_mm = 1e3 * step.norm();
+            footprints.push(Footprint {
+                beam: t.beam,
+                facet,
+                bounce,
+                center: center.origin,
+                outline,
+                margin_mm,
+                across_mm: beside.map(margin).reduce(f64::min),
+                spacing_mm,
+                margin_beams: margin_mm / spacing_mm,
+            });
+        }
+    }
+    footprints
+}
+
+/// An edge of a polygon: the direction in the plane that points inwards, and its product with the edge's points.
+struct Edge {
+    inwards: Vector3<f64>,
+    offset: f64,
+}
+
+fn edges(face: &Polygon) -> Vec<Edge> {
+    let corners = face.corners.iter();
+    let next = face.corners.iter().cycle().skip(1);
+    corners
+        .zip(next)
+        .filter_map(|(a, b)| {
+            let inwards = face.normal.cross(&(b - a)).try_normalize(f64::MIN_POSITIVE)?;
+            Some(Edge {
+                offset: inwards.dot(&a.coords),
+                inwards,
+            })
+        })
+        .collect()
+}
+
+/// A ray after its reflection in the plane of a face, as if that had no end.
+fn reflected(ray: &Ray, face: &Polygon) -> Ray {
+    let closing = face.normal.dot(&ray.direction);
+    let distance = face.normal.dot(&(face.origin - ray.origin)) / closing;
+    Ray {
+        origin: ray.origin + ray.direction.into_inner() * distance,
+        direction: mirror::reflect(&ray.direction, &face.normal),
+    }
+}

@@ -1,0 +1,145 @@
+//! Triangles and lines against a depth buffer, several samples to a pixel.
+
+use image::RgbaImage;
+use plotters::style::RGBColor;
+
+/// Size of the picture, in pixels.
+pub(super) const SIZE: [u32; 2] = [960, 720];
+
+/// Samples per pixel along each axis.
+const SAMPLES: u32 = 3;
+
+/// Samples with the nearness of what they show.
+pub(super) struct Canvas {
+    width: usize,
+    height: usize,
+    shown: Vec<(f64, Option<RGBColor>)>,
+}
+
+impl Canvas {
+    pub(super) fn new() -> Self {
+        let [width, height] = SIZE.map(|s| (s * SAMPLES) as usize);
+        Self {
+            width,
+            height,
+            shown: vec![(0.0, None); width * height],
+        }
+    }
+
+    pub(super) fn triangle(&mut self, corners: [[f64; 3]; 3], color: RGBColor) {
+        let [a, b, c] = corners.map(|[x, y, n]| [x * f64::from(SAMPLES), y * f64::from(SAMPLES), n]);
+        let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+        if area == 0.0 {
+            return;
+        }
+        let (columns, rows) = (
+            self.span([a[0], b[0], c[0]], self.width),
+            self.span([a[1], b[1], c[1]], self.height),
+        );
+        for row in rows {
+            for column in columns.clone() {
+                let (x, y) = (column as f64 + 0.5, row as f64 + 0.5);
+                let part = |p: [f64; 3], q: [f64; 3]| {
+                    ((q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0])) / area
+                };
+                let (u, v, w) = (part(b, c), part(c, a), part(a, b));
+                if u >= 0.0 && v >= 0.0 && w >= 0.0 {
+                    self.show(column, row, u * a[2] + v * b[2] + w * c[2], color);
+                }
+            }
+        }
+    }
+
+    /// Samples between the least and the greatest of some places.
+    fn span(&self, places: [f64; 3], limit: usize) -> std::ops::Range<usize> {
+        let low = places.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = places.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        // Within the picture after the clamp.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let sample = |at: f64| at.clamp(0.0, limit as f64) as usize;
+        sample(low.floor())..sample(high.ceil() + 1.0)
+    }
+
+    /// A line of a width in pixels, a little nearer than it is, so that it shows on what it lies on.
+    pub(super) fn line(&mut self, from: [f64; 3], to: [f64; 3], width: f64, color: RGBColor) {
+        let along = [to[0] - from[0], to[1] - from[1]];
+        let length = libm::hypot(along[0], along[1]);
+        if length == 0.0 {
+            return;
+        }
+        let aside = [-along[1] / length * 0.5 * width, along[0] / length * 0.5 * width];
+        let raised = |p: [f64; 3], sign: f64| [p[0] + sign * aside[0], p[1] + sign * aside[1], p[2] * 1.0005];
+        let [a, b, c, d] = [
+            raised(from, 1.0),
+            raised(to, 1.0),
+            raised(to, -1.0),
+            raised(from, -1.0),
+        ];
+        self.triangle([a, b, c], color);
+        self.triangle([a, c, d], color);
+    }
+
+    fn show(&mut self, column: usize, row: usize, nearness: f64, color: RGBColor) {
+        let sample = &mut self.shown[row * self.width + column];
+        if nearness > sample.0 {
+            *sample = (nearness, Some(color));
+        }
+    }
+
+    /// The mean of each pixel's samples; what shows nothing is transparent.
+    pub(super) fn picture(&self) -> RgbaImage {
+        let samples = SAMPLES as usize;
+        RgbaImage::from_fn(SIZE[0], SIZE[1], |x, y| {
+            let (column, row) = (x as usize * samples, y as usize * samples);
+            let mut sum = [0_u32; 3];
+            let mut count = 0_u32;
+            for i in 0..samples {
+                for j in 0..samples {
+                    if let (_, Some(c)) = self.shown[(row + i) * self.width + column + j] {
+                        sum = [
+                            sum[0] + u32::from(c.0),
+                            sum[1] + u32::from(c.1),
+                            sum[2] + u32::from(c.2),
+                        ];
+                        count += 1;
+                    }
+                }
+            }
+            // Means of bytes, and a share of 255.
+            #[allow(clippy::cast_possible_truncation)]
+            let mean = |value: u32| (value / count.max(1)) as u8;
+            #[allow(clippy::cast_possible_truncation)]
+            let alpha = (255 * count / (SAMPLES * SAMPLES)) as u8;
+            image::Rgba([mean(sum[0]), mean(sum[1]), mean(sum[2]), alpha])
+        })
+    }
+}
+
+/// A color with a share of another.
+pub(super) fn mixed(color: RGBColor, other: RGBColor, share: f64) -> RGBColor {
+    // Between two bytes.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let mix = |a: u8, b: u8| (f64::from(a) * (1.0 - share) + f64::from(b) * share).round() as u8;
+    RGBColor(
+        mix(color.0, other.0),
+        mix(color.1, other.1),
+        mix(color.2, other.2),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearer_triangle_is_shown() {
+        let mut canvas = Canvas::new();
+        let corners = |nearness| [[0.0, 0.0, nearness], [50.0, 0.0, nearness], [0.0, 50.0, nearness]];
+        let (red, blue) = (RGBColor(255, 0, 0), RGBColor(0, 0, 255));
+        canvas.triangle(corners(2.0), red);
+        canvas.triangle(corners(1.0), blue);
+        let picture = canvas.picture();
+        assert_eq!(picture.get_pixel(10, 10).0, [255, 0, 0, 255]);
+        assert_eq!(picture.get_pixel(40, 40).0[3], 0);
+    }
+}

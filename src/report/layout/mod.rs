@@ -1,0 +1,207 @@
+//! The page about mirror layouts, one or several side by side, and its pictures as files.
+
+mod canvas;
+mod perspective;
+mod sides;
+mod tables;
+mod views;
+
+use super::figure::{css, standalone};
+use super::page::{escape, figure as block, page, table};
+use crate::layout::{Analysis, Drawing};
+use catoptric_sim::{Scene, SimError};
+use sides::SIDES;
+use views::LOST;
+
+/// A layout with what was found out about it and the geometry to draw.
+#[derive(Debug, Clone)]
+pub struct Drawn {
+    analysis: Analysis,
+    drawing: Drawing,
+}
+
+impl Drawn {
+    /// The geometry that an analysis is about.
+    ///
+    /// # Errors
+    /// As [`layout::analyze`](crate::layout::analyze).
+    pub fn new(scene: &Scene, analysis: &Analysis) -> Result<Self, SimError> {
+        let mut scene = scene.clone();
+        // As closely as the analysis looked; there are as many as a scene can hold.
+        scene.scanner.sub_rays = u32::try_from(analysis.sub_rays).unwrap_or(scene.scanner.sub_rays);
+        Ok(Self {
+            drawing: Drawing::new(&scene, analysis.seed)?,
+            analysis: analysis.clone(),
+        })
+    }
+}
+
+/// The page, as HTML.
+pub fn layout(layouts: &[Drawn]) -> String {
+    let names: Vec<&str> = layouts.iter().map(|l| l.analysis.name.as_str()).collect();
+    let title = names.join(", ");
+    let mut html = format!(
+        "<header>\n<h1>{}</h1>\n<p class=\"subtitle\">{}</p>\n</header>\n",
+        escape(&title),
+        if layouts.len() == 1 {
+            "What this mirror layout sees, loses and allows"
+        } else {
+            "Mirror layouts side by side"
+        }
+    );
+    html += "<h2>In numbers</h2>\n";
+    let (headings, rows) = tables::key_figures(layouts);
+    let headings: Vec<&str> = headings.iter().map(String::as_str).collect();
+    html += &table(&headings, &rows);
+    html += &format!("<h2>Where it looks</h2>\n{}", of_each(layouts, field));
+    html += &format!("<h2>What becomes of the scan</h2>\n{}", of_each(layouts, scan));
+    html += &format!("<h2>The structure</h2>\n{}", of_each(layouts, structure));
+    html += &format!(
+        "<h2>Where beams meet the mirrors</h2>\n{}",
+        of_each(layouts, mirrors)
+    );
+    html += &format!("<h2>Facet by facet</h2>\n{}", of_each(layouts, facets));
+    html += "<footer>Field of regard: the share of all directions, 4π, that the cells of the elements cover, each direction \
+             counted once. An element's cell reaches half-way to its neighbors along the scan, and as far as the 1/e² contour \
+             of its own beam across it. Ranges are for face-on targets that fill the beam, by Eq. 1 with both passes over the \
+             mirrors, from the scanner. Margins are from the 1/e² contour of a beam to an edge. Sensor frame: x forward, y \
+             left, z up.</footer>\n";
+    page(&format!("{title} – catoptric layout"), &html)
+}
+
+/// The pictures as files: name and content. With several layouts the names begin with each one's number.
+pub fn layout_pictures(layouts: &[Drawn]) -> Vec<(String, Vec<u8>)> {
+    let mut files = Vec::new();
+    for (number, drawn) in layouts.iter().enumerate() {
+        let prefix = if layouts.len() == 1 {
+            String::new()
+        } else {
+            format!("{}-", number + 1)
+        };
+        let mut add = |name: String, svg: &str| {
+            files.push((format!("{prefix}{name}.svg"), standalone(svg).into_bytes()));
+        };
+        add("field".to_owned(), &views::map(drawn));
+        add("scan".to_owned(), &views::scan(drawn));
+        for side in &SIDES {
+            add(side.name.to_owned(), &sides::side(drawn, side));
+        }
+        for (facet, view) in drawn.analysis.facets.iter().enumerate() {
+            if let Some(svg) = views::footprints(drawn, facet) {
+                add(format!("footprints-{}", file_name(&view.name)), &svg);
+            }
+        }
+        let perspective = perspective::perspective(drawn);
+        add("perspective".to_owned(), &perspective.svg());
+        files.push((format!("{prefix}perspective.png"), perspective.png));
+    }
+    files
+}
+
+/// A facet's name as part of a file's.
+fn file_name(name: &str) -> String {
+    let letter = |c: char| {
+        if c.is_ascii_alphanumeric() || "-_".contains(c) {
+            c
+        } else {
+            '_'
+        }
+    };
+    name.chars().map(letter).collect()
+}
+
+/// Radius about the scanner of everything that is built, in metres.
+fn radius(drawing: &Drawing) -> f64 {
+    let faces = drawing.facets.iter().flat_map(|f| &f.face.corners);
+    let bodies = drawing.parts.iter().flat_map(|p| p.skin.iter().flatten());
+    // With nothing around it, something to draw axes in.
+    faces.chain(bodies).map(|p| p.coords.norm()).fold(0.05, f64::max)
+}
+
+/// One section of every layout, under its name if there are several.
+fn of_each(layouts: &[Drawn], section: fn(&Drawn) -> String) -> String {
+    let of_one = |drawn: &Drawn| {
+        let heading = if layouts.len() == 1 {
+            String::new()
+        } else {
+            format!("<h3>{}</h3>\n", escape(&drawn.analysis.name))
+        };
+        heading + &section(drawn)
+    };
+    layouts.iter().map(of_one).collect()
+}
+
+fn field(drawn: &Drawn) -> String {
+    let (headings, rows) = tables::directions(drawn);
+    block(
+        &views::map(drawn),
+        "Every direction around the scanner, forward in the middle, unrolled like a map of the world. Each element is drawn \
+         as the cell of directions that it stands for: grey where the scan passes by the mirrors, in the color of its facet \
+         where it is deflected. White is not looked at: gaps in the grey line are where mirrors stand, and black marks are \
+         elements that are lost, at where they would look without the structure. The grey line is thinnest ahead, where the \
+         scanner's spot lies along the scan.",
+        &perspective::legend(drawn),
+        headings,
+        &rows,
+    )
+}
+
+fn scan(drawn: &Drawn) -> String {
+    let mut legend = perspective::legend(drawn);
+    legend.push((css(LOST), "lost".to_owned()));
+    let (headings, rows) = tables::runs(drawn);
+    block(
+        &views::scan(drawn),
+        "The elements of the scan over their azimuth: those with a direction of their own, those that an edge splits, and \
+         those that end on the structure, stay between mirrors or are too faint.",
+        &legend,
+        headings,
+        &rows,
+    )
+}
+
+fn structure(drawn: &Drawn) -> String {
+    let perspective = perspective::perspective(drawn);
+    let mut svgs = perspective.svg() + "<div class=\"views\">\n";
+    for side in &SIDES {
+        svgs += &format!("<div><h4>{}</h4>{}</div>\n", side.title, sides::side(drawn, side));
+    }
+    svgs += "</div>";
+    let (headings, rows) = tables::sizes(drawn);
+    let caption = format!(
+        "Mirrors, posts and housing in the sensor frame, with every {}th beam in the color of the last facet it meets and \
+         every {}th that passes by in grey. In perspective the beams end shortly after the mirrors.",
+        views::RAY_STEP,
+        views::DIRECT_STEP
+    );
+    block(&svgs, &caption, &perspective::legend(drawn), headings, &rows)
+}
+
+fn mirrors(drawn: &Drawn) -> String {
+    let mut svgs = "<div class=\"views\">\n".to_owned();
+    for (facet, view) in drawn.analysis.facets.iter().enumerate() {
+        if let Some(svg) = views::footprints(drawn, facet) {
+            svgs += &format!("<div><h4>{}</h4>{svg}</div>\n", escape(&view.name));
+        }
+    }
+    svgs += "</div>";
+    let (headings, rows) = tables::margins(drawn);
+    let legend = [(css(LOST), "split at an edge, or lost otherwise".to_owned())];
+    block(
+        &svgs,
+        "Each mirror seen from before it, its outline in black. An ellipse is the 1/e² contour of a beam, of every second \
+         whole one and of every one that is lost. A whole ellipse may move by its margin before an edge cuts it.",
+        &legend,
+        headings,
+        &rows,
+    )
+}
+
+fn facets(drawn: &Drawn) -> String {
+    let (headings, rows) = tables::facets(drawn);
+    format!(
+        "<p>How far a point that is read at 4 m moves if the facet is not where it is drawn: for 0.1° of turn about the worst \
+         axis of its plane, and for 0.1 mm along its normal.</p>\n{}",
+        table(headings, &rows)
+    )
+}

@@ -1,0 +1,314 @@
+//! What `export` writes is what was drawn: closed, outward, of the right size.
+//!
+//! `tests/export_peers.py` opens the same files with readers that others wrote.
+
+use crate::common::{run, stderr, stdout};
+use catoptric::export::{self, Part, Solid};
+use catoptric::io::mesh::read_mesh;
+use catoptric::io::scene as scenes;
+use catoptric::layout::{Detail, Drawing, analyze};
+use catoptric::sim::Scene;
+use catoptric::sim::cast::volume;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+fn load(path: &str) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(path);
+    scenes::load(&path, &[]).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+const SCENES: [&str; 3] = ["prototype.toml", "two-mirror.toml", "reference-facet.toml"];
+
+/// Every edge of a closed surface is walked once in each direction.
+fn assert_closed(solid: &Solid) {
+    let key = |p: &nalgebra::Point3<f64>| [p.x.to_bits(), p.y.to_bits(), p.z.to_bits()];
+    let mut edges: BTreeMap<_, i32> = BTreeMap::new();
+    for t in &solid.triangles {
+        for i in 0..3 {
+            *edges.entry((key(&t[i]), key(&t[(i + 1) % 3]))).or_default() += 1;
+        }
+    }
+    for ((a, b), count) in &edges {
+        assert_eq!((*count, edges.get(&(*b, *a))), (1, Some(&1)), "{}", solid.name);
+    }
+    assert!(volume(&solid.triangles) > 0.0, "{} is inside out", solid.name);
+}
+
+#[test]
+fn solids_are_closed_and_outward() {
+    for name in SCENES {
+        let scene = load(name);
+        for seed in [None, Some(5)] {
+            let drawing = Drawing::new(&scene, seed).unwrap();
+            let solids = export::solids(&scene, &drawing, Part::All);
+            assert!(solids.len() > 2 * drawing.facets.len());
+            solids.iter().for_each(assert_closed);
+        }
+    }
+}
+
+#[test]
+fn mirror_plates_have_their_area_and_thickness() {
+    for name in SCENES {
+        let scene = load(name);
+        let analysis = analyze(&scene, None, Detail::Coarse).unwrap();
+        let drawing = Drawing::new(&scene, None).unwrap();
+        let plates = export::solids(&scene, &drawing, Part::Mirrors);
+        for (plate, facet) in plates.iter().zip(&analysis.facets) {
+            // A mirror drawn without a thickness is made of the least that is cut.
+            let drawn = scene.superstructure.mirror.thickness_mm;
+            let thickness_mm = if drawn > 0.0 { drawn } else { 1.0 };
+            let by_hand = facet.area_mm2 * thickness_mm * 1e-9;
+            assert!(
+                (volume(&plate.triangles) / by_hand - 1.0).abs() < 1e-9,
+                "{name} {}",
+                plate.name
+            );
+        }
+    }
+}
+
+#[test]
+fn the_frame_takes_no_sight() {
+    for name in SCENES {
+        assert_eq!(
+            export::shaded_by_frame(&load(name), None).unwrap(),
+            Vec::<usize>::new(),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn a_frame_in_the_way_is_found() {
+    // A mirror that throws its fan back over the scanner meets the hub above it.
+    let mut scene = load("two-mirror.toml");
+    scene.superstructure.facet.truncate(1);
+    scene.superstructure.facet[0].shape =
+        catoptric::sim::scene::FacetShape::Rectangle(catoptric::sim::scene::RectangleShape {
+            center_mm: [0.0, 90.0, 0.0],
+            normal: [0.0, -1.0, 0.1926],
+            width_mm: 40.0,
+            height_mm: 20.0,
+        });
+    assert!(!export::shaded_by_frame(&scene, None).unwrap().is_empty());
+}
+
+#[test]
+fn an_stl_is_read_back_in_millimetres() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("all.stl");
+    let scene = load("prototype.toml");
+    let drawing = Drawing::new(&scene, None).unwrap();
+    let solids = export::solids(&scene, &drawing, Part::All);
+    std::fs::write(&path, export::stl(&solids)).unwrap();
+    let mesh = read_mesh(&path).unwrap();
+    let count: usize = solids.iter().map(|s| s.triangles.len()).sum();
+    assert_eq!(mesh.triangles().len(), count);
+    let reach = |points: &mut dyn Iterator<Item = f64>| points.fold(0.0_f64, f64::max);
+    let drawn = reach(
+        &mut solids
+            .iter()
+            .flat_map(|s| s.triangles.iter().flatten())
+            .map(|p| p.coords.norm()),
+    );
+    let read = reach(&mut mesh.vertices().iter().map(|p| p.coords.norm()));
+    assert!((read / (1e3 * drawn) - 1.0).abs() < 1e-6, "{read} {drawn}");
+}
+
+/// A number of the JSON that counts or points.
+fn whole(value: &serde_json::Value) -> usize {
+    usize::try_from(value.as_u64().unwrap()).unwrap()
+}
+
+/// The JSON and the binary part of a GLB.
+fn parts(glb: &[u8]) -> (serde_json::Value, Vec<u8>) {
+    let number = |at: usize| u32::from_le_bytes(glb[at..at + 4].try_into().unwrap()) as usize;
+    assert_eq!((&glb[..4], number(4), number(8)), (&b"glTF"[..], 2, glb.len()));
+    let length = number(12);
+    assert_eq!((&glb[16..20], length % 4), (&b"JSON"[..], 0));
+    let json = serde_json::from_slice(&glb[20..20 + length]).unwrap();
+    let binary = 20 + length;
+    assert_eq!(&glb[binary + 4..binary + 8], b"BIN\0");
+    assert_eq!(number(binary), glb.len() - binary - 8);
+    (json, glb[binary + 8..].to_vec())
+}
+
+#[test]
+fn a_glb_holds_what_its_accessors_say_in_metres() {
+    let scene = load("prototype.toml");
+    let drawing = Drawing::new(&scene, None).unwrap();
+    let (json, data) = parts(&export::glb(&scene, &drawing, 0.5));
+    let accessors = json["accessors"].as_array().unwrap();
+    for accessor in accessors {
+        let view = &json["bufferViews"][whole(&accessor["bufferView"])];
+        let (begin, length) = (whole(&view["byteOffset"]), whole(&view["byteLength"]));
+        assert_eq!(length, 12 * whole(&accessor["count"]));
+        let bytes = &data[begin..begin + length];
+        let floats: Vec<f32> = bytes
+            .chunks(4)
+            .map(|c| f32::from_le_bytes(c.try_into().unwrap()))
+            .collect();
+        for axis in 0..3 {
+            let values = || floats.iter().skip(axis).step_by(3).map(|v| f64::from(*v));
+            assert_eq!(values().reduce(f64::min), accessor["min"][axis].as_f64());
+            assert_eq!(values().reduce(f64::max), accessor["max"][axis].as_f64());
+        }
+    }
+    let meshes = json["meshes"].as_array().unwrap();
+    let find = |name: &str| {
+        meshes
+            .iter()
+            .find(|m| m["name"] == name)
+            .unwrap_or_else(|| panic!("no {name}"))
+    };
+    // Undeflected beams end half a metre from the scanner, the one ahead on the x axis.
+    let lines = &find("beams undeflected")["primitives"][0];
+    assert_eq!(lines["mode"], 1);
+    let accessor = &accessors[whole(&lines["attributes"]["POSITION"])];
+    assert!((accessor["max"][0].as_f64().unwrap() - 0.5).abs() < 1e-6);
+    for facet in &drawing.facets {
+        assert_eq!(find(&facet.name)["primitives"][0]["mode"], 4);
+        find(&format!("beams {}", facet.name));
+    }
+}
+
+#[test]
+fn a_drawing_table_gives_the_mirrors_back() {
+    let scene = load("prototype.toml");
+    let drawing = Drawing::new(&scene, None).unwrap();
+    let table = export::drawing_table(&scene, &drawing).unwrap();
+    let mut reader = csv::Reader::from_reader(table.as_slice());
+    let header = reader.headers().unwrap().clone();
+    let column = |name: &str| {
+        header
+            .iter()
+            .position(|h| h == name)
+            .unwrap_or_else(|| panic!("no {name}"))
+    };
+    let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), 8 * 4);
+    let facets = drawing
+        .facets
+        .iter()
+        .flat_map(|f| f.face.corners.iter().map(move |c| (f, c)));
+    for (row, (facet, corner)) in rows.iter().zip(facets) {
+        let number = |name: &str| -> f64 { row[column(name)].parse().unwrap() };
+        assert_eq!(row[0], facet.name);
+        for (axis, name) in ["x_mm", "y_mm", "z_mm"].into_iter().enumerate() {
+            assert!((number(name) - 1e3 * corner[axis]).abs() < 1e-6);
+        }
+        // The plane holds its corners.
+        let normal = [number("normal_x"), number("normal_y"), number("normal_z")];
+        let on_plane: f64 = normal.iter().zip(corner.iter()).map(|(m, c)| m * c * 1e3).sum();
+        assert!((on_plane - number("plane_offset_mm")).abs() < 1e-3);
+        assert_eq!(
+            number("tilt_tolerance_sd_deg"),
+            scene.superstructure.as_built.tilt_sd_deg
+        );
+    }
+    // The corner angles of a quadrangle.
+    let of_first = rows
+        .iter()
+        .take(4)
+        .map(|r| r[column("corner_angle_deg")].parse::<f64>().unwrap());
+    assert!((of_first.sum::<f64>() - 360.0).abs() < 1e-4);
+}
+
+/// The three numbers of an attribute of the joint to a link.
+fn joint(urdf: &str, child: &str, attribute: &str) -> [f64; 3] {
+    let at = urdf
+        .find(&format!("<child link=\"{child}\"/>"))
+        .unwrap_or_else(|| panic!("no {child}"));
+    let from = at + urdf[at..].find(&format!("{attribute}=\"")).unwrap() + attribute.len() + 2;
+    let text = urdf[from..].split('"').next().unwrap();
+    let numbers: Vec<f64> = text.split(' ').map(|n| n.parse().unwrap()).collect();
+    numbers.try_into().unwrap()
+}
+
+#[test]
+fn urdf_frames_stand_on_the_mirrors() {
+    let mut scene = load("prototype.toml");
+    scene.scanner.mount.yaw_deg = 30.0;
+    let drawing = Drawing::new(&scene, None).unwrap();
+    let urdf = export::urdf(&scene, &drawing);
+    assert_eq!(joint(&urdf, "laser", "xyz"), [0.0, 0.0, -0.04]);
+    assert!((joint(&urdf, "laser", "rpy")[2] - 30.0_f64.to_radians()).abs() < 1e-9);
+    for facet in &drawing.facets {
+        let link = format!("mirror_{}", facet.name);
+        let [roll, pitch, yaw] = joint(&urdf, &link, "rpy");
+        // URDF: turns about the fixed x, y and z axes, one after the other.
+        let turn = nalgebra::Rotation3::from_axis_angle(&nalgebra::Vector3::z_axis(), yaw)
+            * nalgebra::Rotation3::from_axis_angle(&nalgebra::Vector3::y_axis(), pitch)
+            * nalgebra::Rotation3::from_axis_angle(&nalgebra::Vector3::x_axis(), roll);
+        let z = turn * nalgebra::Vector3::z();
+        assert!((z - facet.face.normal.into_inner()).norm() < 1e-8, "{link}: {z}");
+        let place = nalgebra::Point3::from(joint(&urdf, &link, "xyz"));
+        assert!(
+            facet.face.contains(&place) && facet.face.normal.dot(&(place - facet.face.origin)).abs() < 1e-8
+        );
+    }
+}
+
+#[test]
+fn the_verb_writes_every_format_and_refuses_what_it_cannot() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = format!("{}/scenes/two-mirror.toml", env!("CARGO_MANIFEST_DIR"));
+    for format in ["stl", "glb", "csv", "urdf"] {
+        let file = format!("two.{format}");
+        let output = run(
+            folder.path(),
+            &["export", &scene, "--format", format, "--out", &file],
+        );
+        assert!(output.status.success(), "{}", stderr(&output));
+        assert!(
+            stdout(&output).starts_with(&format!("wrote {file}")),
+            "{}",
+            stdout(&output)
+        );
+        let first = std::fs::read(folder.path().join(&file)).unwrap();
+        let again = run(
+            folder.path(),
+            &[
+                "export",
+                &scene,
+                "--format",
+                format,
+                "--out",
+                &file,
+                "--threads",
+                "1",
+            ],
+        );
+        assert!(again.status.success());
+        assert!(!first.is_empty() && first == std::fs::read(folder.path().join(&file)).unwrap());
+    }
+    for (arguments, said) in [
+        (vec![".", "--format", "stl"], "is a folder"),
+        (vec![scene.as_str(), "--format", "step"], "possible values"),
+        (
+            vec![scene.as_str(), "--format", "glb", "--reach-m=-1"],
+            "positive number",
+        ),
+        (
+            vec![
+                scene.as_str(),
+                "--format",
+                "stl",
+                "--set",
+                "superstructure.facet=[]",
+            ],
+            "nothing of that kind",
+        ),
+    ] {
+        let arguments = [&["export", "--out", "x"], arguments.as_slice()].concat();
+        let output = run(folder.path(), &arguments);
+        assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+        assert!(
+            stderr(&output).contains(said),
+            "{arguments:?}: {}",
+            stderr(&output)
+        );
+        assert!(!folder.path().join("x").exists());
+    }
+}
