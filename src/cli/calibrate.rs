@@ -26,6 +26,9 @@ pub(crate) struct Arguments {
     /// What step 1 found out about the sensor, instead of what the session believes; as `characterize` writes it.
     #[arg(long, value_name = "characterization.json")]
     characterization: Option<PathBuf>,
+    /// Predict every board from the others as well, five times over, and say how well that goes (`joint`).
+    #[arg(long)]
+    cross_validate: bool,
     /// How derivatives are formed; both end at the same answer.
     #[arg(long, value_enum, default_value_t = JacobianName::Analytic)]
     jacobian: JacobianName,
@@ -79,11 +82,21 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         dataset.session.believed = dataset.session.believed.after(&found);
     }
     let method = Method::from(arguments.method);
+    if arguments.cross_validate && method != Method::Joint {
+        return Err(CliError::Invalid {
+            message: format!(
+                "--cross-validate goes with --method joint, not with {}",
+                method.name()
+            ),
+            help: None,
+        });
+    }
     let options = Options {
         jacobian: match arguments.jacobian {
             JacobianName::Analytic => JacobianForm::Analytic,
             JacobianName::Central => JacobianForm::CentralDifference,
         },
+        cross_validation: arguments.cross_validate,
         ..Options::default()
     };
     let begin = Instant::now();
@@ -95,12 +108,25 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     }
     io::write_json(&arguments.out, &calibration)?;
     print(&format!(
-        "wrote {}: {}\nnext: catoptric score {} {}\n",
+        "wrote {}: {}\n{}next: catoptric score {} {}\n",
         arguments.out.display(),
         summary(&calibration),
+        cross_validation(&calibration),
         quoted(&arguments.dataset),
         quoted(&arguments.out)
     ))
+}
+
+/// How well boards are predicted by the others, where that was asked.
+fn cross_validation(calibration: &Calibration) -> String {
+    let held_out = calibration.assessment.as_ref().and_then(|a| a.held_out.as_ref());
+    held_out.map_or_else(String::new, |h| {
+        format!(
+            "{} boards predicted by the others: off by {:.2} mm rms and {:.2} mm in the mean over {} readings; {:.2} mm rms is \
+             expected\n",
+            h.boards, h.rms_mm, h.mean_mm, h.means, h.expected_mm
+        )
+    })
 }
 
 /// "481 beams solved, 550 direct, …": how many elements have each status.

@@ -24,6 +24,8 @@ pub(crate) struct Attempt<'a> {
     pub(crate) beam: usize,
     pub(crate) azimuth: f64,
     pub(crate) facet: &'a NominalFacet,
+    /// What the facet's plane is believed to make of it.
+    pub(crate) nominal: Deflection,
     pub(crate) distance: BareDistance,
     /// Believed noise of one reading, in metres.
     pub(crate) noise: f64,
@@ -70,6 +72,7 @@ impl<'a> Attempt<'a> {
             beam,
             azimuth: azimuth(session, beam),
             facet,
+            nominal: *nominal,
             distance,
             noise,
             recorded: recorded.len(),

@@ -26,7 +26,7 @@ const STAGES: [f64; 8] = [0.15, 0.05, 0.02, 0.007, 0.0, 0.0, 0.0, 0.0];
 const FARTHEST_END: f64 = 0.007;
 
 /// A start in closed form that is farther than this from the drawing is noise, in radians.
-const FARTHEST_START: f64 = 0.35;
+pub(crate) const FARTHEST_START: f64 = 0.35;
 
 /// Largest ||v| − 1| of a start in closed form that is believed.
 const LARGEST_EXCESS: f64 = 0.2;

@@ -6,9 +6,10 @@ use crate::element::{Failure, Fit, lost, rejected};
 use crate::initial;
 use crate::observations::{BoardView, Observation};
 use crate::options::Method;
+use crate::solve::libm_cos;
 use crate::spread;
-use catoptric_model::{BeamEstimate, Deflection, PoseKind, RawRange, Status};
-use nalgebra::Matrix2;
+use catoptric_model::{BeamEstimate, Deflection, PoseKind, RawRange, Status, frame};
+use nalgebra::{Matrix2, Vector2};
 
 /// How much larger than expected the residuals of a good element may be. A solution from three boards leaves one
 /// Gaussian number: one in a million exceeds five standard deviations.
@@ -58,6 +59,31 @@ impl Attempt<'_> {
                 status: Status::Unobservable,
                 reason: Some(weakness.reason),
                 null_direction: Some(weakness.null_direction),
+                ..found
+            });
+        }
+        if let Some(other) = self.second_direction(fit) {
+            let (v, w) = (
+                solution.deflection.exit_direction(self.azimuth),
+                other.exit_direction(self.azimuth),
+            );
+            let (across, up) = frame::tangent_basis(&v);
+            let turn = Vector2::new(
+                w.dot(&across) / libm_cos(solution.deflection.elevation),
+                w.dot(&up),
+            )
+            .normalize();
+            return Ok(BeamEstimate {
+                status: Status::Unobservable,
+                reason: Some(format!(
+                    "two directions explain its ranges: azimuth {:.2}°, elevation {:.2}° and azimuth {:.2}°, elevation {:.2}°; \
+                     add a board whose tilt is off the line of the others'",
+                    solution.deflection.azimuth.to_degrees(),
+                    solution.deflection.elevation.to_degrees(),
+                    other.azimuth.to_degrees(),
+                    other.elevation.to_degrees()
+                )),
+                null_direction: Some(if turn[turn.iamax()] < 0.0 { -turn } else { turn }.into()),
                 ..found
             });
         }

@@ -14,6 +14,7 @@
 //! truth. It reads no file, prints nothing and draws nothing at random.
 
 mod ahead;
+mod ambiguity;
 mod bare;
 mod calibrate;
 mod calibrator;

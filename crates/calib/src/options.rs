@@ -85,6 +85,8 @@ pub struct Options {
     pub jacobian: JacobianForm,
     /// The iteration ends with a step of (θ_a, φ) shorter than this, in radians.
     pub step_tolerance_rad: f64,
+    /// Whether `joint` is asked to predict every board from the others as well, for five times the time.
+    pub cross_validation: bool,
     /// Steps after which an element counts as not converged.
     pub max_iterations: usize,
 }
@@ -95,6 +97,7 @@ impl Default for Options {
         Self {
             jacobian: JacobianForm::default(),
             step_tolerance_rad: 1e-13,
+            cross_validation: false,
             max_iterations: 50,
         }
     }

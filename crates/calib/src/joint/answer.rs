@@ -20,20 +20,40 @@ pub(super) struct Answer {
     pub(super) deflection: Deflection,
     /// Covariance along (azimuth, elevation) of the tangent plane (cos φ·δθ, δφ), in rad²; `None` where it is open.
     pub(super) covariance: Option<Matrix2<f64>>,
-    /// Residuals over the standard deviations of what no other reading shares, after the departure.
-    pub(super) residuals: Vec<f64>,
-    /// The same over their own standard deviations, which are smaller by what the estimate has taken up.
-    pub(super) studentized: Vec<f64>,
-    /// How many of the residuals the estimate has taken up: Σ of the posterior variances of what it fits to them.
-    pub(super) taken: f64,
     pub(super) readings: usize,
     /// Root mean square residual, in metres.
     pub(super) rms: f64,
     /// χ² of the element's rows, its departure included.
     pub(super) chi_squared: f64,
-    /// Boards, by their index and by the number of their pose.
-    pub(super) poses: Vec<usize>,
-    pub(super) numbers: Vec<usize>,
+    /// What it read of each board.
+    pub(super) seen: Vec<Seen>,
+}
+
+/// A board as an element read it.
+pub(super) struct Seen {
+    /// The board, by its group and its index there, and the number of its pose.
+    pub(super) group: usize,
+    pub(super) board: usize,
+    pub(super) number: usize,
+    /// Standard deviation by what no other reading shares, in metres.
+    pub(super) sd: f64,
+    /// Residual over that, after the departure.
+    pub(super) residual: f64,
+    /// Variance, over that squared, of what the estimate fits to it: how much of it the estimate has taken up. `None` where
+    /// the direction is open.
+    pub(super) fitted: Option<f64>,
+}
+
+impl Seen {
+    /// The residual over its own standard deviation, which is smaller by what the estimate has taken up.
+    pub(super) fn studentized(&self) -> f64 {
+        let left = 1.0 - self.fitted.unwrap_or(1.0);
+        if left > LEAST_LEFT {
+            self.residual / left.sqrt()
+        } else {
+            0.0
+        }
+    }
 }
 
 /// Covariances of one element: direction along the tangent basis, and what is fitted to its sights.
@@ -84,33 +104,23 @@ impl Joint<'_> {
                     0.0
                 };
                 let spread = self.spread(&solution.information, number, facet, &fan, &linear);
-                let fitted = spread.as_ref().map_or(&[][..], |s| &s.fitted);
-                let studentized = rest.iter().zip(fitted).map(|(r, v)| {
-                    let left: f64 = 1.0 - v;
-                    if left > LEAST_LEFT { r / left.sqrt() } else { 0.0 }
+                let seen = element.sights.iter().enumerate().map(|(i, sight)| Seen {
+                    group: number,
+                    board: sight.board,
+                    number: group.boards[sight.board].number,
+                    sd: sight.sd,
+                    residual: rest[i],
+                    fitted: spread.as_ref().map(|s| s.fitted[i]),
                 });
-                let poses: Vec<usize> = element
-                    .sights
-                    .iter()
-                    .map(|s| group.boards[s.board].pose)
-                    .collect();
                 Answer {
                     beam: element.beam,
                     facet: group.facets[facet].facet,
                     deflection: Deflection::from_exit(element.azimuth, &linear.v, linear.distance),
                     rms: (in_metres.sum::<f64>() / count).sqrt(),
                     chi_squared: rest.norm_squared() + departure,
-                    studentized: studentized.collect(),
-                    taken: fitted.iter().sum(),
-                    residuals: rest.iter().copied().collect(),
+                    seen: seen.collect(),
                     readings: element.sights.iter().map(|s| s.count).sum(),
-                    numbers: element
-                        .sights
-                        .iter()
-                        .map(|s| group.boards[s.board].number)
-                        .collect(),
                     covariance: spread.map(|s| s.direction),
-                    poses,
                 }
             })
             .collect()

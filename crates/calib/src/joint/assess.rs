@@ -111,9 +111,10 @@ impl Joint<'_> {
         }
         let believed = &session.believed;
         // Noise: what is left of each element's readings, by the numbers that it and its share of the rest have taken up.
-        let squares: f64 = answers.iter().flat_map(|a| &a.residuals).map(|r| r * r).sum();
-        let means: usize = answers.iter().map(|a| a.residuals.len()).sum();
-        let taken: f64 = answers.iter().map(|a| a.taken).sum();
+        let seen = || answers.iter().flat_map(|a| &a.seen);
+        let squares: f64 = seen().map(|s| s.residual * s.residual).sum();
+        let means = seen().count();
+        let taken: f64 = seen().filter_map(|s| s.fitted).sum();
         let left = means as f64 - taken;
         let noise = (left > LEAST_DETERMINED).then(|| believed.range_noise_sd_mm * (squares / left).sqrt());
         vec![
@@ -206,12 +207,13 @@ fn correlation(c: &DMatrix<f64>) -> Vec<Vec<f64>> {
 fn largest(answers: &[Answer]) -> LargestResidual {
     let mut worst = LargestResidual::default();
     for answer in answers {
-        for (residual, number) in answer.studentized.iter().zip(&answer.numbers) {
-            if residual.abs() > worst.studentized.abs() {
+        for seen in &answer.seen {
+            let studentized = seen.studentized();
+            if studentized.abs() > worst.studentized.abs() {
                 worst = LargestResidual {
-                    studentized: *residual,
+                    studentized,
                     beam: answer.beam,
-                    pose: *number,
+                    pose: seen.number,
                 };
             }
         }

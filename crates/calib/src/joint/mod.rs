@@ -7,6 +7,7 @@
 mod answer;
 mod assess;
 mod fit;
+mod held;
 mod limit;
 mod problem;
 
@@ -329,6 +330,12 @@ fn solve(
         answers = joint.answers(&fit.solution);
     }
     let solution = &fit.solution;
+    let mut assessment = departing.then(|| joint.assess(session, &fit, &answers));
+    if let Some(assessment) = &mut assessment
+        && work.options.cross_validation
+    {
+        assessment.held_out = joint.cross_validated(&solution.state)?;
+    }
     let names = |facet: usize| session.facets[facet].name.clone();
     Ok(Outcome {
         beams: answers
@@ -342,21 +349,21 @@ fn solve(
         } else {
             None
         },
-        assessment: departing.then(|| joint.assess(session, &fit, &answers)),
+        assessment,
     })
 }
 
 impl Answer {
     /// Whether its ranges are not those of a beam of its facet on its boards.
     fn is_strange(&self) -> bool {
-        let freedom = self.residuals.len() as f64;
+        let freedom = self.seen.len() as f64;
         self.chi_squared > freedom + GATE_SIGMAS * (2.0 * freedom).sqrt() + GATE_SIGMAS * GATE_SIGMAS
     }
 
     fn estimate(&self, facet: String, iterations: usize) -> BeamEstimate {
         let found = BeamEstimate {
             facet: Some(facet),
-            poses: Some(self.poses.len()),
+            poses: Some(self.seen.len()),
             readings: Some(self.readings),
             iterations: Some(iterations),
             rms_residual_m: Some(self.rms),

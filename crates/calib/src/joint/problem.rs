@@ -114,6 +114,7 @@ pub(super) struct Mounting {
 }
 
 /// All of it.
+#[derive(Clone)]
 pub(super) struct Joint<'a> {
     pub(super) groups: Vec<Group>,
     pub(super) mounting: Mounting,

@@ -16,11 +16,20 @@ const ALONE: [Method; 4] = [
 /// Solves the middle beam of the middle facet on the given boards; its status and its null direction as an angle
 /// from "across" towards "up" in the tangent plane, in degrees.
 fn null_angle(boards: &[(f64, f64, f64)], facet_tilt_deg: f64, method: Method) -> (Status, Option<f64>) {
+    null_angle_in(World::exact(), boards, facet_tilt_deg, method)
+}
+
+fn null_angle_in(
+    world: World,
+    boards: &[(f64, f64, f64)],
+    facet_tilt_deg: f64,
+    method: Method,
+) -> (Status, Option<f64>) {
     let world = World {
         served: vec![[510, 570]],
         facet_boards: placements(boards),
         facet_tilt_deg,
-        ..World::exact()
+        ..world
     };
     let made = world.make();
     let calibration = calibrate(&made.dataset, method, &Options::default()).expect("a sound dataset");
@@ -88,6 +97,44 @@ fn all_face_on() {
         let (status, angle) = null_angle(&boards, 1.0, method);
         assert_eq!(status, Status::Unobservable);
         assert!(angle.is_some());
+    }
+}
+
+/// Tilts on a line that passes the beam by tan 6°: mirrored at it, a direction 12° away gives the same ranges. That both
+/// angles are determined where the element points does not help; a fourth board off the line does.
+#[test]
+fn tilts_on_a_line_leave_two_directions() {
+    let tilted = |x: f64, y: f64, s: f64| {
+        let (tan, psi) = (libm::hypot(x, y), nalgebra::RealField::atan2(y, x));
+        (
+            s,
+            nalgebra::RealField::atan2(tan, 1.0).to_degrees(),
+            psi.to_degrees(),
+        )
+    };
+    let x = 0.105_104;
+    // A thick mirror's face is elsewhere for another direction, which data without errors would tell.
+    let thin = || World {
+        thickness_mm: 0.0,
+        ..World::exact()
+    };
+    let mut boards = vec![tilted(x, -0.7, 1.2), tilted(x, 0.1, 1.4), tilted(x, 0.6, 1.6)];
+    // The closed form is linear in three components, of which these boards leave one open: it has no answer at all.
+    for method in [Method::BeamGls, Method::Beam, Method::Recursive] {
+        let (status, angle) = null_angle_in(thin(), &boards, 0.0, method);
+        assert_eq!(status, Status::Unobservable, "{method:?}");
+        let angle = angle
+            .expect("it points from one direction to the other")
+            .rem_euclid(180.0);
+        assert!(angle.min(180.0 - angle) < 1e-6, "{method:?}: {angle}");
+    }
+    boards.push(tilted(-0.5, 0.3, 1.3));
+    for method in ALONE {
+        assert_eq!(
+            null_angle_in(thin(), &boards, 0.0, method).0,
+            Status::Solved,
+            "{method:?}"
+        );
     }
 }
 

@@ -1,0 +1,61 @@
+//! Cross-validation: boards are left out, a fifth of each facet's at a time, and what elements read of them is compared
+//! with what the rest predicts.
+//!
+//! A reading that weighs a million times less than it should is left out, while its prediction and the variance of that,
+//! by everything that is estimated and by the board's own errors, come out of the same algebra as all others.
+
+use super::problem::{Group, Joint};
+use crate::least_squares::{self, ProblemError, State};
+use catoptric_model::assessment::HeldOut;
+
+/// Parts that the boards of a facet are left out in.
+const FOLDS: usize = 5;
+
+/// By how much a reading that is left out is more uncertain than it is believed to be.
+const LEFT_OUT: f64 = 1e6;
+
+impl Joint<'_> {
+    /// What every board's readings differ from their prediction by a calibration that has not seen them; `None` where there
+    /// are too few boards to leave any out.
+    pub(super) fn cross_validated(&self, from: &State) -> Result<Option<HeldOut>, ProblemError> {
+        let (mut boards, mut means) = (0, 0_usize);
+        let (mut sum, mut squares, mut expected) = (0.0, 0.0, 0.0);
+        for fold in 0..FOLDS {
+            let is_left_out = |group: &Group, board: usize| !group.facets.is_empty() && board % FOLDS == fold;
+            let mut rest = self.clone();
+            for group in &mut rest.groups {
+                let out: Vec<bool> = (0..group.boards.len()).map(|b| is_left_out(group, b)).collect();
+                boards += out.iter().filter(|o| **o).count();
+                let sights = group.elements.iter_mut().flat_map(|e| &mut e.sights);
+                for sight in sights.filter(|s| out[s.board]) {
+                    sight.sd *= LEFT_OUT;
+                }
+            }
+            let solution = rest.solve(from.clone(), &least_squares::Options::default())?;
+            for answer in rest.answers(&solution) {
+                // Without boards of its own an element's direction is that of its facet; without a covariance it is open.
+                for sight in answer
+                    .seen
+                    .iter()
+                    .filter(|s| is_left_out(&rest.groups[s.group], s.board))
+                {
+                    let Some(fitted) = sight.fitted else { continue };
+                    let residual = sight.residual * sight.sd;
+                    let own = sight.sd / LEFT_OUT;
+                    means += 1;
+                    sum += residual;
+                    squares += residual * residual;
+                    expected += own * own + fitted * sight.sd * sight.sd;
+                }
+            }
+        }
+        let count = means as f64;
+        Ok((means > 0).then(|| HeldOut {
+            boards,
+            means,
+            rms_mm: 1e3 * (squares / count).sqrt(),
+            expected_mm: 1e3 * (expected / count).sqrt(),
+            mean_mm: 1e3 * sum / count,
+        }))
+    }
+}
