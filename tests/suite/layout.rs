@@ -690,7 +690,7 @@ fn pages_and_pictures_are_the_same_on_any_number_of_threads() {
         "report.html",
         "1-field.svg",
         "2-perspective.png",
-        "1-footprints-left-1.svg",
+        "1-footprints-1-left-1.svg",
         "2-scan.svg",
     ] {
         assert!(names.contains(&name), "{names:?}");
