@@ -94,7 +94,9 @@ fn view(
         let values = || own.iter().filter_map(|(e, _)| value(e));
         Some([values().reduce(f64::min)?, values().reduce(f64::max)?])
     };
-    let solid_angle_sr: f64 = own.iter().map(|(e, _)| cells[e.beam].solid_angle()).sum();
+    let angles = own.iter().map(|(e, _)| cells[e.beam].solid_angle());
+    // An empty sum is −0.
+    let solid_angle_sr = angles.fold(0.0, |sum, angle| sum + angle);
     let sees = |f: &&Footprint| f.facet == facet && elements[f.beam].class.sees();
     let nearest = footprints
         .iter()

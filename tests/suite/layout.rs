@@ -517,6 +517,10 @@ fn size_and_mass_of_a_plain_structure_are_by_hand() {
     assert!((size.post_mass_g - 7.44).abs() < 1e-9, "{}", size.post_mass_g);
     assert!((size.structure_mass_g - 11.44).abs() < 1e-9);
     assert_eq!(size.scanner_mass_g, Some(130.0));
+    // Nothing is no negative nothing.
+    scene.superstructure.facet.clear();
+    let none = layout::analyze(&scene, None, Detail::Coarse).unwrap().size;
+    assert!(none.mirror_area_mm2 == 0.0 && none.mirror_area_mm2.is_sign_positive());
 }
 
 #[test]
