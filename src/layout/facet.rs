@@ -3,7 +3,7 @@
 use super::element::{Class, Element, Traced, exit};
 use super::field::Cell;
 use super::footprint::Footprint;
-use super::sensitivity::{RANGE_M, shifts};
+use super::sensitivity::{RANGE_M, Shift, shifts};
 use catoptric_model::beam;
 use catoptric_sim::layout::area_vector;
 use catoptric_sim::structure::Structure;
@@ -53,8 +53,8 @@ pub struct FacetView {
     pub margin_across_mm: Option<f64>,
     /// Area, in square millimetres.
     pub area_mm2: f64,
-    /// Movement of the point at 4 m for a turn of the facet by 0.1° about the worst axis, root mean square over its
-    /// elements, in millimetres.
+    /// Movement of the point at 4 m for a turn of the facet by 0.1° about the worst axis, root mean square over the
+    /// elements that meet it and see, in millimetres.
     pub point_at_4m_per_0_1_deg_rms_mm: Option<f64>,
     /// The same, the greatest.
     pub point_at_4m_per_0_1_deg_max_mm: Option<f64>,
@@ -94,7 +94,9 @@ fn view(
         let values = || own.iter().filter_map(|(e, _)| value(e));
         Some([values().reduce(f64::min)?, values().reduce(f64::max)?])
     };
-    let solid_angle_sr: f64 = own.iter().map(|(e, _)| cells[e.beam].solid_angle()).sum();
+    let angles = own.iter().map(|(e, _)| cells[e.beam].solid_angle());
+    // An empty sum is −0.
+    let solid_angle_sr = angles.fold(0.0, |sum, angle| sum + angle);
     let sees = |f: &&Footprint| f.facet == facet && elements[f.beam].class.sees();
     let nearest = footprints
         .iter()
@@ -105,12 +107,18 @@ fn view(
         .filter(sees)
         .filter_map(|f| f.across_mm)
         .reduce(f64::min);
-    let moved: Vec<(f64, f64)> = own
+    let moved: Vec<(f64, f64)> = elements
         .iter()
-        .filter_map(|(_, t)| shifts(structure, t, RANGE_M).first().copied())
-        .map(|s| {
-            let turn = 1e3 * s.worst_turn() * TURN_DEG.to_radians();
-            (turn, s.shift.norm() * SHIFT_MM)
+        .zip(traced)
+        .filter(|(e, t)| e.class.sees() && meets(t))
+        .map(|(e, t)| {
+            let faces = t.chief.facets().iter().map(|&f| &structure.facets[f].face);
+            let all = shifts(e.beam, faces, RANGE_M);
+            // A facet that is met twice moves the point twice.
+            let own = all.iter().zip(t.chief.facets()).filter(|(_, f)| **f == facet);
+            let sum = own.fold(Shift::default(), |sum, (shift, _)| sum + *shift);
+            let turn = 1e3 * sum.worst_turn() * TURN_DEG.to_radians();
+            (turn, sum.shift.norm() * SHIFT_MM)
         })
         .collect();
     let square: f64 = moved.iter().map(|(turn, _)| turn * turn).sum();

@@ -2,8 +2,9 @@
 //!
 //! Elements that meet the same facets in the same order share one isometry of directions, the product of their
 //! reflections (facets as planes, their unevenness aside). Whether a direction lies in a cell is asked where cells are
-//! plain rectangles: turned back into the scan. Every cell is cut into parts; a part that n ways see counts 1/n for each of
-//! them, so that cells that nothing overlaps keep their solid angle exactly.
+//! plain rectangles: turned back into the scan. Ways are taken one after the other, undeflected elements first. Every cell is cut
+//! into parts, and a part counts unless a way before sees it, so that cells that nothing overlaps keep their solid angle
+//! exactly.
 
 use super::element::{Traced, exit};
 use catoptric_model::beam;
@@ -172,9 +173,8 @@ pub(crate) fn field(ways: &Ways, cells: &[Cell], traced: &[Traced]) -> Field {
             let cell = &cells[beam];
             let seen = part_directions(cell).map(|(in_scan, weight)| {
                 let direction = way.turn * in_scan;
-                let others = ways.0.iter().enumerate().filter(|(other, _)| *other != own);
-                let others = others.filter(|(_, w)| w.sees(&direction, cells, highest)).count();
-                weight / (1 + others) as f64
+                let before = ways.0[..own].iter().any(|w| w.sees(&direction, cells, highest));
+                if before { 0.0 } else { weight }
             });
             covered_sr += seen.sum::<f64>();
             if way.facets.is_empty() {

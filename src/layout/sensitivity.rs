@@ -11,22 +11,32 @@
 //! which the mirrors behind it turn like any direction. A turn about the normal and a shift along the plane move nothing.
 //! Glass moves with its facet, so it does not count here; it adds a walk of its own millimetres times the turn.
 
-use super::element::Traced;
 use catoptric_model::beam;
 use catoptric_model::frame::tangent_basis;
-use catoptric_sim::structure::Structure;
+use catoptric_sim::cast::Polygon;
 use nalgebra::{Matrix3, Matrix3x2, Point3, Vector3};
 
 /// Reading for which it is stated, in metres from the scanner.
 pub(super) const RANGE_M: f64 = 4.0;
 
 /// How the point of one reading moves with one facet.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Shift {
     /// With a turn of the facet about the two axes of its plane, in metres per radian.
     pub(super) turn: Matrix3x2<f64>,
     /// With a shift of the facet along its normal, without unit.
     pub(super) shift: Vector3<f64>,
+}
+
+impl std::ops::Add for Shift {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            turn: self.turn + other.turn,
+            shift: self.shift + other.shift,
+        }
+    }
 }
 
 impl Shift {
@@ -39,13 +49,11 @@ impl Shift {
     }
 }
 
-/// How the point of a reading of a beam moves with the facets that its chief ray meets, one for every bounce.
-pub(super) fn shifts(structure: &Structure, traced: &Traced, range: f64) -> Vec<Shift> {
-    let facets = traced.chief.facets();
-    let mut image = Point3::from(beam::direction(beam::azimuth(traced.beam)).into_inner() * range);
-    let mut shifts: Vec<Shift> = Vec::with_capacity(facets.len());
-    for &facet in facets {
-        let face = &structure.facets[facet].face;
+/// How the point of a reading of a beam moves with the faces that its chief ray meets, one for every bounce.
+pub(super) fn shifts<'f>(beam: usize, faces: impl Iterator<Item = &'f Polygon>, range: f64) -> Vec<Shift> {
+    let mut image = Point3::from(beam::direction(beam::azimuth(beam)).into_inner() * range);
+    let mut shifts: Vec<Shift> = Vec::new();
+    for face in faces {
         let m = face.normal.into_inner();
         let height = m.dot(&(image - face.origin));
         let reflection = Matrix3::identity() - m * m.transpose() * 2.0;
@@ -70,4 +78,70 @@ pub(super) fn shifts(structure: &Structure, traced: &Traced, range: f64) -> Vec<
 /// Mean of the corners, about which a facet is turned.
 pub(crate) fn center(corners: &[Point3<f64>]) -> Point3<f64> {
     Point3::from(corners.iter().map(|c| c.coords).sum::<Vector3<f64>>() / corners.len().max(1) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Rotation3;
+
+    fn face(center: [f64; 3], normal: [f64; 3]) -> Polygon {
+        let m = nalgebra::Unit::new_normalize(Vector3::from(normal));
+        let (a, b) = tangent_basis(&m);
+        let corners = [(-0.01, -0.02), (0.03, -0.02), (0.03, 0.02), (-0.01, 0.02)];
+        let place = |(x, y): (f64, f64)| Point3::from(Vector3::from(center) + a.scale(x) + b.scale(y));
+        let corners: Vec<_> = corners.map(place).to_vec();
+        let face = Polygon::new(corners).expect("it has an area");
+        if face.normal.dot(&m) > 0.0 {
+            face
+        } else {
+            face.turned().expect("so has its back")
+        }
+    }
+
+    fn moved(face: &Polygon, turn: Vector3<f64>, shift: Vector3<f64>) -> Polygon {
+        let (middle, turn) = (center(&face.corners), Rotation3::new(turn));
+        let corners = face.corners.iter().map(|c| middle + shift + turn * (c - middle));
+        Polygon::new(corners.collect()).expect("it has an area")
+    }
+
+    /// The point of a reading, by reflection after reflection.
+    fn point(faces: &[Polygon], beam: usize, range: f64) -> Point3<f64> {
+        let start = Point3::from(beam::direction(beam::azimuth(beam)).into_inner() * range);
+        faces.iter().fold(start, |p, f| {
+            let m = f.normal.into_inner();
+            p - m * (2.0 * m.dot(&(p - f.origin)))
+        })
+    }
+
+    #[test]
+    fn derivatives_over_two_mirrors_are_finite_differences() {
+        let faces = [
+            face([0.07, 0.0, 0.0], [-1.0, 0.2, 1.0]),
+            face([0.07, 0.02, 0.3], [0.1, 0.4, -1.0]),
+        ];
+        let found = shifts(550, faces.iter(), RANGE_M);
+        assert_eq!(found.len(), 2);
+        let step = 1e-5;
+        for (number, shift) in found.iter().enumerate() {
+            let with = |turn: Vector3<f64>, by: Vector3<f64>| {
+                let mut faces = faces.clone();
+                faces[number] = moved(&faces[number], turn, by);
+                point(&faces, 550, RANGE_M)
+            };
+            let (a, b) = tangent_basis(&faces[number].normal);
+            for (column, axis) in [a, b].into_iter().enumerate() {
+                let turn = axis.into_inner() * step;
+                let difference =
+                    (with(turn, Vector3::zeros()) - with(-turn, Vector3::zeros())) / (2.0 * step);
+                assert!(
+                    (difference - shift.turn.column(column)).norm() < 1e-6,
+                    "{number} {column}"
+                );
+            }
+            let by = faces[number].normal.into_inner() * step;
+            let difference = (with(Vector3::zeros(), by) - with(Vector3::zeros(), -by)) / (2.0 * step);
+            assert!((difference - shift.shift).norm() < 1e-9, "{number}");
+        }
+    }
 }

@@ -62,7 +62,7 @@ pub(crate) fn size(scene: &Scene, structure: &Structure) -> Size {
     let radius = points.iter().map(|p| libm::hypot(p.x, p.y)).fold(0.0, f64::max);
     let area: f64 = (structure.facets.iter())
         .map(|f| 0.5 * area_vector(&f.face.corners).norm())
-        .sum();
+        .fold(0.0, |sum, area| sum + area);
     let thickness = plate_thickness(scene);
     let (mirror_mass, post_mass) = (area * thickness * MIRROR_DENSITY, post_volume * POST_DENSITY);
     Size {

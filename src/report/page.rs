@@ -58,6 +58,23 @@ pub(super) fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
 /// Rows beyond which a table is folded away.
 const LONG_TABLE: usize = 12;
 
+/// Colors with their names; nothing for none.
+pub(super) fn legend(entries: &[(String, String)]) -> String {
+    if entries.is_empty() {
+        return String::new();
+    }
+    let entry = |(color, name): &(String, String)| {
+        format!(
+            "<span><i style=\"background:{color}\"></i>{}</span> ",
+            escape(name)
+        )
+    };
+    format!(
+        "<p class=\"legend\">{}</p>\n",
+        entries.iter().map(entry).collect::<String>()
+    )
+}
+
 /// Plots, what to see in them, and their numbers.
 pub(super) fn figure(
     plots: &str,
@@ -66,17 +83,7 @@ pub(super) fn figure(
     headings: &[&str],
     rows: &[Vec<String>],
 ) -> String {
-    let mut html = format!("<figure>\n{plots}\n");
-    if !legend.is_empty() {
-        html += "<p class=\"legend\">";
-        for (color, name) in legend {
-            html += &format!(
-                "<span><i style=\"background:{color}\"></i>{}</span> ",
-                escape(name)
-            );
-        }
-        html += "</p>\n";
-    }
+    let mut html = format!("<figure>\n{plots}\n{}", self::legend(legend));
     html += &format!("<figcaption>{}</figcaption>\n", escape(caption));
     let table = table(headings, rows);
     if rows.len() > LONG_TABLE {

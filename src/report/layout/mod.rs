@@ -7,7 +7,7 @@ mod tables;
 mod views;
 
 use super::figure::{css, standalone};
-use super::page::{escape, figure as block, page, table};
+use super::page::{escape, figure as block, legend, page, table};
 use crate::layout::{Analysis, Drawing};
 use catoptric_sim::{Scene, SimError};
 use sides::SIDES;
@@ -49,18 +49,29 @@ pub fn layout(layouts: &[Drawn]) -> String {
             "Mirror layouts side by side"
         }
     );
+    for drawn in layouts {
+        html += &format!("<p>{}</p>\n", escape(&tables::summary(&drawn.analysis)));
+    }
     html += "<h2>In numbers</h2>\n";
     let (headings, rows) = tables::key_figures(layouts);
     let headings: Vec<&str> = headings.iter().map(String::as_str).collect();
     html += &table(&headings, &rows);
-    html += &format!("<h2>Where it looks</h2>\n{}", of_each(layouts, field));
-    html += &format!("<h2>What becomes of the scan</h2>\n{}", of_each(layouts, scan));
-    html += &format!("<h2>The structure</h2>\n{}", of_each(layouts, structure));
-    html += &format!(
-        "<h2>Where beams meet the mirrors</h2>\n{}",
-        of_each(layouts, mirrors)
-    );
-    html += &format!("<h2>Facet by facet</h2>\n{}", of_each(layouts, facets));
+    let chapters: [(&str, OfLayout); 5] = [
+        ("Where it looks", field),
+        ("What becomes of the scan", scan),
+        ("The structure", structure),
+        ("From three sides", three_sides),
+        ("Where beams meet the mirrors", mirrors),
+    ];
+    for (title, of) in chapters {
+        html += &format!("<h2>{title}</h2>\n{}", chapter(layouts, of));
+    }
+    html += "<h2>Facet by facet</h2>\n<p>How far a point that is read at 4 m moves if the facet is not where it is drawn: for \
+             0.1° of turn about the worst axis of its plane, and for 0.1 mm along its normal.</p>\n";
+    for drawn in layouts {
+        let (headings, rows) = tables::facets(drawn);
+        html += &(name_of(layouts, drawn) + &table(headings, &rows));
+    }
     html += "<footer>Field of regard: the share of all directions, 4π, that the cells of the elements cover, each direction \
              counted once. An element's cell reaches half-way to its neighbors along the scan, and as far as the 1/e² contour \
              of its own beam across it. Ranges are for face-on targets that fill the beam, by Eq. 1 with both passes over the \
@@ -88,7 +99,10 @@ pub fn layout_pictures(layouts: &[Drawn]) -> Vec<(String, Vec<u8>)> {
         }
         for (facet, view) in drawn.analysis.facets.iter().enumerate() {
             if let Some(svg) = views::footprints(drawn, facet) {
-                add(format!("footprints-{}", file_name(&view.name)), &svg);
+                add(
+                    format!("footprints-{}-{}", facet + 1, file_name(&view.name)),
+                    &svg,
+                );
             }
         }
         let perspective = perspective::perspective(drawn);
@@ -118,66 +132,126 @@ fn radius(drawing: &Drawing) -> f64 {
     faces.chain(bodies).map(|p| p.coords.norm()).fold(0.05, f64::max)
 }
 
-/// One section of every layout, under its name if there are several.
-fn of_each(layouts: &[Drawn], section: fn(&Drawn) -> String) -> String {
-    let of_one = |drawn: &Drawn| {
-        let heading = if layouts.len() == 1 {
-            String::new()
-        } else {
-            format!("<h3>{}</h3>\n", escape(&drawn.analysis.name))
+/// Pictures of one layout, what to see in them, and their numbers.
+struct Chapter {
+    pictures: String,
+    caption: String,
+    legend: Vec<(String, String)>,
+    headings: &'static [&'static str],
+    rows: Vec<Vec<String>>,
+    /// Whether the pictures fill the page, so that those of several layouts stand below one another.
+    wide: bool,
+}
+
+/// What makes a chapter.
+type OfLayout = fn(&Drawn) -> Chapter;
+
+/// A chapter about every layout: of one as it is, of several side by side.
+fn chapter(layouts: &[Drawn], of: OfLayout) -> String {
+    let chapters: Vec<Chapter> = layouts.iter().map(of).collect();
+    if layouts.len() == 1 || chapters.iter().any(|c| c.wide) {
+        let one = |(drawn, c): (&Drawn, &Chapter)| {
+            let figure = block(&c.pictures, &c.caption, &c.legend, c.headings, &c.rows);
+            name_of(layouts, drawn) + &figure
         };
-        heading + &section(drawn)
-    };
-    layouts.iter().map(of_one).collect()
+        return layouts.iter().zip(&chapters).map(one).collect();
+    }
+    let mut html = "<div class=\"views beside\">\n".to_owned();
+    for (drawn, c) in layouts.iter().zip(&chapters) {
+        let name = escape(&drawn.analysis.name);
+        html += &format!("<div><h4>{name}</h4>{}{}</div>\n", c.pictures, legend(&c.legend));
+    }
+    html += "</div>\n";
+    if let Some(first) = chapters.first() {
+        html += &format!("<p>{}</p>\n", escape(&first.caption));
+    }
+    for (drawn, c) in layouts.iter().zip(&chapters) {
+        html += &format!(
+            "<details><summary>The numbers of {}</summary>\n{}</details>\n",
+            escape(&drawn.analysis.name),
+            table(c.headings, &c.rows)
+        );
+    }
+    html
 }
 
-fn field(drawn: &Drawn) -> String {
+/// The name of a layout as a heading, if there are several.
+fn name_of(layouts: &[Drawn], drawn: &Drawn) -> String {
+    if layouts.len() == 1 {
+        String::new()
+    } else {
+        format!("<h3>{}</h3>\n", escape(&drawn.analysis.name))
+    }
+}
+
+fn field(drawn: &Drawn) -> Chapter {
     let (headings, rows) = tables::directions(drawn);
-    block(
-        &views::map(drawn),
-        "Every direction around the scanner, forward in the middle, unrolled like a map of the world. Each element is drawn \
-         as the cell of directions that it stands for: grey where the scan passes by the mirrors, in the color of its facet \
-         where it is deflected. White is not looked at: gaps in the grey line are where mirrors stand, and black marks are \
-         elements that are lost, at where they would look without the structure. The grey line is thinnest ahead, where the \
-         scanner's spot lies along the scan.",
-        &perspective::legend(drawn),
+    Chapter {
+        pictures: views::map(drawn),
+        caption: "Every direction around the scanner, forward in the middle, unrolled like a map of the world. Each element \
+                  is drawn as the cell of directions that it stands for: grey where the scan passes by the mirrors, in the \
+                  color of its facet where it is deflected. White is not looked at: gaps in the grey line are where mirrors \
+                  stand, and black marks are elements that are lost, at where they would look without the structure. The grey \
+                  line is thinnest where the scanner's spot lies along the scan."
+            .to_owned(),
+        legend: perspective::legend(drawn),
         headings,
-        &rows,
-    )
+        rows,
+        wide: false,
+    }
 }
 
-fn scan(drawn: &Drawn) -> String {
+fn scan(drawn: &Drawn) -> Chapter {
     let mut legend = perspective::legend(drawn);
     legend.push((css(LOST), "lost".to_owned()));
     let (headings, rows) = tables::runs(drawn);
-    block(
-        &views::scan(drawn),
-        "The elements of the scan over their azimuth: those with a direction of their own, those that an edge splits, and \
-         those that end on the structure, stay between mirrors or are too faint.",
-        &legend,
+    Chapter {
+        pictures: views::scan(drawn),
+        caption: "The elements of the scan over their azimuth: those with a direction of their own, those that an edge \
+                  splits, and those that end on the structure, stay between mirrors or are too faint."
+            .to_owned(),
+        legend,
         headings,
-        &rows,
-    )
-}
-
-fn structure(drawn: &Drawn) -> String {
-    let perspective = perspective::perspective(drawn);
-    let mut svgs = perspective.svg() + "<div class=\"views\">\n";
-    for side in &SIDES {
-        svgs += &format!("<div><h4>{}</h4>{}</div>\n", side.title, sides::side(drawn, side));
+        rows,
+        wide: false,
     }
-    svgs += "</div>";
-    let (headings, rows) = tables::sizes(drawn);
-    let caption = format!(
-        "Mirrors, posts and housing in the sensor frame, with every {}th beam in the color of the last facet it meets and \
-         every {}th that passes by in grey. In perspective the beams end shortly after the mirrors.",
-        views::RAY_STEP,
-        views::DIRECT_STEP
-    );
-    block(&svgs, &caption, &perspective::legend(drawn), headings, &rows)
 }
 
-fn mirrors(drawn: &Drawn) -> String {
+fn structure(drawn: &Drawn) -> Chapter {
+    let (headings, rows) = tables::sizes(drawn);
+    Chapter {
+        pictures: perspective::perspective(drawn).svg(),
+        caption: format!(
+            "Mirrors, posts and the scanner's housing, with every {}th beam in the color of the last facet it meets and every \
+             {}th that passes by in grey, up to shortly after the mirrors. The back of a mirror is paler than its face.",
+            views::RAY_STEP,
+            views::DIRECT_STEP
+        ),
+        legend: perspective::legend(drawn),
+        headings,
+        rows,
+        wide: false,
+    }
+}
+
+fn three_sides(drawn: &Drawn) -> Chapter {
+    let side =
+        |side: &sides::Side| format!("<div><h4>{}</h4>{}</div>\n", side.title, sides::side(drawn, side));
+    let svgs: String = SIDES.iter().map(side).collect();
+    let (headings, rows) = tables::places(drawn);
+    Chapter {
+        pictures: format!("<div class=\"views\">\n{svgs}</div>"),
+        caption: "The same beams. Outlines are drawn whole, whatever stands before them: mirrors heavy and in their colors, \
+                  posts grey, the housing black."
+            .to_owned(),
+        legend: perspective::legend(drawn),
+        headings,
+        rows,
+        wide: true,
+    }
+}
+
+fn mirrors(drawn: &Drawn) -> Chapter {
     let mut svgs = "<div class=\"views\">\n".to_owned();
     for (facet, view) in drawn.analysis.facets.iter().enumerate() {
         if let Some(svg) = views::footprints(drawn, facet) {
@@ -186,22 +260,15 @@ fn mirrors(drawn: &Drawn) -> String {
     }
     svgs += "</div>";
     let (headings, rows) = tables::margins(drawn);
-    let legend = [(css(LOST), "split at an edge, or lost otherwise".to_owned())];
-    block(
-        &svgs,
-        "Each mirror seen from before it, its outline in black. An ellipse is the 1/e² contour of a beam, of every second \
-         whole one and of every one that is lost. A whole ellipse may move by its margin before an edge cuts it.",
-        &legend,
+    Chapter {
+        pictures: svgs,
+        caption: "Each mirror seen from before it, its outline in black. An ellipse is the 1/e² contour of a beam, of every \
+                  second whole one and of every one that is lost. A whole ellipse may move by its margin before an edge cuts \
+                  it."
+        .to_owned(),
+        legend: vec![(css(LOST), "split at an edge, or lost otherwise".to_owned())],
         headings,
-        &rows,
-    )
-}
-
-fn facets(drawn: &Drawn) -> String {
-    let (headings, rows) = tables::facets(drawn);
-    format!(
-        "<p>How far a point that is read at 4 m moves if the facet is not where it is drawn: for 0.1° of turn about the worst \
-         axis of its plane, and for 0.1 mm along its normal.</p>\n{}",
-        table(headings, &rows)
-    )
+        rows,
+        wide: true,
+    }
 }

@@ -88,7 +88,7 @@ pub(super) fn perspective(drawn: &Drawn) -> Perspective {
     let mut canvas = Canvas::new();
     for part in &drawing.parts {
         let fill = if part.housing {
-            RGBColor(0x48, 0x4C, 0x52)
+            RGBColor(0x5C, 0x60, 0x68)
         } else {
             DIRECT
         };
@@ -159,14 +159,15 @@ type Words = Vec<([f64; 2], String)>;
 
 /// The axes of the sensor frame at the scanner, over everything, with their names and length.
 fn axes(camera: &Camera, canvas: &mut Canvas) -> Words {
-    let black = RGBColor(0, 0, 0);
+    // In sight on white and on black.
+    let ink = RGBColor(0x70, 0x70, 0x70);
     let over = |p: [f64; 3]| [p[0], p[1], 2.0 * p[2]];
     let origin = over(camera.place(&Point3::origin()));
     let mut words = Vec::new();
     for (axis, name) in ["x, forward", "y, left", "z, up"].into_iter().enumerate() {
         let end = Point3::from(Vector3::ith(axis, AXIS_M));
         let tip = over(camera.place(&end));
-        canvas.line(origin, tip, 2.5, black);
+        canvas.line(origin, tip, 2.5, ink);
         let along = Unit::new_normalize(Vector3::new(tip[0] - origin[0], tip[1] - origin[1], 0.0));
         for side in [0.5, -0.5] {
             let barb = [
@@ -174,7 +175,7 @@ fn axes(camera: &Camera, canvas: &mut Canvas) -> Words {
                 tip[1] - 10.0 * along.y + 10.0 * side * along.x,
                 tip[2],
             ];
-            canvas.line(tip, barb, 2.5, black);
+            canvas.line(tip, barb, 2.5, ink);
         }
         // Half of the words beside the tip, where the axis points to a side.
         let aside = if along.x.abs() > 0.3 {

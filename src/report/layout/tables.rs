@@ -12,20 +12,22 @@ type KeyFigure = (&'static str, fn(&Analysis) -> String);
 
 const KEY_FIGURES: [KeyFigure; 22] = [
     ("Elements with a direction", |a| a.seeing.to_string()),
-    ("undeflected", |a| count(a, Class::Direct)),
-    ("deflected by one facet", |a| count(a, Class::Deflected)),
-    ("leaving after several facets", |a| count(a, Class::MultiBounce)),
-    ("Elements without", |a| a.lost.to_string()),
-    ("split at an edge", |a| count(a, Class::Split)),
-    ("ending on the structure", |a| count(a, Class::HitsStructure)),
-    ("ending on it after a mirror", |a| count(a, Class::Shaded)),
-    ("trapped between mirrors", |a| count(a, Class::Trapped)),
-    ("too faint", |a| count(a, Class::TooFaint)),
+    ("… undeflected", |a| count(a, Class::Direct)),
+    ("… deflected by one facet", |a| count(a, Class::Deflected)),
+    ("… leaving after several facets", |a| {
+        count(a, Class::MultiBounce)
+    }),
+    ("Elements without a direction", |a| a.lost.to_string()),
+    ("… split at an edge", |a| count(a, Class::Split)),
+    ("… ending on the structure", |a| count(a, Class::HitsStructure)),
+    ("… ending on it after a mirror", |a| count(a, Class::Shaded)),
+    ("… trapped between mirrors", |a| count(a, Class::Trapped)),
+    ("… too faint", |a| count(a, Class::TooFaint)),
     ("Largest gap in the scan (°)", |a| number(a.largest_gap_deg, 2)),
     ("Field of regard (% of all directions)", |a| {
         number(100.0 * a.field_of_regard, 3)
     }),
-    ("of it undeflected (%)", |a| {
+    ("… of it undeflected (%)", |a| {
         number(100.0 * a.direct_field_of_regard, 3)
     }),
     ("Directions within 5° of a beam (%)", |a| {
@@ -80,6 +82,31 @@ fn figure(value: Option<f64>, decimals: usize) -> String {
     number(value.unwrap_or(f64::NAN), decimals)
 }
 
+/// A layout in three sentences.
+pub(super) fn summary(analysis: &Analysis) -> String {
+    let of = |class| analysis.counts.get(&class).copied().unwrap_or(0);
+    let accuracy = analysis.accuracy.as_ref();
+    let reach = accuracy
+        .and_then(|a| a.per_axis_deg)
+        .map_or_else(String::new, |bound| {
+            format!(" A calibration from its own boards can reach {bound:.4}° per axis.")
+        });
+    format!(
+        "{}: of {} elements {} see, {} past the mirrors and {} by them; {} are lost, {} of those because an edge splits them. \
+         {} of {} facets serve an element, and all together cover {} % of all directions.{reach}",
+        analysis.name,
+        analysis.elements.len(),
+        analysis.seeing,
+        of(Class::Direct),
+        of(Class::Deflected) + of(Class::MultiBounce),
+        analysis.lost,
+        of(Class::Split),
+        analysis.facets.iter().filter(|f| f.elements > 0).count(),
+        analysis.facets.len(),
+        number(100.0 * analysis.field_of_regard, 3),
+    )
+}
+
 /// Every key figure, a column for each layout.
 pub(super) fn key_figures(layouts: &[Drawn]) -> (Vec<String>, Rows) {
     let mut headings = vec!["Figure".to_owned()];
@@ -110,7 +137,7 @@ pub(super) fn directions(drawn: &Drawn) -> (Headings, Rows) {
         "Elements",
         "Azimuth (°)",
         "Elevation (°)",
-        "Share of all directions (%)",
+        "Of 4π (%)",
         "Seen to, 10 % (m)",
         "white (m)",
     ];
@@ -142,6 +169,27 @@ pub(super) fn runs(drawn: &Drawn) -> (Headings, Rows) {
         "Width (°)",
     ];
     (headings, rows.collect())
+}
+
+/// Where each mirror stands.
+pub(super) fn places(drawn: &Drawn) -> (Headings, Rows) {
+    let row = |facet: &catoptric_sim::structure::BuiltFacet| {
+        let (middle, m) = (crate::layout::center(&facet.face.corners), facet.face.normal);
+        let mut row = vec![facet.name.clone()];
+        row.extend(middle.iter().map(|c| number(1e3 * c, 1)));
+        row.push(number(libm::atan2(m.y, m.x).to_degrees(), 2));
+        row.push(number(libm::atan2(m.z, libm::hypot(m.x, m.y)).to_degrees(), 2));
+        row
+    };
+    let headings = &[
+        "Facet",
+        "Center x (mm)",
+        "y (mm)",
+        "z (mm)",
+        "Normal's azimuth (°)",
+        "elevation (°)",
+    ];
+    (headings, drawn.drawing.facets.iter().map(row).collect())
 }
 
 /// Size, area, mass, and the spot.
