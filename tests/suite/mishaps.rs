@@ -6,7 +6,7 @@ use crate::scenes::{PROTOTYPE, TWO_MIRROR, scene};
 use catoptric::calib::{self, Method, Options};
 use catoptric::model::{Calibration, Dataset, PoseKind};
 use catoptric::score;
-use catoptric::sim::scene::{Interference, MocapProfile};
+use catoptric::sim::scene::{ErrorModel, Interference, MocapProfile};
 use catoptric::sim::{Laboratory, Scene};
 
 /// The first pose with a board before a facet.
@@ -201,4 +201,56 @@ fn outliers_cost_less_than_a_tenth() {
             );
         }
     }
+}
+
+/// A detector whose walk nobody believes in, with a pulse twice as long as usual: the calibration says that something is
+/// wrong, and does not where nothing is.
+#[test]
+fn a_walk_that_nobody_believes_in_fires_the_residual_test() {
+    let assessed = |model, pulse_fwhm_ns| {
+        let mut scene = scene(TWO_MIRROR);
+        scene.errors.model = model;
+        scene.detection.pulse_fwhm_ns = pulse_fwhm_ns;
+        scene.experiment.scans_per_pose = 20;
+        let assessment = calibrated(&scene, 1, Method::Joint).0.assessment;
+        assessment.expect("joint assesses itself")
+    };
+    let sound = assessed(ErrorModel::Empirical, 4.0);
+    assert!(sound.global_test.p_value > 1e-3, "{:?}", sound.global_test);
+    let wrong = assessed(ErrorModel::Both, 8.0);
+    assert!(wrong.global_test.p_value < 1e-6, "{:?}", wrong.global_test);
+    assert!(
+        wrong.verdict.contains("something acts that nobody believes in"),
+        "{}",
+        wrong.verdict
+    );
+}
+
+/// Boards that a calibration has not seen are where it says, give or take what it says.
+#[test]
+fn boards_left_out_are_predicted_as_well_as_stated() {
+    let options = Options {
+        cross_validation: true,
+        ..Options::default()
+    };
+    // Of four runs, since boards of one run share their errors.
+    let (mut found, mut expected) = (0.0, 0.0);
+    for seed in 1..=4 {
+        let laboratory = Laboratory::new(&scene(TWO_MIRROR), seed).expect("the scene is good");
+        let dataset = laboratory.dataset().expect("recorded");
+        let calibration = calib::calibrate(&dataset, Method::Joint, &options).expect("it calibrates");
+        let held_out = calibration
+            .assessment
+            .and_then(|a| a.held_out)
+            .expect("it was asked for");
+        let boards = dataset.of_kind(PoseKind::Facet).count();
+        assert!(
+            held_out.boards <= boards && held_out.boards + 2 >= boards,
+            "{held_out:?}"
+        );
+        found += held_out.rms_mm.powi(2);
+        expected += held_out.expected_mm.powi(2);
+    }
+    let ratio = f64::sqrt(found / expected);
+    assert!((0.7..1.35).contains(&ratio), "{ratio}");
 }

@@ -42,17 +42,68 @@ impl RangeGradient {
 /// ```
 #[doc(alias = "H")]
 pub fn analytic(deflection: &Deflection, beam_azimuth: f64, board: &BoardPlane) -> Option<RangeGradient> {
-    let v = deflection.exit_direction(beam_azimuth);
-    let s = board.distance_along(&deflection.deflection_point(beam_azimuth), &v)?;
-    let (sin_a, cos_a) = libm_sincos(beam_azimuth + deflection.azimuth);
-    let (sin_e, cos_e) = libm_sincos(deflection.elevation);
-    let closing = board.normal.dot(&v);
-    let turned = |dv: Vector3<f64>| -s * board.normal.dot(&dv) / closing;
-    Some(RangeGradient {
-        azimuth: turned(Vector3::new(-cos_e * sin_a, cos_e * cos_a, 0.0)),
-        elevation: turned(Vector3::new(-sin_e * cos_a, -sin_e * sin_a, cos_e)),
-        distance: 1.0 - board.normal.dot(&beam::direction(beam_azimuth)) / closing,
-    })
+    OutgoingRay::of(deflection, beam_azimuth).gradient(board)
+}
+
+/// A deflected beam with its derivatives, to be held against several boards.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OutgoingRay {
+    /// P_L1, in the sensor frame, in metres.
+    pub origin: Point3<f64>,
+    /// v.
+    pub direction: Unit<Vector3<f64>>,
+    /// u, the direction before the mirror, and d, in metres.
+    base: Unit<Vector3<f64>>,
+    distance: f64,
+    /// ∂v/∂θ_a and ∂v/∂φ.
+    by_azimuth: Vector3<f64>,
+    by_elevation: Vector3<f64>,
+}
+
+impl OutgoingRay {
+    /// The ray of a deflection.
+    pub fn of(deflection: &Deflection, beam_azimuth: f64) -> Self {
+        let base = beam::direction(beam_azimuth);
+        let (sin_a, cos_a) = libm_sincos(beam_azimuth + deflection.azimuth);
+        let (sin_e, cos_e) = libm_sincos(deflection.elevation);
+        Self {
+            origin: Point3::from(base.into_inner() * deflection.distance),
+            direction: Unit::new_unchecked(Vector3::new(cos_e * cos_a, cos_e * sin_a, sin_e)),
+            base,
+            distance: deflection.distance,
+            by_azimuth: Vector3::new(-cos_e * sin_a, cos_e * cos_a, 0.0),
+            by_elevation: Vector3::new(-sin_e * cos_a, -sin_e * sin_a, cos_e),
+        }
+    }
+
+    /// The range r to a board, Eq. (6), in metres; `None` if the ray does not meet its plane.
+    pub fn range(&self, board: &BoardPlane) -> Option<f64> {
+        Some(self.distance + board.distance_along(&self.origin, &self.direction)?)
+    }
+
+    /// That range and its row of H at once.
+    #[inline]
+    pub(crate) fn range_and_angles(&self, board: &BoardPlane) -> Option<(f64, Vector2<f64>)> {
+        let s = board.distance_along(&self.origin, &self.direction)?;
+        let by_s = -s / board.normal.dot(&self.direction);
+        let angles = Vector2::new(
+            by_s * board.normal.dot(&self.by_azimuth),
+            by_s * board.normal.dot(&self.by_elevation),
+        );
+        Some((self.distance + s, angles))
+    }
+
+    /// The derivatives of that range; `None` if the ray does not meet the plane.
+    pub fn gradient(&self, board: &BoardPlane) -> Option<RangeGradient> {
+        let s = board.distance_along(&self.origin, &self.direction)?;
+        let closing = board.normal.dot(&self.direction);
+        let turned = |dv: &Vector3<f64>| -s * board.normal.dot(dv) / closing;
+        Some(RangeGradient {
+            azimuth: turned(&self.by_azimuth),
+            elevation: turned(&self.by_elevation),
+            distance: 1.0 - board.normal.dot(&self.base) / closing,
+        })
+    }
 }
 
 /// The derivatives by central differences, Eq. (7), with [`DIFFERENCE_STEP`]; ∂r/∂d, which the paper does not

@@ -4,9 +4,10 @@
 //! return the truth itself and not a neighbor of it.
 
 use crate::jacobian;
+use crate::jacobian::OutgoingRay;
 use crate::observations::Observation;
-use crate::options::Options;
-use catoptric_model::{CorrectedRange, Deflection, RangeBias, beam, range};
+use crate::options::{JacobianForm, Options};
+use catoptric_model::{CorrectedRange, Deflection, RangeBias, beam};
 use nalgebra::{Matrix2, SymmetricEigen, Unit, Vector2, Vector3};
 
 /// Lever arm, in metres per radian, below which a direction counts as undetermined within the iteration.
@@ -85,46 +86,63 @@ impl Element<'_> {
             elevation,
             distance: self.distance.distance,
         };
+        if self.distance.thickness == 0.0 {
+            return bare;
+        }
         let distance = self
             .distance
             .to_mirror(self.azimuth, &bare.exit_direction(self.azimuth));
         Deflection { distance, ..bare }
     }
 
-    /// The boards linearized at an estimate; `None` if the ray misses one.
-    pub(crate) fn linearize(&self, at: &Deflection, options: &Options) -> Option<Vec<Row>> {
-        let v = at.exit_direction(self.azimuth);
-        self.observations
-            .iter()
-            .map(|o| {
-                let plane = &o.board.plane;
-                let gradient = jacobian::gradient(options.jacobian, at, self.azimuth, plane)?.angles();
-                let predicted = range::predict(at, self.azimuth, plane)?;
-                let bias = self
-                    .bias
-                    .terms(predicted, plane.cos_incidence(&v), o.board.color)
-                    .total();
-                Some(Row {
-                    gradient,
-                    predicted,
-                    bias,
-                })
+    /// The boards linearized at an estimate, one after the other; `None` for one that the ray misses.
+    pub(crate) fn linearized<'e>(
+        &'e self,
+        at: &'e Deflection,
+        options: &'e Options,
+    ) -> impl Iterator<Item = Option<Row>> + 'e {
+        let ray = OutgoingRay::of(at, self.azimuth);
+        self.observations.iter().map(move |o| {
+            let plane = &o.board.plane;
+            let (predicted, gradient) = match options.jacobian {
+                JacobianForm::Analytic => ray.range_and_angles(plane)?,
+                JacobianForm::CentralDifference => (
+                    ray.range(plane)?,
+                    jacobian::central(at, self.azimuth, plane)?.angles(),
+                ),
+            };
+            let bias = self
+                .bias
+                .terms(predicted, plane.cos_incidence(&ray.direction), o.board.color)
+                .total();
+            Some(Row {
+                gradient,
+                predicted,
+                bias,
             })
-            .collect()
+        })
+    }
+
+    /// The same, all of them or `None`.
+    pub(crate) fn linearize(&self, at: &Deflection, options: &Options) -> Option<Vec<Row>> {
+        let mut rows = Vec::with_capacity(self.observations.len());
+        for row in self.linearized(at, options) {
+            rows.push(row?);
+        }
+        Some(rows)
     }
 
     /// z − r̂ of each board at an estimate, with z corrected by Eq. (3), in metres; `None` if the ray misses one.
     pub fn residuals(&self, at: &Deflection) -> Option<Vec<f64>> {
-        let v = at.exit_direction(self.azimuth);
-        self.observations
-            .iter()
-            .map(|o| {
-                let predicted = range::predict(at, self.azimuth, &o.board.plane)?;
-                let cos_incidence = o.board.plane.cos_incidence(&v);
-                let CorrectedRange(z) = self.bias.correct(o.mean, predicted, cos_incidence, o.board.color);
-                Some(z - predicted)
-            })
-            .collect()
+        let ray = OutgoingRay::of(at, self.azimuth);
+        let mut residuals = Vec::with_capacity(self.observations.len());
+        for o in self.observations {
+            let predicted = ray.range(&o.board.plane)?;
+            let cos_incidence = o.board.plane.cos_incidence(&ray.direction);
+            let CorrectedRange(z) = self.bias.correct(o.mean, predicted, cos_incidence, o.board.color);
+            residuals.push(z - predicted);
+        }
+        Some(residuals)
     }
 
     /// A solution at an estimate, with the added azimuth within (−π, π].
@@ -149,7 +167,8 @@ pub fn batch(element: &Element, start: &Deflection, options: &Options) -> Option
     let mut at = element.place(start.azimuth, start.elevation);
     for iteration in 1..=options.max_iterations {
         let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
-        for (row, o) in element.linearize(&at, options)?.iter().zip(element.observations) {
+        for (row, o) in element.linearized(&at, options).zip(element.observations) {
+            let row = row?;
             let weight = o.board.count as f64;
             normal += row.gradient * row.gradient.transpose() * weight;
             right += row.gradient * (weight * (o.mean.0 - row.bias - row.predicted));
@@ -170,6 +189,19 @@ pub(crate) fn determined_step(
     right: &Vector2<f64>,
     cos_elevation: f64,
 ) -> Vector2<f64> {
+    // Both levers are long enough if the shorter squared, at least det/trace, is: nothing then needs to be taken apart.
+    let tangent = Matrix2::new(
+        normal[(0, 0)] / (cos_elevation * cos_elevation),
+        normal[(0, 1)] / cos_elevation,
+        normal[(1, 0)] / cos_elevation,
+        normal[(1, 1)],
+    );
+    let determinant = tangent.determinant();
+    if determinant > SHORTEST_LEVER * SHORTEST_LEVER * tangent.trace()
+        && let Some(inverse) = normal.try_inverse()
+    {
+        return (inverse * right).cap_magnitude(LONGEST_STEP);
+    }
     let (values, vectors) = levers(normal, cos_elevation);
     // In the tangent plane (cos φ·δθ, δφ) both components are angles on the sphere.
     let scale = Vector2::new(1.0 / cos_elevation, 1.0);

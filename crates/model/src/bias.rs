@@ -22,6 +22,7 @@ pub struct BiasTerms {
 
 impl BiasTerms {
     /// E_a + E_c + E_r.
+    #[inline]
     pub fn total(&self) -> f64 {
         self.distance + self.angle + self.color
     }
@@ -92,6 +93,7 @@ pub struct ColorBias {
 /// Weights of a table's nodes in the value interpolated linearly at `x`, held constant outside the table.
 ///
 /// At most two nodes, as (index, weight); all weights are 0 for an empty table. `nodes` must increase strictly.
+#[inline]
 pub fn interpolation_weights(nodes: &[f64], x: f64) -> [(usize, f64); 2] {
     let n = nodes.len();
     if n == 0 {
@@ -120,6 +122,7 @@ impl DistanceBias {
     /// Weight of each table node in the interpolated value: (index, weight) of at most two nodes.
     ///
     /// The derivative of E_r with respect to its nodes, which an error budget needs.
+    #[inline]
     pub fn weights(&self, range: f64) -> [(usize, f64); 2] {
         interpolation_weights(&self.range_m, range)
     }
@@ -128,6 +131,7 @@ impl DistanceBias {
     ///
     /// Unlike the paper, which fits a line that misses its own Table 2 by up to 5 mm, this is the table itself.
     #[doc(alias = "E_r")]
+    #[inline]
     pub fn error(&self, range: f64) -> f64 {
         self.weights(range)
             .iter()
@@ -142,6 +146,7 @@ impl AngleBias {
     /// Takes cos θ_N, `0 ≤ cos θ_N ≤ 1`. Unlike the paper, whose law misses its own Table 3 by up to 8 mm, this adds
     /// a table where one is given.
     #[doc(alias = "E_a")]
+    #[inline]
     pub fn error(&self, cos_incidence: f64) -> f64 {
         let law = (self.gain_mm * cos_incidence + self.offset_mm) * 1e-3;
         self.table
@@ -152,6 +157,7 @@ impl AngleBias {
 
 impl AngleTable {
     /// The table's value under an incidence given by its cosine, in metres; a cosine beyond ±1 by rounding is 1.
+    #[inline]
     pub fn error(&self, cos_incidence: f64) -> f64 {
         let incidence = libm::acos(cos_incidence.clamp(-1.0, 1.0)).to_degrees();
         interpolate(&self.incidence_deg, &self.error_mm, incidence) * 1e-3
@@ -161,6 +167,7 @@ impl AngleTable {
 impl ColorBias {
     /// Range error caused by the target's color, in metres: E_c = A_c·R + B_c — Eq. (5).
     #[doc(alias = "E_c")]
+    #[inline]
     pub fn error(&self, range: f64) -> f64 {
         (self.slope_mm_per_m * range + self.offset_mm) * 1e-3
     }
@@ -168,6 +175,7 @@ impl ColorBias {
 
 impl RangeBias {
     /// The three terms for a target at `range` metres under a given incidence and color.
+    #[inline]
     pub fn terms(&self, range: f64, cos_incidence: f64, color: &str) -> BiasTerms {
         BiasTerms {
             distance: self.distance.error(range),
@@ -180,6 +188,7 @@ impl RangeBias {
     ///
     /// `range` and `cos_incidence` describe the target as it is believed to be; the errors vary slowly enough that
     /// a range good to centimetres is good to micrometres here.
+    #[inline]
     pub fn correct(&self, raw: RawRange, range: f64, cos_incidence: f64, color: &str) -> CorrectedRange {
         CorrectedRange(raw.0 - self.terms(range, cos_incidence, color).total())
     }

@@ -43,6 +43,7 @@ impl BoardPlane {
     }
 
     /// Distance along a ray to the plane: s = n·(c − p)/(n·v). `None` if the ray runs along the plane or away.
+    #[inline]
     pub fn distance_along(&self, origin: &Point3<f64>, direction: &Unit<Vector3<f64>>) -> Option<f64> {
         let closing = self.normal.dot(direction);
         let s = self.normal.dot(&(self.point - origin)) / closing;
@@ -51,6 +52,7 @@ impl BoardPlane {
 
     /// Cosine of the incidence θ_N between the board's normal and a ray, `0 ≤ cos θ_N ≤ 1`.
     #[doc(alias = "theta_N")]
+    #[inline]
     pub fn cos_incidence(&self, direction: &Unit<Vector3<f64>>) -> f64 {
         self.normal.dot(direction).abs().min(1.0)
     }

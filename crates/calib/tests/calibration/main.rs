@@ -3,6 +3,7 @@
 //! That is the "inverse crime", committed on purpose: it proves that the estimator inverts what it believes and that
 //! its covariances are honest under its own beliefs. It does not prove that the beliefs describe a scanner.
 
+mod basin;
 mod closure;
 mod consistency;
 mod degenerate;
