@@ -3,6 +3,9 @@
 use crate::observations::BoardView;
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
+/// Part of the longest distance of a marker from the middle of all at which one gives a direction.
+const LONG_ENOUGH: f64 = 0.3;
+
 /// Variance of a tracked plane's height at a point of it, in square metres: σ²·aᵀ(Σ a_i a_iᵀ)⁻¹a, a = (1, x, y).
 pub(super) fn plane_variance(
     markers: &[Point3<f64>],
@@ -31,15 +34,21 @@ impl PlaneFit {
     pub(crate) fn new(markers: &[Point3<f64>], normal: &Unit<Vector3<f64>>) -> Self {
         let count = markers.len().max(1) as f64;
         let centroid = markers.iter().map(|m| m.coords).sum::<Vector3<f64>>() / count;
-        let across = Vector3::x() - normal.into_inner() * normal.x;
-        let other = Vector3::y() - normal.into_inner() * normal.y;
-        // Whichever axis is farther from the normal gives a first direction in the plane.
-        let first = if across.norm() > other.norm() {
-            across
-        } else {
-            other
-        }
-        .normalize();
+        // A direction that goes with the board: however the sensor is turned, an error of it stays the same error.
+        let on_plane = |v: Vector3<f64>| v - normal.into_inner() * normal.dot(&v);
+        let spokes = || markers.iter().map(|m| on_plane(m.coords - centroid));
+        let longest = spokes().map(|s| s.norm()).fold(0.0, f64::max);
+        let first = spokes()
+            .find(|s| longest > 0.0 && s.norm() > LONG_ENOUGH * longest)
+            .unwrap_or_else(|| {
+                let (across, other) = (on_plane(Vector3::x()), on_plane(Vector3::y()));
+                if across.norm() > other.norm() {
+                    across
+                } else {
+                    other
+                }
+            })
+            .normalize();
         let offset_only = Matrix3::from_diagonal(&Vector3::new(1.0 / count, 0.0, 0.0));
         let mut fit = Self {
             centroid,
@@ -76,11 +85,11 @@ impl PlaneFit {
         Vector3::new(1.0, self.axes[0].dot(&p), self.axes[1].dot(&p))
     }
 
-    /// Three combinations of a's coefficients whose errors have unit variance for markers of unit variance: a square
-    /// root of the cofactor, column by column.
+    /// Three combinations of a's coefficients whose errors have unit variance for markers of unit variance: the symmetric
+    /// square root of the cofactor, the one that does not jump where eigenvectors do.
     pub(crate) fn errors(&self) -> Matrix3<f64> {
         let root = self.cofactor.symmetric_eigen();
         let scale = root.eigenvalues.map(|v| v.max(0.0).sqrt());
-        root.eigenvectors * Matrix3::from_diagonal(&scale)
+        root.eigenvectors * Matrix3::from_diagonal(&scale) * root.eigenvectors.transpose()
     }
 }
