@@ -1,105 +1,75 @@
-"""The least calibrator of one's own: reads a dataset folder, solves every beam by itself, writes calibration.json.
-
-    pip install -r tests/requirements.txt
-    python examples/python/calibrate.py DATASET calibration.json
-
-It takes the sensor to sit where the drawing puts it, and adds what that may be off by to its covariance. Colors (E_c) are left out: the boards here are white.
-"""
-
-import json, sys, tomllib
-from pathlib import Path
+"""A calibrator of one's own, whole: calibrate.py DATASET calibration.json. White boards; E_a by its law; see chapter 9."""
+import json, os, subprocess, sys, tomllib
 import numpy as np
-from mcap.reader import make_reader
-from mcap_ros2.decoder import DecoderFactory
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
-def turn(q):  # rotation matrix of a quaternion (x, y, z, w)
-    x, y, z, w = q
-    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + 2 * w * k + 2 * k @ k
+folder, out = sys.argv[1:]
+subprocess.run([os.getenv("CATOPTRIC", "catoptric"), "export", folder, "--format", "csv", "--out", out + ".csv"], check=True)
+rows = np.genfromtxt(out + ".csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+session = tomllib.load(open(folder + "/session.toml", "rb"))
+believed, bare, drawn, bias = session["believed"], session["bare_structure"], session["nominal_rig_from_sensor"], session["believed"]["bias"]
+white, drift, marker = (np.maximum(1e-3 * believed[f"{name}_sd_mm"], 1e-5) for name in ("range_noise", "drift", "marker"))
+rows = rows[rows["sd_m"] < 2.5 * white + 1e-3]  # the others read two surfaces at once, or what passed by
+noise = lambda r: np.hypot(white / np.sqrt(r["readings"]), 3e-4)  # of a mean; readings come in whole millimetres
+ray = lambda azimuth, elevation: np.stack([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation) + 0 * azimuth], -1)
+xyz = lambda r, name: np.stack([r[name.replace("*", axis)] for axis in "xyz"], -1)
 
-def spherical(azimuth, elevation):
-    return np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+def board(r, mount):  # centers and normals in a sensor moved by three shifts and three turns from where it is drawn
+    turn = Rotation.from_quat(drawn["rotation_xyzw"])
+    back = (turn * Rotation.from_rotvec(mount[3:])).inv()
+    return back.apply(xyz(r, "rig_center_*_m") - drawn["translation_m"] - turn.apply(mount[:3])), back.apply(xyz(r, "rig_normal_*"))
 
-folder, out = Path(sys.argv[1]), Path(sys.argv[2])
-session = tomllib.loads((folder / "session.toml").read_text())
-believed, bare = session["believed"], session["bare_structure"]
-mount = session["nominal_rig_from_sensor"]
+def reading(r, mount, u, d, v):  # what beams read that go d along u and then along v, and |cos| of their incidence
+    center, normal = board(r, mount)
+    closing = (normal * v).sum(-1)
+    path = d + (normal * (center - d * u)).sum(-1) / closing
+    error = np.interp(path, bias["distance"]["range_m"] or [1], bias["distance"]["error_mm"] or [0])
+    return path + 1e-3 * (error + bias["angle"]["gain_mm"] * abs(closing) + bias["angle"]["offset_mm"]), abs(closing)
 
-stretches = []  # label, scans, and the first pose of every body, in the order of the recording
-with (folder / "observations.mcap").open("rb") as file:
-    decoders = DecoderFactory()
-    for schema, channel, message in make_reader(file).iter_messages():
-        if channel.topic == "/session/pose":
-            stretches.append((json.loads(message.data), [], {}))
-        elif channel.topic == "/scan" or channel.topic.startswith("/mocap/") and channel.topic != "/mocap/markers":
-            data = decoders.decoder_for(channel.message_encoding, schema)(message.data)
-            label, scans, poses = stretches[-1]
-            if channel.topic == "/scan":
-                scans.append(np.array(data.ranges))
-            else:
-                poses.setdefault(channel.topic[7:], data.pose)
+# Where the sensor sits: boards before undeflected beams, each with a drift of its own; what stands out hardly counts.
+direct, faced = rows[rows["kind"] == "direct"], rows[rows["kind"] == "facet"]
+_, pose = np.unique(direct["pose"], return_inverse=True)
+tolerance = session["mount_tolerance"]
+sd = np.concatenate([1e-3 * np.array(tolerance["translation_sd_mm"]), np.radians(tolerance["rotation_sd_deg"]), np.full(pose.max() + 1, np.hypot(drift, marker))])
+u = ray(direct["azimuth_rad"], 0)
+seen = lambda x: (direct["mean_m"] - reading(direct, sd[:6] * x[:6], u, 0, u)[0] - (sd * x)[6:][pose]) / noise(direct)
+placed = least_squares(lambda x: np.concatenate([seen(x), x]), np.zeros(len(sd)), loss="soft_l1")
+mount, mount_covariance = sd[:6] * placed.x[:6], (np.linalg.inv(placed.jac.T @ placed.jac) * np.outer(sd, sd))[:6, :6]
 
-boards = []  # facet, beams, center and normal in the sensor frame, mean range and readings of every beam
-for label, scans, poses in (s for s in stretches if s[0]["kind"] == "facet"):
-    def of(body):
-        p, q = poses[body].position, poses[body].orientation
-        return turn((q.x, q.y, q.z, q.w)), np.array([p.x, p.y, p.z])
-    (rig, at), (board, center) = of("rig"), of(label["board"])
-    back = (rig @ turn(mount["rotation_xyzw"])).T
-    center = back @ (center - at - rig @ mount["translation_m"])
-    ranges = np.where(np.isfinite(scans), scans, np.nan)
-    count = np.isfinite(ranges).sum(axis=0)
-    mean = np.where(count > 0, np.nansum(ranges, axis=0) / np.maximum(count, 1), np.nan)
-    boards.append((label["facet"], label["beams"], center, back @ board[:, 2], mean, count))
+def solve(beam):
+    r = faced[faced["beam"] == beam]
+    r = r[~np.isnan(r["bare_distance_m"])]
+    if len(r) < 3:
+        return {"beam": beam, "status": "too_few_poses", "reason": f"{len(r)} boards, 3 are needed"}
+    u, deep = ray(r["azimuth_rad"][0], 0), r["bare_distance_m"][0]
+    depth = lambda v: deep - 1e-3 * bare["mirror_thickness_mm"] / np.sqrt((1 - u @ v) / 2)  # the mirror halves u and v
+    center, normal = board(r, mount)
+    slope = normal / (normal * (center - deep * u)).sum(-1)[:, None]  # closed form: slope · v = 1/s
+    v = np.linalg.lstsq(slope, 1 / (r["mean_m"] - deep), rcond=None)[0]
+    x = np.array([np.arctan2(v[1], v[0]), np.arctan2(v[2], np.hypot(v[0], v[1]))])
+    rest = lambda x, mount, e=0: r["mean_m"] - reading(r, mount, u, depth(ray(*x)) + e, ray(*x))[0]
+    cosine = reading(r, mount, u, deep, ray(*x))[1]
+    shared = [1e-3 * np.full(len(r), believed["distance_bias_sd_mm"]), 1e-3 * believed["angle_gain_sd_mm"] * (1 - cosine),
+              rest(x, mount, 1e-3 * bare["distance_sd_mm"]) - rest(x, mount)]
+    whole = np.diag(noise(r) ** 2 + drift**2 + marker**2) + sum(np.outer(s, s) for s in shared)
+    weight = np.linalg.inv(np.linalg.cholesky(whole))
+    fit = least_squares(lambda x: weight @ rest(x, mount), x, method="lm")
+    x, sharp = fit.x, np.linalg.svd(fit.jac / [np.cos(fit.x[1]), 1], compute_uv=False)[-1]
+    rms = np.sqrt(np.mean(rest(x, mount) ** 2))
+    if sharp < 1 / np.radians(0.5):
+        return {"beam": beam, "status": "unobservable", "reason": "the boards leave a direction open by more than half a degree"}
+    if rms > 0.01:
+        return {"beam": beam, "status": "rejected", "reason": f"residuals of {1e3 * rms:.0f} mm"}
+    step = 1e-6 * np.eye(6)
+    carried = np.linalg.pinv(fit.jac) @ weight @ np.stack([(rest(x, mount + h) - rest(x, mount)) / 1e-6 for h in step], -1)
+    covariance = np.linalg.inv(fit.jac.T @ fit.jac) + carried @ mount_covariance @ carried.T
+    relative = (x[0] - r["azimuth_rad"][0] + np.pi) % (2 * np.pi) - np.pi
+    return {"beam": beam, "status": "solved", "facet": str(r["facet"][0]), "azimuth_rad": relative, "elevation_rad": x[1],
+            "distance_m": depth(ray(*x)), "covariance_rad2": covariance.tolist(), "poses": len(r), "rms_residual_m": rms}
 
-def solve(beam, facet, mirror):
-    """The entry of a beam that the drawing sends to a facet."""
-    fail = lambda status, reason: {"beam": beam, "status": status, "reason": reason}
-    azimuth = np.radians((beam - (session["scanner"]["beams"] - 1) / 2) * session["scanner"]["step_deg"])
-    u = spherical(azimuth, 0)
-    d = bare["distance_m"][beam - bare["first_beam"]] - 1e-3 * bare["mirror_thickness_mm"] / abs(u @ mirror)
-    v = u - 2 * (u @ mirror) * mirror
-    x = np.array([np.arctan2(v[1], v[0]), np.arcsin(v[2])])  # azimuth in the sensor frame, elevation
-    mine = [b for b in boards if b[0] == facet and b[1][0] <= beam <= b[1][1] and b[5][beam] > 0]
-    if len(mine) < 3:
-        return fail("too_few_poses", f"{len(mine)} boards, 3 are needed")
-    for _ in range(20):
-        v = spherical(*x)
-        dv = np.stack([spherical(x[0] + np.pi / 2, 0) * np.cos(x[1]), spherical(x[0], x[1] + np.pi / 2)], axis=1)
-        rows, rest, variance = [], [], []
-        for _, _, center, normal, mean, count in mine:
-            closing = normal @ v
-            s = normal @ (center - d * u) / closing
-            table = believed["bias"]["distance"]  # an empty one means no error
-            e_r = np.interp(mean[beam], table["range_m"] or [1], table["error_mm"] or [0])
-            e_a = believed["bias"]["angle"]["gain_mm"] * abs(closing) + believed["bias"]["angle"]["offset_mm"]
-            rest.append(mean[beam] - 1e-3 * (e_r + e_a) - d - s)
-            rows.append(-s / closing * (normal @ dv))
-            variance.append((believed["range_noise_sd_mm"] ** 2 / count[beam] + believed["drift_sd_mm"] ** 2) * 1e-6)
-        h, rest = np.array(rows), np.array(rest)
-        if np.linalg.svd(h, compute_uv=False)[-1] < 0.03:  # a millimetre is 2° there
-            return fail("unobservable", "the boards are tilted along one direction, or face-on")
-        step = np.linalg.lstsq(h, rest, rcond=None)[0]
-        x = x + np.clip(step, -0.2, 0.2)
-    rms = np.sqrt(np.mean(rest**2))
-    if not np.abs(step).max() < 1e-9 or rms > 0.015:
-        return fail("rejected", f"residuals of {1e3 * rms:.1f} mm over {len(mine)} boards")
-    gain = np.linalg.pinv(h)
-    tilt = np.radians(max(session["mount_tolerance"]["rotation_sd_deg"])) ** 2
-    covariance = gain @ np.diag(variance) @ gain.T + tilt * np.diag([1 / np.cos(x[1]) ** 2, 1])
-    relative = (x[0] - azimuth + np.pi) % (2 * np.pi) - np.pi  # azimuth_rad is counted from the bare beam
-    return {"beam": beam, "status": "solved", "facet": facet, "azimuth_rad": relative, "elevation_rad": x[1],
-            "distance_m": d, "covariance_rad2": covariance.tolist(), "poses": len(mine), "rms_residual_m": rms}
-
-beams = {}
-for facet in session["facets"]:
-    first, last = facet["beams"]
-    corners = np.array(facet["corners_mm"])
-    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-    for beam in range(max(first - 12, 0), min(last + 13, session["scanner"]["beams"])):
-        if first <= beam <= last:
-            beams[beam] = solve(beam, facet["name"], normal / np.linalg.norm(normal))
-        else:  # mirrors stand a degree or two off the drawing, so beams beside it may be deflected
-            beams.setdefault(beam, {"beam": beam, "status": "rejected", "reason": "beside a mirror as drawn"})
-everything = [beams.get(b, {"beam": b, "status": "direct"}) for b in range(session["scanner"]["beams"])]
-out.write_text(json.dumps({"schema_version": 1, "method": "own", "frame": "sensor", "beams": everything}))
+served = {b for f in session["facets"] for b in range(f["beams"][0], f["beams"][1] + 1)}
+beside = {b + k for b in served for k in range(-12, 13)}
+beams = [solve(b) if b in served else {"beam": b, "status": "rejected", "reason": "beside a mirror as drawn"} if b in beside
+         else {"beam": b, "status": "direct"} for b in range(session["scanner"]["beams"])]
+json.dump({"schema_version": 1, "method": "own", "frame": "sensor", "beams": beams}, open(out, "w"))
