@@ -3,20 +3,27 @@
 //! A row holds what was read of a board and where the board stood, in the rig and in the sensor as drawn. Nothing is
 //! corrected, chosen or left out: the statistics are over all readings that are ranges.
 
-use catoptric_calib::observations::azimuth;
+use catoptric_calib::observations::{BoardInSensor, azimuth};
+use catoptric_model::beam::direction;
 use catoptric_model::{Dataset, Pose, PoseKind, PoseRecord};
-use nalgebra::Vector3;
+use nalgebra::{Point3, Unit, Vector3};
+
+/// Beams beyond the first and last that a board in a fan was set up for that have rows too: mirrors stand a degree or
+/// two off the drawing.
+pub const BESIDE: usize = 12;
 
 /// Columns that say what was read, in front of those of [`FRAMES`].
-const READ: [&str; 12] = [
+const READ: [&str; 14] = [
     "kind",
     "pose",
     "board",
     "color",
     "facet",
     "beam",
+    "set_up_for",
     "azimuth_rad",
     "bare_distance_m",
+    "inside_edge_m",
     "readings",
     "missing",
     "mean_m",
@@ -29,8 +36,8 @@ const FRAMES: [&str; 2] = ["rig", "drawn"];
 /// The boards of a dataset as CSV, in the order of the recording; numbers are written so that they are read back to
 /// the bit.
 ///
-/// The rows of a board are the beams that it was set up for, all of them where its label names none. Stretches without
-/// a board have no rows.
+/// The rows of a board are the beams that it was set up for, all of them where its label names none, and in the fan of
+/// a facet [`BESIDE`] more on either side. Stretches without a board have no rows.
 ///
 /// ```
 /// use catoptric::{export, sim};
@@ -40,7 +47,7 @@ const FRAMES: [&str; 2] = ["rig", "drawn"];
 /// scene.scanner.sub_rays = 1;
 /// let dataset = sim::Laboratory::new(&scene, 1)?.dataset()?;
 /// let table = String::from_utf8(export::board_table(&dataset)?)?;
-/// assert!(table.starts_with("kind,pose,board,color,facet,beam,azimuth_rad,"));
+/// assert!(table.starts_with("kind,pose,board,color,facet,beam,set_up_for,"));
 /// # Ok(())
 /// # }
 /// ```
@@ -75,40 +82,47 @@ fn write_board(
     record: &PoseRecord,
 ) -> Result<(), csv::Error> {
     let (session, label) = (&dataset.session, &record.label);
-    let Some(room_from_board) = record.room_from_board else {
+    let drawn = Pose::from(&session.nominal_rig_from_sensor);
+    let (Some(room_from_board), Some(board)) =
+        (record.room_from_board, BoardInSensor::of(record, session, &drawn))
+    else {
         return Ok(());
     };
     let rig_from_board = record.room_from_rig.inverse() * room_from_board;
-    let drawn_from_board = Pose::from(&session.nominal_rig_from_sensor).inverse() * rig_from_board;
+    let drawn_from_board = drawn.inverse() * rig_from_board;
     let place = [rig_from_board, drawn_from_board]
         .map(|p| in_numbers(&p))
         .concat();
-    let sheet = label.board.as_deref().and_then(|name| session.board(name));
-    let color = label.color.as_deref().or(sheet.map(|b| b.color.as_str()));
-    let kind = match label.kind {
-        PoseKind::Facet => "facet",
-        _ => "direct",
+    let (kind, beside) = match label.kind {
+        PoseKind::Facet => ("facet", BESIDE),
+        _ => ("direct", 0),
     };
     let last_beam = session.scanner.beams.saturating_sub(1);
     let [first, last] = label.beams.unwrap_or([0, last_beam]);
+    let rows = first.saturating_sub(beside)..=last.saturating_add(beside).min(last_beam);
     let summaries = record.summarize();
     for (beam, read) in summaries
         .iter()
         .enumerate()
-        .take(last.min(last_beam) + 1)
-        .skip(first)
+        .filter(|(beam, _)| rows.contains(beam))
     {
+        let inside = match label.kind {
+            PoseKind::Direct => inside_edge(&board, &direction(azimuth(session, beam))),
+            _ => None,
+        };
         let mean = (read.count > 0).then_some(read.mean);
         let sd = (read.count > 1).then_some(read.sd);
         let row = [
             kind.to_owned(),
             label.pose.to_string(),
             label.board.clone().unwrap_or_default(),
-            color.unwrap_or_default().to_owned(),
+            board.color.clone(),
             label.facet.clone().unwrap_or_default(),
             beam.to_string(),
+            u8::from((first..=last).contains(&beam)).to_string(),
             azimuth(session, beam).to_string(),
             or_empty(session.bare_structure.distance(beam)),
+            or_empty(inside),
             read.count.to_string(),
             read.missing.to_string(),
             or_empty(mean),
@@ -117,6 +131,14 @@ fn write_board(
         writer.write_record(row.iter().chain(&place))?;
     }
     Ok(())
+}
+
+/// How far inside the nearest edge of a board a beam from the origin meets it, in metres, negative off the board; `None`
+/// where it does not meet the board's plane.
+fn inside_edge(board: &BoardInSensor, direction: &Unit<Vector3<f64>>) -> Option<f64> {
+    let at = board.hit(&Point3::origin(), direction)?.in_board;
+    let half = [0.5 * board.outline.width, 0.5 * board.outline.height];
+    Some((half[0] - at.x.abs()).min(half[1] - at.y.abs()))
 }
 
 /// Center of a board's face, its normal, and its x axis.

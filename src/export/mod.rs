@@ -30,7 +30,7 @@ mod stl;
 mod table;
 mod urdf;
 
-pub use boards::{board_table, has_rows};
+pub use boards::{BESIDE, board_table, has_rows};
 pub use frame::shaded_by_frame;
 pub use glb::glb;
 pub use solid::Solid;
