@@ -9,72 +9,62 @@ program = os.getenv("CATOPTRIC", "catoptric")
 subprocess.run([program, "export", folder, "--format", "csv", "--out", out + ".csv"], check=True)
 rows = np.genfromtxt(out + ".csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
 session = tomllib.load(open(folder + "/session.toml", "rb"))
-believed, bare, drawn, loose = (session[k] for k in ("believed", "bare_structure", "nominal_rig_from_sensor", "mount_tolerance"))
+believed, bare, drawn = session["believed"], session["bare_structure"], session["nominal_rig_from_sensor"]
+loose = session["mount_tolerance"]
 white, drift, marker = (max(1e-3 * believed[k + "_sd_mm"], 1e-5) for k in ("range_noise", "drift", "marker"))
-served = {b for f in session["facets"] for b in range(f["beams"][0], f["beams"][1] + 1)}
-beside = {b + k for b in served for k in range(-12, 13)}
 rows = rows[rows["sd_m"] < 2.5 * white + 1e-3]  # the others read two surfaces in turn
-noise = lambda r: np.hypot(white / np.sqrt(r["readings"]), 3e-4)  # of a mean, in whole millimetres
-dot = lambda a, b: (a * b).sum(-1)
-xyz = lambda r, name: np.stack([r[name.replace("*", axis)] for axis in "xyz"], -1)
+noise = lambda r: np.hypot(white / np.sqrt(r["readings"]), 3e-4)  # of a mean of whole millimetres
 ray = lambda a, e: np.stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e) + 0 * a], -1)
+served = {b for f in session["facets"] for b in range(f["beams"][0], f["beams"][1] + 1)}
+beside = {b + k for b in served for k in range(-12, 13)}  # mirrors stand off the drawing
 
-def board(r, mount):  # in a sensor that is shifted and turned by `mount` from where it is drawn: centers, normals
+def reading(r, mount, u, d, v):  # of beams d along u and then along v, the sensor shifted and turned by `mount`; |cos|
     turn = Rotation.from_quat(drawn["rotation_xyzw"])
-    back = (turn * Rotation.from_rotvec(mount[3:])).inv()
-    at = drawn["translation_m"] + turn.apply(mount[:3])
-    return back.apply(xyz(r, "rig_center_*_m") - at), back.apply(xyz(r, "rig_normal_*"))
+    back, at = (turn * Rotation.from_rotvec(mount[3:])).inv(), drawn["translation_m"] + turn.apply(mount[:3])
+    center = back.apply(np.stack([r[f"rig_center_{k}_m"] for k in "xyz"], -1) - at) - d * u
+    normal = back.apply(np.stack([r[f"rig_normal_{k}"] for k in "xyz"], -1))
+    toward, closing, bias = (normal * center).sum(-1), (normal * v).sum(-1), believed["bias"]
+    path = d + toward / closing
+    e_r = np.interp(path, bias["distance"]["range_m"] or [1], bias["distance"]["error_mm"] or [0])
+    e_a = bias["angle"]["gain_mm"] * abs(closing) + bias["angle"]["offset_mm"]
+    return path + 1e-3 * (e_r + e_a), normal / toward[:, None], abs(closing)
 
-def reading(r, mount, u, d, v):  # of beams that go d along u, then along v; and |cos| of their incidence
-    center, normal = board(r, mount)
-    path, cosine = d + dot(normal, center - d * u) / dot(normal, v), abs(dot(normal, v))
-    by_range, by_angle = believed["bias"]["distance"], believed["bias"]["angle"]
-    e_r = np.interp(path, by_range["range_m"] or [1], by_range["error_mm"] or [0])
-    return path + 1e-3 * (e_r + by_angle["gain_mm"] * cosine + by_angle["offset_mm"]), cosine
-
-# Where the sensor sits: boards before undeflected beams, each with a drift of its own.
-r = rows[(rows["kind"] == "direct") & ~np.isin(rows["beam"], list(beside))]
-u, center, normal, along = ray(r["azimuth_rad"], 0), *(xyz(r, "drawn_" + k) for k in ("center_*_m", "normal_*", "along_*"))
-hit = u * (dot(normal, center) / dot(normal, u))[:, None] - center
-half = np.array([[5e-4 * b["width_mm"], 5e-4 * b["height_mm"]] for n in r["board"] for b in session["boards"] if b["name"] == n])
-on_it = (abs(np.stack([dot(hit, along), dot(hit, np.cross(normal, along))], -1)) < half - 0.05).all(-1) & (dot(hit + center, u) > 0)
-r, u = r[on_it], u[on_it]
-_, pose = np.unique(r["pose"], return_inverse=True)
-sd = np.concatenate([1e-3 * np.array(loose["translation_sd_mm"]), np.radians(loose["rotation_sd_deg"]), np.full(pose.max() + 1, np.hypot(drift, marker))])
-rest = lambda x: (r["mean_m"] - reading(r, sd[:6] * x[:6], u, 0, u)[0] - (sd[6:] * x[6:])[pose]) / noise(r)
-fit = least_squares(lambda x: np.concatenate([rest(x), x]), np.zeros(len(sd)), loss="soft_l1", max_nfev=50)
+# Where the sensor sits: undeflected beams on boards, each board with a drift of its own.
+near = rows[(rows["inside_edge_m"] > 0.05) & ~np.isin(rows["beam"], list(beside))]
+u, pose = ray(near["azimuth_rad"], 0), np.unique(near["pose"], return_inverse=True)[1]
+sd = np.array([*(1e-3 * np.array(loose["translation_sd_mm"])), *np.radians(loose["rotation_sd_deg"]),
+               *np.full(pose.max() + 1, np.hypot(drift, marker))])
+rest = lambda x: (near["mean_m"] - reading(near, sd[:6] * x[:6], u, 0, u)[0] - (sd[6:] * x[6:])[pose]) / noise(near)
+fit = least_squares(lambda x: np.append(rest(x), x), np.zeros(len(sd)), loss="soft_l1")
 mount, mount_covariance = sd[:6] * fit.x[:6], (np.linalg.inv(fit.jac.T @ fit.jac) * np.outer(sd, sd))[:6, :6]
 
-def solve(beam, fail=lambda beam, status, reason: {"beam": beam, "status": status, "reason": reason}):
-    r = rows[(rows["kind"] == "facet") & (rows["beam"] == beam)]
-    r = r[(r["set_up_for"] == 1) & np.isfinite(r["bare_distance_m"])]
+def solve(beam):
+    r = rows[(rows["kind"] == "facet") & (rows["beam"] == beam) & (rows["set_up_for"] == 1)]
+    r = r[r["bare_distance_m"] > 0]
     if len(r) < 3:
-        return fail(beam, "too_few_poses", f"{len(r)} boards, 3 are needed")
-    base, deep = r["azimuth_rad"][0], r["bare_distance_m"][0]
-    u, (center, normal) = ray(base, 0), board(r, mount)
+        return {"status": "too_few_poses", "reason": f"{len(r)} boards, 3 are needed"}
+    base, deep, u = r["azimuth_rad"][0], r["bare_distance_m"][0], ray(r["azimuth_rad"][0], 0)
     depth = lambda v: deep - 1e-3 * bare["mirror_thickness_mm"] / np.sqrt((1 - u @ v) / 2)  # a mirror halves u and v
-    rest = lambda x, mount, e=0: r["mean_m"] - reading(r, mount, u, depth(ray(*x)) + e, ray(*x))[0]
-    # Closed form: 1/s = (n / n·(c - d·u)) · v is linear in v.
-    v = np.linalg.lstsq(normal / dot(normal, center - deep * u)[:, None], 1 / (r["mean_m"] - deep), rcond=None)[0]
+    rest = lambda x, m=mount, e=0: r["mean_m"] - reading(r, m, u, depth(ray(*x)) + e, ray(*x))[0]
+    v = np.linalg.lstsq(reading(r, mount, u, deep, u)[1], 1 / (r["mean_m"] - deep), rcond=None)[0]  # 1/s is linear in v
     x = np.array([np.arctan2(v[1], v[0]), np.arctan2(v[2], np.hypot(v[0], v[1]))])
-    shared = [1e-3 * np.full(len(r), believed["distance_bias_sd_mm"]),  # what all boards of a beam have in common
-              1e-3 * believed["angle_gain_sd_mm"] * (1 - reading(r, mount, u, deep, ray(*x))[1]),
-              rest(x, mount, 1e-3 * bare["distance_sd_mm"]) - rest(x, mount)]
+    shared = [np.full(len(r), 1e-3 * believed["distance_bias_sd_mm"]),  # 1σ of what a beam's boards have in common
+              1e-3 * believed["angle_gain_sd_mm"] * (1 - reading(r, mount, u, deep, ray(*x))[2]),
+              rest(x, e=1e-3 * bare["distance_sd_mm"]) - rest(x)]
     whole = np.diag(noise(r) ** 2 + drift**2 + marker**2) + sum(np.outer(s, s) for s in shared)
     weight = np.linalg.inv(np.linalg.cholesky(whole))
-    fit = least_squares(lambda x: weight @ rest(x, mount), x, max_nfev=50)
-    rms = np.sqrt(np.mean(rest(fit.x, mount) ** 2))
-    if np.linalg.svd(fit.jac / [np.cos(fit.x[1]), 1], compute_uv=False)[-1] < 1 / np.radians(0.5):
-        return fail(beam, "unobservable", "the boards leave a direction open by more than half a degree")
+    fit = least_squares(lambda x: weight @ rest(x), x, max_nfev=50)
+    x, rms, gain = fit.x, np.sqrt(np.mean(rest(fit.x) ** 2)), np.linalg.pinv(fit.jac) @ weight
+    if np.linalg.svd(fit.jac / [np.cos(x[1]), 1], compute_uv=False)[-1] < 1 / np.radians(0.5):
+        return {"status": "unobservable", "reason": "the boards leave a direction open by more than half a degree"}
     if rms > 0.01 or not fit.success:
-        return fail(beam, "rejected", f"residuals of {1e3 * rms:.0f} mm over {len(r)} boards")
-    gain = np.linalg.pinv(fit.jac) @ weight
-    moved = gain @ np.stack([rest(fit.x, mount + h) - rest(fit.x, mount) for h in 1e-6 * np.eye(6)], -1) * 1e6
+        return {"status": "rejected", "reason": f"residuals of {1e3 * rms:.0f} mm over {len(r)} boards"}
+    moved = gain @ np.stack([rest(x, mount + h) - rest(x) for h in 1e-6 * np.eye(6)], -1) * 1e6
     covariance = gain @ whole @ gain.T + moved @ mount_covariance @ moved.T
-    return {"beam": beam, "status": "solved", "facet": str(r["facet"][0]), "distance_m": depth(ray(*fit.x)),
-            "azimuth_rad": (fit.x[0] - base + np.pi) % (2 * np.pi) - np.pi, "elevation_rad": fit.x[1],
-            "covariance_rad2": covariance.tolist(), "poses": len(r), "rms_residual_m": rms}
+    return {"status": "solved", "azimuth_rad": (x[0] - base + np.pi) % (2 * np.pi) - np.pi, "elevation_rad": x[1],
+            "distance_m": depth(ray(*x)), "covariance_rad2": covariance.tolist(), "poses": len(r)}
 
-beams = [solve(b) if b in served else {"beam": b, "status": "rejected", "reason": "beside a mirror as drawn"}
-         if b in beside else {"beam": b, "status": "direct"} for b in range(session["scanner"]["beams"])]
+unsure, direct = {"status": "rejected", "reason": "beside a mirror as drawn"}, {"status": "direct"}
+beams = [{"beam": b, **(solve(b) if b in served else unsure if b in beside else direct)}
+         for b in range(session["scanner"]["beams"])]
 json.dump({"schema_version": 1, "method": "own", "frame": "sensor", "beams": beams}, open(out, "w"))
