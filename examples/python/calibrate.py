@@ -1,105 +1,70 @@
-"""The least calibrator of one's own: reads a dataset folder, solves every beam by itself, writes calibration.json.
-
-    pip install -r tests/requirements.txt
-    python examples/python/calibrate.py DATASET calibration.json
-
-It takes the sensor to sit where the drawing puts it, and adds what that may be off by to its covariance. Colors (E_c) are left out: the boards here are white.
-"""
-
-import json, sys, tomllib
-from pathlib import Path
+"""A whole calibrator of one's own: python calibrate.py DATASET calibration.json, with catoptric on the PATH."""
+import json, os, subprocess, sys, tomllib
 import numpy as np
-from mcap.reader import make_reader
-from mcap_ros2.decoder import DecoderFactory
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
-def turn(q):  # rotation matrix of a quaternion (x, y, z, w)
-    x, y, z, w = q
-    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + 2 * w * k + 2 * k @ k
+folder, out = sys.argv[1:]
+program = os.getenv("CATOPTRIC", "catoptric")
+subprocess.run([program, "export", folder, "--format", "csv", "--out", out + ".csv"], check=True)
+rows = np.genfromtxt(out + ".csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+session = tomllib.load(open(folder + "/session.toml", "rb"))
+believed, bare, drawn = session["believed"], session["bare_structure"], session["nominal_rig_from_sensor"]
+loose = session["mount_tolerance"]
+white, drift, marker = (max(1e-3 * believed[k + "_sd_mm"], 1e-5) for k in ("range_noise", "drift", "marker"))
+rows = rows[rows["sd_m"] < 2.5 * white + 1e-3]  # the others read two surfaces in turn
+noise = lambda r: np.hypot(white / np.sqrt(r["readings"]), 3e-4)  # of a mean of whole millimetres
+ray = lambda a, e: np.stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e) + 0 * a], -1)
+served = {b for f in session["facets"] for b in range(f["beams"][0], f["beams"][1] + 1)}
+beside = {b + k for b in served for k in range(-12, 13)}  # mirrors stand off the drawing
 
-def spherical(azimuth, elevation):
-    return np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+def reading(r, mount, u, d, v):  # of beams d along u and then along v, the sensor shifted and turned by `mount`; |cos|
+    turn = Rotation.from_quat(drawn["rotation_xyzw"])
+    back, at = (turn * Rotation.from_rotvec(mount[3:])).inv(), drawn["translation_m"] + turn.apply(mount[:3])
+    center = back.apply(np.stack([r[f"rig_center_{k}_m"] for k in "xyz"], -1) - at) - d * u
+    normal = back.apply(np.stack([r[f"rig_normal_{k}"] for k in "xyz"], -1))
+    toward, closing, bias = (normal * center).sum(-1), (normal * v).sum(-1), believed["bias"]
+    path = d + toward / closing
+    e_r = np.interp(path, bias["distance"]["range_m"] or [1], bias["distance"]["error_mm"] or [0])
+    e_a = bias["angle"]["gain_mm"] * abs(closing) + bias["angle"]["offset_mm"]
+    return path + 1e-3 * (e_r + e_a), normal / toward[:, None], abs(closing)
 
-folder, out = Path(sys.argv[1]), Path(sys.argv[2])
-session = tomllib.loads((folder / "session.toml").read_text())
-believed, bare = session["believed"], session["bare_structure"]
-mount = session["nominal_rig_from_sensor"]
+# Where the sensor sits: undeflected beams on boards, each board with a drift of its own.
+near = rows[(rows["inside_edge_m"] > 0.05) & ~np.isin(rows["beam"], list(beside))]
+u, pose = ray(near["azimuth_rad"], 0), np.unique(near["pose"], return_inverse=True)[1]
+sd = np.array([*(1e-3 * np.array(loose["translation_sd_mm"])), *np.radians(loose["rotation_sd_deg"]),
+               *np.full(pose.max() + 1, np.hypot(drift, marker))])
+rest = lambda x: (near["mean_m"] - reading(near, sd[:6] * x[:6], u, 0, u)[0] - (sd[6:] * x[6:])[pose]) / noise(near)
+fit = least_squares(lambda x: np.append(rest(x), x), np.zeros(len(sd)), loss="soft_l1")
+mount, mount_covariance = sd[:6] * fit.x[:6], (np.linalg.inv(fit.jac.T @ fit.jac) * np.outer(sd, sd))[:6, :6]
 
-stretches = []  # label, scans, and the first pose of every body, in the order of the recording
-with (folder / "observations.mcap").open("rb") as file:
-    decoders = DecoderFactory()
-    for schema, channel, message in make_reader(file).iter_messages():
-        if channel.topic == "/session/pose":
-            stretches.append((json.loads(message.data), [], {}))
-        elif channel.topic == "/scan" or channel.topic.startswith("/mocap/") and channel.topic != "/mocap/markers":
-            data = decoders.decoder_for(channel.message_encoding, schema)(message.data)
-            label, scans, poses = stretches[-1]
-            if channel.topic == "/scan":
-                scans.append(np.array(data.ranges))
-            else:
-                poses.setdefault(channel.topic[7:], data.pose)
+def solve(beam):
+    r = rows[(rows["kind"] == "facet") & (rows["beam"] == beam) & (rows["set_up_for"] == 1)]
+    r = r[r["bare_distance_m"] > 0]
+    if len(r) < 3:
+        return {"status": "too_few_poses", "reason": f"{len(r)} boards, 3 are needed"}
+    base, deep, u = r["azimuth_rad"][0], r["bare_distance_m"][0], ray(r["azimuth_rad"][0], 0)
+    depth = lambda v: deep - 1e-3 * bare["mirror_thickness_mm"] / np.sqrt((1 - u @ v) / 2)  # a mirror halves u and v
+    rest = lambda x, m=mount, e=0: r["mean_m"] - reading(r, m, u, depth(ray(*x)) + e, ray(*x))[0]
+    v = np.linalg.lstsq(reading(r, mount, u, deep, u)[1], 1 / (r["mean_m"] - deep), rcond=None)[0]  # 1/s is linear in v
+    x = np.array([np.arctan2(v[1], v[0]), np.arctan2(v[2], np.hypot(v[0], v[1]))])
+    shared = [np.full(len(r), 1e-3 * believed["distance_bias_sd_mm"]),  # 1σ of what a beam's boards have in common
+              1e-3 * believed["angle_gain_sd_mm"] * (1 - reading(r, mount, u, deep, ray(*x))[2]),
+              rest(x, e=1e-3 * bare["distance_sd_mm"]) - rest(x)]
+    whole = np.diag(noise(r) ** 2 + drift**2 + marker**2) + sum(np.outer(s, s) for s in shared)
+    weight = np.linalg.inv(np.linalg.cholesky(whole))
+    fit = least_squares(lambda x: weight @ rest(x), x, max_nfev=50)
+    x, rms, gain = fit.x, np.sqrt(np.mean(rest(fit.x) ** 2)), np.linalg.pinv(fit.jac) @ weight
+    if np.linalg.svd(fit.jac / [np.cos(x[1]), 1], compute_uv=False)[-1] < 1 / np.radians(0.5):
+        return {"status": "unobservable", "reason": "the boards leave a direction open by more than half a degree"}
+    if rms > 0.01 or not fit.success:
+        return {"status": "rejected", "reason": f"residuals of {1e3 * rms:.0f} mm over {len(r)} boards"}
+    moved = gain @ np.stack([rest(x, mount + h) - rest(x) for h in 1e-6 * np.eye(6)], -1) * 1e6
+    covariance = gain @ whole @ gain.T + moved @ mount_covariance @ moved.T
+    return {"status": "solved", "azimuth_rad": (x[0] - base + np.pi) % (2 * np.pi) - np.pi, "elevation_rad": x[1],
+            "distance_m": depth(ray(*x)), "covariance_rad2": covariance.tolist(), "poses": len(r)}
 
-boards = []  # facet, beams, center and normal in the sensor frame, mean range and readings of every beam
-for label, scans, poses in (s for s in stretches if s[0]["kind"] == "facet"):
-    def of(body):
-        p, q = poses[body].position, poses[body].orientation
-        return turn((q.x, q.y, q.z, q.w)), np.array([p.x, p.y, p.z])
-    (rig, at), (board, center) = of("rig"), of(label["board"])
-    back = (rig @ turn(mount["rotation_xyzw"])).T
-    center = back @ (center - at - rig @ mount["translation_m"])
-    ranges = np.where(np.isfinite(scans), scans, np.nan)
-    count = np.isfinite(ranges).sum(axis=0)
-    mean = np.where(count > 0, np.nansum(ranges, axis=0) / np.maximum(count, 1), np.nan)
-    boards.append((label["facet"], label["beams"], center, back @ board[:, 2], mean, count))
-
-def solve(beam, facet, mirror):
-    """The entry of a beam that the drawing sends to a facet."""
-    fail = lambda status, reason: {"beam": beam, "status": status, "reason": reason}
-    azimuth = np.radians((beam - (session["scanner"]["beams"] - 1) / 2) * session["scanner"]["step_deg"])
-    u = spherical(azimuth, 0)
-    d = bare["distance_m"][beam - bare["first_beam"]] - 1e-3 * bare["mirror_thickness_mm"] / abs(u @ mirror)
-    v = u - 2 * (u @ mirror) * mirror
-    x = np.array([np.arctan2(v[1], v[0]), np.arcsin(v[2])])  # azimuth in the sensor frame, elevation
-    mine = [b for b in boards if b[0] == facet and b[1][0] <= beam <= b[1][1] and b[5][beam] > 0]
-    if len(mine) < 3:
-        return fail("too_few_poses", f"{len(mine)} boards, 3 are needed")
-    for _ in range(20):
-        v = spherical(*x)
-        dv = np.stack([spherical(x[0] + np.pi / 2, 0) * np.cos(x[1]), spherical(x[0], x[1] + np.pi / 2)], axis=1)
-        rows, rest, variance = [], [], []
-        for _, _, center, normal, mean, count in mine:
-            closing = normal @ v
-            s = normal @ (center - d * u) / closing
-            table = believed["bias"]["distance"]  # an empty one means no error
-            e_r = np.interp(mean[beam], table["range_m"] or [1], table["error_mm"] or [0])
-            e_a = believed["bias"]["angle"]["gain_mm"] * abs(closing) + believed["bias"]["angle"]["offset_mm"]
-            rest.append(mean[beam] - 1e-3 * (e_r + e_a) - d - s)
-            rows.append(-s / closing * (normal @ dv))
-            variance.append((believed["range_noise_sd_mm"] ** 2 / count[beam] + believed["drift_sd_mm"] ** 2) * 1e-6)
-        h, rest = np.array(rows), np.array(rest)
-        if np.linalg.svd(h, compute_uv=False)[-1] < 0.03:  # a millimetre is 2° there
-            return fail("unobservable", "the boards are tilted along one direction, or face-on")
-        step = np.linalg.lstsq(h, rest, rcond=None)[0]
-        x = x + np.clip(step, -0.2, 0.2)
-    rms = np.sqrt(np.mean(rest**2))
-    if not np.abs(step).max() < 1e-9 or rms > 0.015:
-        return fail("rejected", f"residuals of {1e3 * rms:.1f} mm over {len(mine)} boards")
-    gain = np.linalg.pinv(h)
-    tilt = np.radians(max(session["mount_tolerance"]["rotation_sd_deg"])) ** 2
-    covariance = gain @ np.diag(variance) @ gain.T + tilt * np.diag([1 / np.cos(x[1]) ** 2, 1])
-    relative = (x[0] - azimuth + np.pi) % (2 * np.pi) - np.pi  # azimuth_rad is counted from the bare beam
-    return {"beam": beam, "status": "solved", "facet": facet, "azimuth_rad": relative, "elevation_rad": x[1],
-            "distance_m": d, "covariance_rad2": covariance.tolist(), "poses": len(mine), "rms_residual_m": rms}
-
-beams = {}
-for facet in session["facets"]:
-    first, last = facet["beams"]
-    corners = np.array(facet["corners_mm"])
-    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-    for beam in range(max(first - 12, 0), min(last + 13, session["scanner"]["beams"])):
-        if first <= beam <= last:
-            beams[beam] = solve(beam, facet["name"], normal / np.linalg.norm(normal))
-        else:  # mirrors stand a degree or two off the drawing, so beams beside it may be deflected
-            beams.setdefault(beam, {"beam": beam, "status": "rejected", "reason": "beside a mirror as drawn"})
-everything = [beams.get(b, {"beam": b, "status": "direct"}) for b in range(session["scanner"]["beams"])]
-out.write_text(json.dumps({"schema_version": 1, "method": "own", "frame": "sensor", "beams": everything}))
+unsure, direct = {"status": "rejected", "reason": "beside a mirror as drawn"}, {"status": "direct"}
+beams = [{"beam": b, **(solve(b) if b in served else unsure if b in beside else direct)}
+         for b in range(session["scanner"]["beams"])]
+json.dump({"schema_version": 1, "method": "own", "frame": "sensor", "beams": beams}, open(out, "w"))

@@ -1,4 +1,5 @@
-//! A layout for making and using it: solids to cut and print, a scene to look at, a table of its drawing, its frames.
+//! A layout for making and using it: solids to cut and print, a scene to look at, a table of its drawing, its frames;
+//! and a dataset's boards as a table.
 //!
 //! | format | what it holds | unit |
 //! |---|---|---|
@@ -6,6 +7,7 @@
 //! | [`glb`](fn@glb) | mirrors, posts, housing and beams in their colors (glTF 2.0) | metres |
 //! | [`drawing_table`] | corners, angles and tolerances of every mirror, as CSV | millimetres, degrees |
 //! | [`urdf`](fn@urdf) | the scanner and its mirrors in the rig, as links | metres, radians |
+//! | [`board_table`] | what every beam read of every board of a dataset, as CSV | metres, radians |
 //!
 //! ```
 //! use catoptric::{export, layout, sim};
@@ -20,6 +22,7 @@
 //! # }
 //! ```
 
+mod boards;
 mod frame;
 mod glb;
 mod solid;
@@ -27,6 +30,7 @@ mod stl;
 mod table;
 mod urdf;
 
+pub use boards::{BESIDE, board_table, has_rows};
 pub use frame::shaded_by_frame;
 pub use glb::glb;
 pub use solid::Solid;

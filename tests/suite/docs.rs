@@ -624,6 +624,13 @@ fn the_ci_chapter_shows_the_example_that_is_run() {
 }
 
 #[test]
+fn the_chapter_on_testing_shows_the_program_that_is_run() {
+    let shown = code_blocks(&read("docs/guide/9-test-your-own.md"), "python");
+    assert_eq!(shown, [read("examples/python/calibrate.py")]);
+    assert!(read(".ci/run").contains("examples/python/calibrate.py \"$work/own-data\""));
+}
+
+#[test]
 fn every_status_is_explained() {
     let text = read("docs/guide/4-calibrating-and-scoring.md");
     let explained = first_column(&text, "## Every element has a status");

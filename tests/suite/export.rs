@@ -285,6 +285,15 @@ fn the_verb_writes_every_format_and_refuses_what_it_cannot() {
     }
     for (arguments, said) in [
         (vec![".", "--format", "stl"], "is a folder"),
+        (vec![".", "--format", "csv"], "no session.toml in it"),
+        (
+            vec![".", "--format", "csv", "--as-built"],
+            "--as-built is for scenes",
+        ),
+        (
+            vec![".", "--format", "csv", "--part", "all"],
+            "--part is for scenes",
+        ),
         (vec![scene.as_str(), "--format", "step"], "possible values"),
         (
             vec![scene.as_str(), "--format", "glb", "--reach-m=-1"],
@@ -303,7 +312,9 @@ fn the_verb_writes_every_format_and_refuses_what_it_cannot() {
     ] {
         let arguments = [&["export", "--out", "x"], arguments.as_slice()].concat();
         let output = run(folder.path(), &arguments);
-        assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+        // A folder that is no dataset is one that was not found.
+        let code = if said.contains("session.toml") { 3 } else { 2 };
+        assert_eq!(output.status.code(), Some(code), "{}", stderr(&output));
         assert!(
             stderr(&output).contains(said),
             "{arguments:?}: {}",
@@ -311,4 +322,159 @@ fn the_verb_writes_every_format_and_refuses_what_it_cannot() {
         );
         assert!(!folder.path().join("x").exists());
     }
+}
+
+/// A table's columns, and its rows.
+fn parsed(table: &[u8]) -> (Vec<String>, Vec<csv::StringRecord>) {
+    let mut reader = csv::Reader::from_reader(table);
+    let header = reader.headers().unwrap().iter().map(str::to_owned).collect();
+    (header, reader.records().map(Result::unwrap).collect())
+}
+
+#[test]
+fn a_board_table_is_the_recording_to_the_bit() {
+    let sets = [
+        "experiment.scans_per_pose=3",
+        "scanner.sub_rays=1",
+        "scanner.mount.yaw_deg=5",
+    ];
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/two-mirror.toml");
+    let scene = scenes::load(&path, &sets.map(str::to_owned)).unwrap();
+    let dataset = catoptric::sim::Laboratory::new(&scene, 1)
+        .unwrap()
+        .dataset()
+        .unwrap();
+    let (header, rows) = parsed(&export::board_table(&dataset).unwrap());
+    let mut rows = rows.iter();
+    let column = |name: &str| {
+        let at = header.iter().position(|h| h == name);
+        at.unwrap_or_else(|| panic!("no {name}"))
+    };
+    let session = &dataset.session;
+    let drawn = catoptric::model::Pose::from(&session.nominal_rig_from_sensor);
+    let (mut facets, mut direct) = (0, 0);
+    for record in dataset.poses.iter().filter(|p| p.label.board.is_some()) {
+        let label = &record.label;
+        let [first, last] = label.beams.unwrap();
+        let beside = if label.facet.is_some() { export::BESIDE } else { 0 };
+        *if label.facet.is_some() {
+            &mut facets
+        } else {
+            &mut direct
+        } += 1;
+        for beam in first.saturating_sub(beside)..=(last + beside).min(1080) {
+            let row = rows.next().unwrap();
+            let text = |name: &str| &row[column(name)];
+            let number = |name: &str| text(name).parse::<f64>().unwrap();
+            assert_eq!(text("kind") == "facet", label.facet.is_some());
+            assert_eq!(text("pose"), label.pose.to_string());
+            assert_eq!(text("beam"), beam.to_string());
+            assert_eq!(text("board"), "board");
+            assert_eq!(text("color"), "white");
+            assert_eq!(text("facet"), label.facet.as_deref().unwrap_or_default());
+            assert_eq!(text("set_up_for") == "1", (first..=last).contains(&beam));
+            assert_eq!(
+                number("azimuth_rad"),
+                catoptric::calib::observations::azimuth(session, beam)
+            );
+            match session.bare_structure.distance(beam) {
+                Some(d) => assert_eq!(number("bare_distance_m"), d),
+                None => assert_eq!(text("bare_distance_m"), ""),
+            }
+            if label.facet.is_some() {
+                assert_eq!(text("inside_edge_m"), "");
+            } else {
+                // The nearest edge, by the corner-free distance along the board's own axes.
+                let pick = |name: &str| {
+                    nalgebra::Vector3::from(["x", "y", "z"].map(|axis| number(&name.replace('*', axis))))
+                };
+                let (center, normal) = (pick("drawn_center_*_m"), pick("drawn_normal_*"));
+                let along = pick("drawn_along_*");
+                let azimuth = number("azimuth_rad");
+                let u = nalgebra::Vector3::new(azimuth.cos(), azimuth.sin(), 0.0);
+                let off = u * (normal.dot(&center) / normal.dot(&u)) - center;
+                let [x, y] = [off.dot(&along), off.dot(&normal.cross(&along))];
+                let inside = (0.45 - x.abs()).min(0.35 - y.abs());
+                assert!((number("inside_edge_m") - inside).abs() < 1e-12);
+            }
+            let found: Vec<f64> = record.readings(beam).filter(|r| r.is_finite()).collect();
+            assert_eq!(text("readings"), found.len().to_string());
+            assert_eq!(text("missing"), (3 - found.len()).to_string());
+            if found.is_empty() {
+                assert_eq!((text("mean_m"), text("sd_m")), ("", ""));
+            } else {
+                let mean = found.iter().sum::<f64>() / found.len() as f64;
+                assert!((number("mean_m") - mean).abs() < 1e-14);
+                assert_eq!(number("mean_m"), record.summarize()[beam].mean);
+            }
+            if found.len() > 1 {
+                assert_eq!(number("sd_m"), record.summarize()[beam].sd);
+            }
+            // The board in the rig, and the same board through the drawn mounting.
+            let triple = |name: &str| ["x", "y", "z"].map(|axis| number(&name.replace('*', axis)));
+            let point = nalgebra::Point3::from(triple("rig_center_*_m"));
+            let back = record.room_from_rig * point;
+            assert!((back.coords - record.room_from_board.unwrap().translation.vector).norm() < 1e-12);
+            let through = drawn * nalgebra::Point3::from(triple("drawn_center_*_m"));
+            assert!((through - point).norm() < 1e-12);
+            for (axis, name) in [
+                (nalgebra::Vector3::<f64>::z(), "normal"),
+                (nalgebra::Vector3::x(), "along"),
+            ] {
+                let in_rig = nalgebra::Vector3::from(triple(&format!("rig_{name}_*")));
+                let in_room = record.room_from_rig * in_rig;
+                assert!((in_room - record.room_from_board.unwrap() * axis).norm() < 1e-12);
+                let in_drawn = nalgebra::Vector3::from(triple(&format!("drawn_{name}_*")));
+                assert!((drawn * in_drawn - in_rig).norm() < 1e-12);
+            }
+        }
+    }
+    assert!(rows.next().is_none());
+    assert_eq!((direct, facets), (9, 36));
+}
+
+#[test]
+fn a_blind_dataset_gives_the_same_board_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let scene = format!("{}/scenes/two-mirror.toml", env!("CARGO_MANIFEST_DIR"));
+    let quick = [
+        "--set",
+        "experiment.scans_per_pose=2",
+        "--set",
+        "scanner.sub_rays=1",
+    ];
+    for (name, blind) in [("seen", None), ("blind", Some("--blind"))] {
+        let mut arguments = vec!["simulate", &scene, "--out", name];
+        arguments.extend(quick.iter().copied().chain(blind));
+        assert!(run(at, &arguments).status.success());
+        let table = format!("{name}.csv");
+        let output = run(at, &["export", name, "--format", "csv", "--out", &table]);
+        assert!(output.status.success(), "{}", stderr(&output));
+        assert_eq!(stdout(&output), format!("wrote {table}: 45 boards\n"));
+    }
+    assert!(!at.join("blind/truth").exists());
+    let read = |name: &str| std::fs::read(at.join(name)).unwrap();
+    assert_eq!(read("seen.csv"), read("blind.csv"));
+    // What the file says is what is in memory: floats as the recording holds them.
+    let dataset = catoptric::io::read_dataset(&at.join("seen")).unwrap();
+    assert_eq!(read("seen.csv"), export::board_table(&dataset).unwrap());
+    // Only the columns that chapter 5 explains.
+    let (header, _) = parsed(&read("seen.csv"));
+    let guide = include_str!("../../docs/guide/5-files.md");
+    let section = guide
+        .split("## The board table")
+        .nth(1)
+        .unwrap()
+        .split("\n## ")
+        .next()
+        .unwrap();
+    let table = section
+        .lines()
+        .filter_map(|line| line.strip_prefix('|')?.split('|').next());
+    let named: Vec<String> = table
+        .flat_map(|cell| cell.split('`').skip(1).step_by(2))
+        .map(str::to_owned)
+        .collect();
+    assert_eq!(named, header, "explained (left) and written (right)");
 }
