@@ -18,7 +18,9 @@ pub mod recording;
 mod schedule;
 
 pub mod diagnostic;
+mod expression;
 mod format;
+mod parameters;
 pub mod scene;
 mod tree;
 

@@ -22,6 +22,7 @@ mod mishaps;
 mod motion;
 mod noise;
 mod paper;
+mod parametric;
 mod physics;
 mod pipeline;
 mod plan;
