@@ -22,6 +22,7 @@ mod expression;
 mod format;
 mod parameters;
 pub mod scene;
+pub mod template;
 mod tree;
 
 pub mod cloud;

@@ -22,17 +22,16 @@ pub(super) struct Fault {
     pub(super) help: Option<String>,
 }
 
-/// Puts a number in the place of every expression; `text` is the file, for places within them.
-pub(super) fn resolve(root: &mut Node, text: &str, schema: &Json) -> Vec<Fault> {
+/// Puts a number in the place of every expression; `text` is the file, for places within them, `texts` the
+/// [`text_keys`].
+pub(super) fn resolve(root: &mut Node, text: &str, texts: &BTreeSet<String>) -> Vec<Fault> {
     let mut faults = Vec::new();
     let definitions = definitions(root, &mut faults);
     let mut values = Values {
         definitions: &definitions,
         known: BTreeMap::new(),
     };
-    let mut texts = BTreeSet::new();
-    text_keys(schema, &mut texts);
-    walk(root, "", text, &texts, &mut values, &mut faults);
+    walk(root, "", text, texts, &mut values, &mut faults);
     faults
 }
 
@@ -187,7 +186,13 @@ fn fault(whole: Source, written: &str, own: &str, flaw: Flaw, text: &str) -> Fau
 }
 
 /// Keys that hold text and nothing else anywhere in the schema; what they hold is no expression.
-fn text_keys(schema: &Json, found: &mut BTreeSet<String>) {
+pub(super) fn text_keys(schema: &Json) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    collect_text_keys(schema, &mut found);
+    found
+}
+
+fn collect_text_keys(schema: &Json, found: &mut BTreeSet<String>) {
     match schema {
         Json::Object(fields) => {
             let properties = fields.get("properties").and_then(Json::as_object);
@@ -196,9 +201,9 @@ fn text_keys(schema: &Json, found: &mut BTreeSet<String>) {
                     found.insert(name.clone());
                 }
             }
-            fields.values().for_each(|own| text_keys(own, found));
+            fields.values().for_each(|own| collect_text_keys(own, found));
         }
-        Json::Array(items) => items.iter().for_each(|own| text_keys(own, found)),
+        Json::Array(items) => items.iter().for_each(|own| collect_text_keys(own, found)),
         _ => {}
     }
 }

@@ -166,10 +166,7 @@ pub fn kept(scene: &Scene) -> (Scene, Vec<(String, Vec<u8>)>) {
 /// # Errors
 /// [`SceneErrors::Invalid`] with everything that is wrong.
 pub fn parse(text: &str, file_name: &str, sets: &[String]) -> Result<Scene, SceneErrors> {
-    let is_json = Path::new(file_name)
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    let (file, mut list) = if is_json {
+    let (file, mut list) = if is_json(file_name) {
         match tree::from_json(text) {
             Ok(node) => (node, Vec::new()),
             Err(diagnostic) => return Err(invalid(file_name, text, vec![diagnostic])),
@@ -188,7 +185,7 @@ pub fn parse(text: &str, file_name: &str, sets: &[String]) -> Result<Scene, Scen
         }
     }
     let schema = json_schema();
-    let faults = parameters::resolve(&mut root, text, &schema);
+    let faults = parameters::resolve(&mut root, text, &parameters::text_keys(&schema));
     let placed = faults
         .iter()
         .map(|f| f.whole.clone())
@@ -245,6 +242,12 @@ pub fn parse(text: &str, file_name: &str, sets: &[String]) -> Result<Scene, Scen
         .map(|p| locate_copy(p, &made, &root, sets, of_file.as_deref()))
         .collect();
     Err(invalid(file_name, text, diagnostics))
+}
+
+/// Whether a file is JSON by its name.
+pub(super) fn is_json(file_name: &str) -> bool {
+    let extension = Path::new(file_name).extension();
+    extension.is_some_and(|e| e.eq_ignore_ascii_case("json"))
 }
 
 /// The scene of a tree, its patterns worked out.
@@ -307,7 +310,7 @@ fn problems_without_sets(
         return None;
     }
     let mut file = file.clone();
-    if !parameters::resolve(&mut file, text, schema).is_empty() {
+    if !parameters::resolve(&mut file, text, &parameters::text_keys(schema)).is_empty() {
         return None;
     }
     let made = expanded(&file).ok()?.ok()?;

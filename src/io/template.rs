@@ -3,7 +3,6 @@
 //! The file is read once; a choice of parameters works its expressions out again, and everything is checked as if it had
 //! been written so.
 
-use super::file::parent;
 use super::scene::{self, SceneErrors};
 use super::tree::{self, Node, Source, Value};
 use super::{format, parameters};
@@ -130,14 +129,13 @@ impl Template {
             return Err(findings.into_iter().map(|f| f.message).collect());
         }
         let written: Scene = serde_json::from_value(root.to_json()).map_err(|e| vec![e.to_string()])?;
-        let messages = |problems: Vec<check::Problem>| problems.into_iter().map(|p| p.message).collect();
         let mut scene = pattern::expand(&written).map_err(messages)?.scene;
         scene.meshes = self.scene.meshes.clone();
         let problems = check::problems(&scene);
         if problems.is_empty() {
             Ok(scene)
         } else {
-            Err(problems.into_iter().map(|p| p.message).collect())
+            Err(messages(problems))
         }
     }
 
@@ -154,7 +152,9 @@ impl Template {
     }
 
     fn substituted(&self, choice: Choice<'_>) -> Option<String> {
-        let spans = choice.iter().map(|(name, number)| Some((self.span(name)?, *number)));
+        let spans = choice
+            .iter()
+            .map(|(name, number)| Some((self.span(name)?, *number)));
         let mut spans = spans.collect::<Option<Vec<(Range<usize>, f64)>>>()?;
         // From the end, so that places before stay where they are.
         spans.sort_by_key(|(span, _)| std::cmp::Reverse(span.start));
@@ -176,6 +176,10 @@ impl Template {
     fn number_span_or_set(&self, name: &str) -> bool {
         value_of(&self.root, name).is_some_and(|n| n.value.number().is_some())
     }
+}
+
+fn messages(problems: Vec<check::Problem>) -> Vec<String> {
+    problems.into_iter().map(|p| p.message).collect()
 }
 
 /// Where the number of a parameter is written.

@@ -21,6 +21,7 @@ mod layout;
 mod mishaps;
 mod motion;
 mod noise;
+mod optimize;
 mod paper;
 mod parametric;
 mod physics;
