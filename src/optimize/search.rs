@@ -172,7 +172,7 @@ impl<'a> Search<'a> {
         let place = |number: usize| -> Vec<f64> {
             let mut step = |from: &f64| {
                 let u = unit(random);
-                if number % 2 == 0 {
+                if number.is_multiple_of(2) {
                     (from + FIRST_STEP * (2.0 * u - 1.0)).clamp(0.0, 1.0)
                 } else {
                     u

@@ -84,6 +84,8 @@ fn a_known_optimum_is_found() {
         [[superstructure.marker]]
         name = "c"
         position_mm = [0, -80, 20]
+        [room]
+        size_m = [5, 4, 3]
     "#;
     let found = search(text, &options(&["size.diameter_mm:down"], &[], 300));
     let best = found.best.unwrap();
@@ -108,7 +110,7 @@ fn a_known_optimum_is_found() {
 fn what_is_required_is_kept() {
     let requirements = [
         "size.diameter_mm<=165",
-        "facets.*.margin_mm>=0.3",
+        "facets.*.margin_across_mm>=3",
         "stopped_by_facets<=0",
     ];
     let found = search(PARAMETRIC, &options(&["field_of_regard"], &requirements, 200));
@@ -125,7 +127,7 @@ fn what_is_required_is_kept() {
     let scene = template(PARAMETRIC).with(&best.choice()).unwrap();
     let analysis = layout::analyze(&scene, None, Detail::Coarse).unwrap();
     assert!(analysis.size.diameter_mm <= 165.0 && analysis.stopped_by_facets == 0);
-    assert!(analysis.facets.iter().all(|f| f.margin_mm.unwrap() >= 0.3));
+    assert!(analysis.facets.iter().all(|f| f.margin_across_mm.unwrap() >= 3.0));
     assert_eq!(best.goals["field_of_regard"], analysis.field_of_regard);
 }
 

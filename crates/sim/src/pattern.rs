@@ -13,6 +13,10 @@ use crate::check::{Path, Problem, Segment, nearest};
 use crate::scene::{Exchange, Facet, FacetShape, Pattern, Plate, Scene};
 use catoptric_model::beam;
 
+/// The last beam of the scan, the first's mirror image.
+const LAST_BEAM: u32 = 1080;
+const _: () = assert!(LAST_BEAM as usize + 1 == beam::COUNT);
+
 /// A scene without patterns, and where its facets come from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expanded {
@@ -196,9 +200,8 @@ fn left_right(mut shape: FacetShape) -> FacetShape {
             wedge.exit_azimuth_deg = -wedge.exit_azimuth_deg;
         }
         FacetShape::Plate(plate) => {
-            let last = beam::COUNT as u32 - 1;
             plate.azimuth_deg = plate.azimuth_deg.map(|a| -a);
-            plate.beam = plate.beam.map(|b| last.saturating_sub(b));
+            plate.beam = plate.beam.map(|b| LAST_BEAM.saturating_sub(b));
             plate.exit_azimuth_deg = plate.exit_azimuth_deg.map(|a| -a);
             plate.normal_azimuth_deg = plate.normal_azimuth_deg.map(|a| -a);
         }
