@@ -56,3 +56,6 @@ pub mod planning {}
 
 #[doc = include_str!("../docs/guide/12-layouts.md")]
 pub mod layouts {}
+
+#[doc = include_str!("../docs/guide/13-optimizing.md")]
+pub mod optimizing {}

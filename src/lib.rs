@@ -27,6 +27,7 @@ pub mod export;
 pub mod guide;
 pub mod io;
 pub mod layout;
+pub mod optimize;
 pub mod plan;
 pub mod report;
 pub mod score;

@@ -87,7 +87,12 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     if arguments.json {
         print(&json)?;
     } else {
-        let text: Vec<String> = analyses.iter().map(text).collect();
+        let mut text: Vec<String> = analyses.iter().map(text).collect();
+        if context.global.verbose > 0 {
+            for (text, (scene, analysis)) in text.iter_mut().zip(scenes.iter().zip(&analyses)) {
+                text.push_str(&corners(&layout::Drawing::new(scene, analysis.seed)?));
+            }
+        }
         print(&(text.join("\n") + &said + &next(arguments)))?;
     }
     if unmet.is_empty() {
@@ -225,6 +230,19 @@ fn text(analysis: &Analysis) -> String {
         };
     }
     text
+}
+
+/// The polygons that were looked at.
+fn corners(drawing: &layout::Drawing) -> String {
+    let facets = drawing.facets.iter().map(|facet| {
+        let corners = facet.face.corners.iter().map(|c| {
+            let c = c * 1e3;
+            format!("({:.3}, {:.3}, {:.3})", c.x, c.y, c.z)
+        });
+        let corners: Vec<String> = corners.collect();
+        format!("  {}: corners {} mm\n", facet.name, corners.join(", "))
+    });
+    facets.collect()
 }
 
 fn facet(facet: &FacetView, width: usize) -> String {

@@ -14,6 +14,7 @@ mod interrupt;
 mod layout;
 mod man;
 mod new;
+mod optimize;
 mod output;
 mod plan;
 mod progress;
@@ -88,6 +89,8 @@ enum Verb {
     Plan(plan::Arguments),
     /// Say what a mirror layout sees, loses and allows; several side by side
     Layout(layout::Arguments),
+    /// Search a scene's parameters for better layouts
+    Optimize(optimize::Arguments),
     /// Write a layout as solids, a 3D scene, a drawing table or frames
     Export(export::Arguments),
     /// Turn a scan into a point cloud
@@ -162,6 +165,7 @@ fn run(cli: Cli) -> Result<(), CliError> {
         Verb::Study(arguments) => study::run(&arguments, &context),
         Verb::Plan(arguments) => plan::run(&arguments, &context),
         Verb::Layout(arguments) => layout::run(&arguments, &context),
+        Verb::Optimize(arguments) => optimize::run(&arguments, &context),
         Verb::Export(arguments) => export::run(&arguments, &context),
         Verb::Apply(arguments) => apply::run(&arguments, &context),
         Verb::Report(arguments) => report::run(&arguments, &context),

@@ -5,5 +5,5 @@ use super::output::print;
 use catoptric::io::scene;
 
 pub(crate) fn run() -> Result<(), CliError> {
-    print(&format!("{:#}\n", scene::json_schema()))
+    print(&format!("{:#}\n", scene::file_schema()))
 }

@@ -18,8 +18,11 @@ pub mod recording;
 mod schedule;
 
 pub mod diagnostic;
+mod expression;
 mod format;
+mod parameters;
 pub mod scene;
+pub mod template;
 mod tree;
 
 pub mod cloud;

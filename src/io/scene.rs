@@ -8,9 +8,11 @@ use super::error::IoError;
 use super::file::{parent, sha256};
 use super::format;
 use super::mesh;
+use super::parameters;
 use super::tree::{self, Node, Source};
 use catoptric_sim::Scene;
 use catoptric_sim::check::{self, Problem};
+use catoptric_sim::pattern::{self, Expanded};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -164,10 +166,7 @@ pub fn kept(scene: &Scene) -> (Scene, Vec<(String, Vec<u8>)>) {
 /// # Errors
 /// [`SceneErrors::Invalid`] with everything that is wrong.
 pub fn parse(text: &str, file_name: &str, sets: &[String]) -> Result<Scene, SceneErrors> {
-    let is_json = Path::new(file_name)
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("json"));
-    let (file, mut list) = if is_json {
+    let (file, mut list) = if is_json(file_name) {
         match tree::from_json(text) {
             Ok(node) => (node, Vec::new()),
             Err(diagnostic) => return Err(invalid(file_name, text, vec![diagnostic])),
@@ -185,12 +184,39 @@ pub fn parse(text: &str, file_name: &str, sets: &[String]) -> Result<Scene, Scen
             });
         }
     }
-    list.extend(departures(&root, text, sets, &list));
+    let schema = json_schema();
+    let faults = parameters::resolve(&mut root, text, &parameters::text_keys(&schema));
+    let placed = faults
+        .iter()
+        .map(|f| f.whole.clone())
+        .filter(|s| *s != Source::Unknown);
+    let flawed: Vec<Source> = placed.collect();
+    let departures = departures(&root, text, &schema, &list);
+    // An expression without a value is said to be wrong once.
+    let departures = departures.into_iter().filter(|f| !flawed.contains(&f.source));
+    list.extend(departures.map(|f| Diagnostic {
+        place: place(&f.source, &f.path.to_string(), sets),
+        message: f.message,
+        help: f.help,
+    }));
+    list.extend(faults.into_iter().map(|f| Diagnostic {
+        place: place(&f.part, "parameters", sets),
+        message: f.message,
+        help: f.help,
+    }));
     if !list.is_empty() {
         return Err(invalid(file_name, text, list));
     }
-    let scene: Scene = match serde_json::from_value(root.to_json()) {
-        Ok(scene) => scene,
+    let Expanded {
+        scene,
+        drawn,
+        made_by,
+    } = match expanded(&root) {
+        Ok(Ok(expanded)) => expanded,
+        Ok(Err(problems)) => {
+            let list = problems.into_iter().map(|p| locate(p, &root, sets, None));
+            return Err(invalid(file_name, text, list.collect()));
+        }
         // The schema is generated from the type, so this is a difference between the two.
         Err(error) => {
             let diagnostic = Diagnostic {
@@ -205,12 +231,29 @@ pub fn parse(text: &str, file_name: &str, sets: &[String]) -> Result<Scene, Scen
     if problems.is_empty() {
         return Ok(scene);
     }
-    let of_file = problems_without_sets(&file, sets);
+    let of_file = problems_without_sets(&file, text, sets, &schema);
+    let made = Expanded {
+        scene,
+        drawn,
+        made_by,
+    };
     let diagnostics = problems
         .into_iter()
-        .map(|p| locate(p, &root, sets, of_file.as_deref()))
+        .map(|p| locate_copy(p, &made, &root, sets, of_file.as_deref()))
         .collect();
     Err(invalid(file_name, text, diagnostics))
+}
+
+/// Whether a file is JSON by its name.
+pub(super) fn is_json(file_name: &str) -> bool {
+    let extension = Path::new(file_name).extension();
+    extension.is_some_and(|e| e.eq_ignore_ascii_case("json"))
+}
+
+/// The scene of a tree, its patterns worked out.
+fn expanded(root: &Node) -> Result<Result<Expanded, Vec<Problem>>, serde_json::Error> {
+    let scene: Scene = serde_json::from_value(root.to_json())?;
+    Ok(pattern::expand(&scene))
 }
 
 /// The scene as TOML, with every default written out; it reads back as the same scene.
@@ -221,13 +264,23 @@ pub fn to_toml(scene: &Scene) -> Result<String, toml::ser::Error> {
     toml::to_string(scene)
 }
 
-/// JSON Schema of a scene.
+/// JSON Schema of a scene whose expressions have been worked out.
 pub fn json_schema() -> serde_json::Value {
     schemars::schema_for!(Scene).to_value()
 }
 
+/// JSON Schema of a scene file, for editors: numbers may be expressions.
+pub fn file_schema() -> serde_json::Value {
+    parameters::with_expressions(json_schema())
+}
+
 /// Departures from the schema that a syntax error does not explain.
-fn departures(root: &Node, text: &str, sets: &[String], syntax: &[Diagnostic]) -> Vec<Diagnostic> {
+fn departures(
+    root: &Node,
+    text: &str,
+    schema: &serde_json::Value,
+    syntax: &[Diagnostic],
+) -> Vec<format::Finding> {
     let broken_lines: Vec<usize> = syntax
         .iter()
         .filter_map(|d| match &d.place {
@@ -242,25 +295,46 @@ fn departures(root: &Node, text: &str, sets: &[String], syntax: &[Diagnostic]) -
         }
         _ => false,
     };
-    let findings = format::check(root, &json_schema());
-    findings
-        .into_iter()
-        .filter(|f| !explained(f))
-        .map(|f| Diagnostic {
-            place: place(&f.source, &f.path.to_string(), sets),
-            message: f.message,
-            help: f.help,
-        })
-        .collect()
+    let findings = format::check(root, schema);
+    findings.into_iter().filter(|f| !explained(f)).collect()
 }
 
 /// What is wrong with the file by itself; `None` if it has no sense by itself.
-fn problems_without_sets(file: &Node, sets: &[String]) -> Option<Vec<Problem>> {
+fn problems_without_sets(
+    file: &Node,
+    text: &str,
+    sets: &[String],
+    schema: &serde_json::Value,
+) -> Option<Vec<Problem>> {
     if sets.is_empty() {
         return None;
     }
-    let scene: Scene = serde_json::from_value(file.to_json()).ok()?;
-    Some(check::problems(&scene))
+    let mut file = file.clone();
+    if !parameters::resolve(&mut file, text, &parameters::text_keys(schema)).is_empty() {
+        return None;
+    }
+    let made = expanded(&file).ok()?.ok()?;
+    Some(check::problems(&made.scene))
+}
+
+/// The place of a problem; what is wrong with a copy is wrong with the pattern that made it.
+fn locate_copy(
+    problem: Problem,
+    made: &Expanded,
+    root: &Node,
+    sets: &[String],
+    of_file: Option<&[Problem]>,
+) -> Diagnostic {
+    let Some((path, name)) = made.origin(&problem.path) else {
+        return locate(problem, root, sets, of_file);
+    };
+    let copy = format!("in the copy {name:?}: ");
+    let mut found = locate(problem.clone(), root, sets, of_file);
+    if !matches!(found.place, Place::Set(_)) {
+        found.place = place(&root.nearest(&path).source, &path.to_string(), sets);
+    }
+    found.message.insert_str(0, &copy);
+    found
 }
 
 /// The place of a problem: the `--set` that caused it, else where the value is written.

@@ -93,6 +93,8 @@ pub struct Analysis {
     pub seeing: usize,
     /// Elements without one.
     pub lost: usize,
+    /// Elements whose chief ray's way ends at a facet: facets that shade others, or are seen from behind.
+    pub stopped_by_facets: usize,
     /// Longest run of neighboring elements without one, in degrees of the scan.
     pub largest_gap_deg: f64,
     /// Share of all directions, 4π, that the cells of the seeing elements cover.
@@ -191,6 +193,7 @@ pub fn analyze(scene: &Scene, seed: Option<u64>, detail: Detail) -> Result<Analy
         counts,
         seeing,
         lost: elements.len() - seeing,
+        stopped_by_facets: stopped_by_facets(&structure, &elements),
         largest_gap_deg: largest_gap(&elements),
         field_of_regard: field.covered_sr / SPHERE_SR,
         solid_angle_sr: field.covered_sr,
@@ -247,6 +250,12 @@ fn runs(elements: &[Element]) -> Vec<Run> {
             })
         })
         .collect()
+}
+
+fn stopped_by_facets(structure: &Structure, elements: &[Element]) -> usize {
+    let is_facet = |name: &str| structure.facets.iter().any(|f| f.name == name);
+    let stopped = elements.iter().filter_map(|e| e.stopped_by.as_deref());
+    stopped.filter(|name| is_facet(name)).count()
 }
 
 /// The longest run of elements that do not see, in degrees of the scan.

@@ -128,6 +128,25 @@ impl Requirement {
         Ok(unmet.map(words).collect())
     }
 
+    /// The name of the figure.
+    pub(crate) fn key(&self) -> &str {
+        &self.key
+    }
+
+    /// How far figures are from meeting it, as a share of its limit and summed over all it names; 1 for one without a
+    /// value.
+    pub(crate) fn shortfall(&self, figures: &[(String, Option<f64>)]) -> f64 {
+        let named = figures.iter().filter(|(key, _)| matches(&self.key, key));
+        let scale = if self.limit == 0.0 { 1.0 } else { self.limit.abs() };
+        named
+            .map(|(_, value)| match value {
+                Some(value) if self.holds(*value) => 0.0,
+                Some(value) => (value - self.limit).abs() / scale,
+                None => 1.0,
+            })
+            .sum()
+    }
+
     fn holds(&self, value: f64) -> bool {
         match self.comparison {
             Comparison::AtLeast => value >= self.limit,
@@ -135,6 +154,12 @@ impl Requirement {
             Comparison::Above => value > self.limit,
             Comparison::Below => value < self.limit,
         }
+    }
+}
+
+impl fmt::Display for Requirement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
     }
 }
 

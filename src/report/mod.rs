@@ -8,6 +8,7 @@ mod angles;
 mod characterization;
 mod figure;
 mod layout;
+mod optimum;
 mod page;
 mod plan;
 mod plots;
@@ -20,6 +21,7 @@ mod words;
 pub use characterization::characterization;
 pub(crate) use figure::color as facet_color;
 pub use layout::{Drawn, layout, layout_pictures};
+pub use optimum::{front_picture, goal_value, optimum};
 pub use plan::plan;
 pub use study::study;
 

@@ -158,7 +158,7 @@ fn types_ranges_and_words() {
         "shape.rectangle",
         "shape.square",
         "square",
-        &["wedge, rectangle, polygon"],
+        &["wedge, plate, rectangle, polygon"],
     );
     expect_one(
         "width_mm = 600.0\n",

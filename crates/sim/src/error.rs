@@ -71,6 +71,9 @@ pub enum SimError {
         /// Why it cannot.
         what: String,
     },
+    /// Patterns that nobody has made facets of.
+    #[error("the scene's patterns have not been worked out into facets")]
+    Patterns,
     /// A scene to trace rays in, and no more.
     #[error(
         "the scene has no laboratory: recording takes a [superstructure] with markers, and either room.size_m and a \

@@ -1,6 +1,7 @@
 //! From a facet as a person describes it to its corners in the nominal sensor frame.
 
-use crate::scene::{FacetShape, RectangleShape, Wedge};
+use crate::pattern::plate_azimuth_deg;
+use crate::scene::{FacetShape, Plate, RectangleShape, Wedge};
 use catoptric_model::beam;
 use catoptric_model::mirror;
 use nalgebra::{Point3, Unit, Vector3};
@@ -12,6 +13,7 @@ use nalgebra::{Point3, Unit, Vector3};
 pub fn corners(shape: &FacetShape) -> Option<Vec<Point3<f64>>> {
     match shape {
         FacetShape::Wedge(wedge) => wedge_corners(wedge),
+        FacetShape::Plate(plate) => plate_corners(plate),
         FacetShape::Rectangle(rectangle) => rectangle_corners(rectangle),
         FacetShape::Polygon(polygon) => Some(
             polygon
@@ -49,6 +51,25 @@ fn wedge_corners(wedge: &Wedge) -> Option<Vec<Point3<f64>>> {
         corners.reverse();
     }
     Some(corners)
+}
+
+/// The rectangle about the point where the beam meets it.
+fn plate_corners(plate: &Plate) -> Option<Vec<Point3<f64>>> {
+    let u = beam::direction(plate_azimuth_deg(plate)?.to_radians());
+    let toward = |azimuth: f64, elevation: f64| beam::spherical(azimuth.to_radians(), elevation.to_radians());
+    let exit = plate.exit_azimuth_deg.zip(plate.exit_elevation_deg);
+    let normal = plate.normal_azimuth_deg.zip(plate.normal_elevation_deg);
+    let m = match (exit, normal) {
+        (Some((azimuth, elevation)), None) => mirror::normal_between(&u, &toward(azimuth, elevation))?,
+        (None, Some((azimuth, elevation))) => toward(azimuth, elevation),
+        _ => return None,
+    };
+    let center = Point3::from(u.into_inner() * (1e-3 * plate.distance_mm));
+    rectangle(
+        center,
+        m.into_inner(),
+        [1e-3 * plate.width_mm, 1e-3 * plate.height_mm],
+    )
 }
 
 fn rectangle_corners(shape: &RectangleShape) -> Option<Vec<Point3<f64>>> {

@@ -14,6 +14,7 @@ pub mod mesh;
 pub mod mocap;
 pub mod noise;
 pub mod optics;
+pub mod pattern;
 pub mod phase;
 pub mod placement;
 pub mod power;

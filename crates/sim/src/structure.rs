@@ -199,7 +199,8 @@ impl Structure {
     /// The structure as drawn.
     ///
     /// # Errors
-    /// [`SimError::Facet`] for a facet that is no mirror.
+    /// [`SimError::Facet`] for a facet that is no mirror, [`SimError::Patterns`] if [`crate::pattern::expand`] has not been
+    /// asked.
     pub fn nominal(scene: &Scene) -> Result<Self, SimError> {
         Self::build(scene, None)
     }
@@ -213,6 +214,9 @@ impl Structure {
     }
 
     fn build(scene: &Scene, seed: Option<u64>) -> Result<Self, SimError> {
+        if !scene.superstructure.pattern.is_empty() {
+            return Err(SimError::Patterns);
+        }
         let nominal = nominal_mount(scene);
         let mount_error = seed.map_or_else(Pose::identity, |seed| mount_error(scene, seed));
         let sensor_from_drawing = mount_error.inverse();

@@ -75,7 +75,7 @@ impl Value {
 }
 
 impl Node {
-    fn child(&self, segment: &Segment) -> Option<&Node> {
+    pub(in crate::io) fn child(&self, segment: &Segment) -> Option<&Node> {
         match (&self.value, segment) {
             (Value::Table(entries), Segment::Key(name)) => {
                 entries.iter().find(|(k, _)| k.name == *name).map(|(_, n)| n)

@@ -2,7 +2,11 @@
 
 use super::toml::node;
 use super::{Key, Node, Source, Value};
+use catoptric_sim::check::{Segment, nearest};
 use toml::de::DeValue;
+
+/// The table whose entries are set by name alone.
+const PARAMETERS: &str = "parameters";
 
 /// Applies the `--set` of that number: `superstructure.facet.0.name=left`, `board[1].width_mm=500`.
 pub(in crate::io) fn apply_set(root: &mut Node, argument: &str, number: usize) -> Result<(), String> {
@@ -15,6 +19,10 @@ pub(in crate::io) fn apply_set(root: &mut Node, argument: &str, number: usize) -
         source: source.clone(),
         value: set_value(text.trim(), &source)?,
     };
+    let of_parameters = steps.first().is_some_and(|s| s == PARAMETERS);
+    if let (true, Some(name)) = (of_parameters, steps.get(1)) {
+        known_parameter(root, name)?;
+    }
     let mut at = root;
     for (i, step) in steps.iter().enumerate() {
         let so_far = if i == 0 {
@@ -58,8 +66,40 @@ pub(in crate::io) fn apply_set(root: &mut Node, argument: &str, number: usize) -
             other => return Err(format!("{so_far} is {}; it has no keys", other.describe())),
         };
     }
+    if let [_, _] = steps.as_slice()
+        && of_parameters
+        && let Value::Table(entries) = &mut at.value
+        && !matches!(value.value, Value::Table(_))
+    {
+        // A parameter keeps its limits.
+        let key = Key {
+            source: source.clone(),
+            name: "value".to_owned(),
+        };
+        entries.retain(|(k, _)| k.name != key.name);
+        entries.push((key, value));
+        return Ok(());
+    }
     *at = value;
     Ok(())
+}
+
+/// A parameter that comes into being on the command line would change nothing.
+fn known_parameter(root: &Node, name: &str) -> Result<(), String> {
+    let table = root.child(&Segment::Key(PARAMETERS.to_owned())).map(|n| &n.value);
+    let names: Vec<&str> = match table {
+        Some(Value::Table(entries)) => entries.iter().map(|(k, _)| k.name.as_str()).collect(),
+        _ => Vec::new(),
+    };
+    if names.contains(&name) {
+        return Ok(());
+    }
+    let help = match (nearest(name, names.iter().copied()), names.is_empty()) {
+        (Some(near), _) => format!("did you mean {PARAMETERS}.{near}?"),
+        (None, true) => "it has none".to_owned(),
+        (None, false) => format!("it has {}", names.join(", ")),
+    };
+    Err(format!("the scene has no parameter `{name}`; {help}"))
 }
 
 fn split_path(path: &str) -> Result<Vec<String>, String> {

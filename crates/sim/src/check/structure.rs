@@ -4,7 +4,7 @@ use super::outline::{Face, Meets, Obstacles};
 use super::values::distinct;
 use super::{Findings, Path};
 use crate::layout;
-use crate::scene::{Facet, FacetShape, Marker, RectangleShape, Scanner, Scene, Wedge};
+use crate::scene::{Facet, FacetShape, Marker, Plate, RectangleShape, Scanner, Scene, Wedge};
 use catoptric_model::beam;
 use nalgebra::{Point3, Unit, Vector3};
 
@@ -20,6 +20,13 @@ pub(super) const SCAN_HALF_DEG: f64 = 135.0;
 
 pub(super) fn check(scene: &Scene, found: &mut Findings) {
     let structure = Path::of("superstructure");
+    if !scene.superstructure.pattern.is_empty() {
+        found.add(
+            &structure.key("pattern"),
+            "is not worked out into facets yet",
+            "io::scene does so as it reads a file, sim::pattern::expand by itself".to_owned(),
+        );
+    }
     let obstacles = Obstacles::of(scene);
     let met = obstacles.met_by_beams();
     for (i, facet) in scene.superstructure.facet.iter().enumerate() {
@@ -27,6 +34,7 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
         let before = found.0.len();
         match &facet.shape {
             FacetShape::Wedge(wedge) => check_wedge(wedge, &path.key("wedge"), found),
+            FacetShape::Plate(plate) => check_plate(plate, &path.key("plate"), found),
             FacetShape::Rectangle(shape) => check_rectangle(shape, &path.key("rectangle"), found),
             FacetShape::Polygon(shape) => {
                 let corners = layout::corners(&facet.shape).unwrap_or_default();
@@ -158,6 +166,47 @@ fn check_wedge(wedge: &Wedge, path: &Path, found: &mut Findings) {
             ),
             "turn the beam farther, narrow azimuth_deg or lower height_mm".to_owned(),
         );
+    }
+}
+
+fn check_plate(plate: &Plate, path: &Path, found: &mut Findings) {
+    match (plate.azimuth_deg, plate.beam) {
+        (Some(_), Some(_)) => found.add(
+            &path.key("beam"),
+            "names a beam, and `azimuth_deg` another",
+            "delete one of the two".to_owned(),
+        ),
+        (None, None) => found.add(
+            path,
+            "says of no beam that it meets its center",
+            "give it azimuth_deg, or beam".to_owned(),
+        ),
+        _ => {}
+    }
+    let exit = [plate.exit_azimuth_deg, plate.exit_elevation_deg];
+    let normal = [plate.normal_azimuth_deg, plate.normal_elevation_deg];
+    let given = |angles: &[Option<f64>; 2]| angles.iter().flatten().count();
+    if !matches!((given(&exit), given(&normal)), (2, 0) | (0, 2)) {
+        found.add(
+            path,
+            "needs one direction, and has none, half of one, or two",
+            "give it exit_azimuth_deg and exit_elevation_deg, or normal_azimuth_deg and normal_elevation_deg"
+                .to_owned(),
+        );
+        return;
+    }
+    let one_beam = plate.azimuth_deg.is_some() != plate.beam.is_some();
+    match layout::corners(&FacetShape::Plate(plate.clone())) {
+        Some(corners) => {
+            let help = "turn the normal round: it points from the mirror towards the scanner's side";
+            check_side(&corners, path, help, found);
+        }
+        None if one_beam => found.add(
+            path,
+            "describes no mirror: its beam leaves as it comes",
+            "turn exit_azimuth_deg or exit_elevation_deg away from the beam".to_owned(),
+        ),
+        None => {}
     }
 }
 

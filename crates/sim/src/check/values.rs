@@ -7,6 +7,7 @@ use catoptric_model::dataset::RIG_SUBJECT;
 
 pub(super) fn check(scene: &Scene, found: &mut Findings) {
     names(scene, found);
+    parameters(scene, found);
     colors(scene, found);
     tables(scene, found);
     shares(scene, found);
@@ -36,6 +37,31 @@ pub(super) fn distinct<'a>(list: &Path, names: impl Iterator<Item = &'a str>, fo
             );
         }
         seen.push(name);
+    }
+}
+
+/// A search goes from one limit to the other.
+fn parameters(scene: &Scene, found: &mut Findings) {
+    for (name, parameter) in &scene.parameters {
+        let path = Path::of("parameters").key(name);
+        match (parameter.low, parameter.high) {
+            (Some(low), Some(high)) if low >= high => found.add(
+                &path,
+                format_args!("reaches from {low} to {high}; the smaller limit is `low`"),
+                (low > high).then(|| format!("write low = {high}, high = {low}")),
+            ),
+            (Some(low), Some(high)) if !(low..=high).contains(&parameter.value) => found.add(
+                &path.key("value"),
+                format_args!("is {}; {low} to {high} is allowed", parameter.value),
+                None,
+            ),
+            (Some(_), None) | (None, Some(_)) => found.add(
+                &path,
+                "has one limit; a search needs both `low` and `high`",
+                "give it the other, or none".to_owned(),
+            ),
+            _ => {}
+        }
     }
 }
 

@@ -8,6 +8,8 @@ mod detection;
 mod errors;
 mod flight;
 mod mishap;
+mod parameter;
+mod pattern;
 mod room;
 mod scanner;
 mod superstructure;
@@ -21,11 +23,13 @@ pub use detection::{Detection, Detector, EchoChoice, Principle};
 pub use errors::{Characterization, Correlated, ErrorModel, Errors, Interference, NoiseTable, WarmUp};
 pub use flight::{Attitude, Flight, Waypoint};
 pub use mishap::{Mishap, Mislabelled};
+pub use parameter::Parameter;
+pub use pattern::{CopyList, Exchange, FacetCopy, MirrorImage, Pattern, Ring};
 pub use room::{Board, BoardPose, Color, Design, Experiment, MarkerNoise, Mocap, MocapProfile, Room};
 pub use scanner::{BeamShape, HousingBox, Light, Limits, Mount, Preset, Scanner};
 pub use superstructure::{
-    AsBuilt, Facet, FacetShape, Glass, Marker, Mirror, PolygonShape, Post, RectangleShape, Superstructure,
-    Wedge,
+    AsBuilt, Facet, FacetShape, Glass, Marker, Mirror, Plate, PolygonShape, Post, RectangleShape,
+    Superstructure, Wedge,
 };
 pub use test::SensorTest;
 
@@ -49,6 +53,9 @@ pub struct Scene {
     /// Seed of every random draw; `--seed` overrides it.
     #[serde(default = "one")]
     pub seed: u64,
+    /// Numbers of the design with names and bounds, for expressions and searches.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub parameters: BTreeMap<String, Parameter>,
     /// The scanner.
     #[serde(default = "ust_20lx")]
     pub scanner: Scanner,

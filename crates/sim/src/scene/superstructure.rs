@@ -1,6 +1,7 @@
 //! What is built around the scanner: mirrors, posts, markers, and how far they are from the drawing.
 
 use super::body::PostShape;
+use super::pattern::Pattern;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -11,6 +12,9 @@ pub struct Superstructure {
     /// The mirrors.
     #[serde(default)]
     pub facet: Vec<Facet>,
+    /// Mirrors that are copies of others.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pattern: Vec<Pattern>,
     /// Opaque bodies.
     #[serde(default)]
     pub post: Vec<Post>,
@@ -37,6 +41,7 @@ impl Default for Superstructure {
     fn default() -> Self {
         Self {
             facet: Vec::new(),
+            pattern: Vec::new(),
             post: Vec::new(),
             marker: Vec::new(),
             mirror: Mirror::default(),
@@ -73,6 +78,8 @@ pub struct Facet {
 pub enum FacetShape {
     /// Cut by two azimuths and two heights, and turned so that its middle beam leaves in a wanted direction.
     Wedge(Wedge),
+    /// A rectangle about one beam, turned so that it leaves in a wanted direction, or with a given normal.
+    Plate(Plate),
     /// A rectangle with a given center and normal.
     Rectangle(RectangleShape),
     /// Given corners.
@@ -96,6 +103,45 @@ pub struct Wedge {
     #[schemars(range(min = -90.0, max = 90.0))]
     pub exit_elevation_deg: f64,
     /// Height over which the facet reaches, centered on the scan plane, in millimetres.
+    #[schemars(range(min = 0.1, max = 10000.0))]
+    pub height_mm: f64,
+}
+
+/// A rectangle about one beam: `azimuth_deg` or `beam`, and either both `exit_` or both `normal_` angles.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Plate {
+    /// Azimuth of the beam that meets its center, in degrees.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -180.0, max = 180.0))]
+    pub azimuth_deg: Option<f64>,
+    /// The same beam by its index.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0, max = 1080))]
+    pub beam: Option<u32>,
+    /// Distance from the sensor origin to its center, in millimetres.
+    #[schemars(range(min = 1.0, max = 10000.0))]
+    pub distance_mm: f64,
+    /// Azimuth in which that beam leaves, in degrees.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -360.0, max = 360.0))]
+    pub exit_azimuth_deg: Option<f64>,
+    /// Elevation in which that beam leaves, in degrees.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -90.0, max = 90.0))]
+    pub exit_elevation_deg: Option<f64>,
+    /// Yaw: azimuth of the normal of the reflecting side, in degrees.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -360.0, max = 360.0))]
+    pub normal_azimuth_deg: Option<f64>,
+    /// Pitch: elevation of that normal, in degrees.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -90.0, max = 90.0))]
+    pub normal_elevation_deg: Option<f64>,
+    /// Extent parallel to the scan plane, in millimetres.
+    #[schemars(range(min = 0.1, max = 10000.0))]
+    pub width_mm: f64,
+    /// Extent along the other side, in millimetres.
     #[schemars(range(min = 0.1, max = 10000.0))]
     pub height_mm: f64,
 }

@@ -1,0 +1,267 @@
+//! The search for better layouts finds what can be known, keeps what it must, and says the same every time.
+//!
+//! What a candidate's goals are is compared with `layout` of the scene that is written. That the search finds the best
+//! there is, is shown only where that is known in closed form.
+
+use crate::common::{folder_with, run, stderr, stdout};
+use crate::parametric::PARAMETRIC;
+use catoptric::io::{scene, template::Template};
+use catoptric::layout::{self, Detail, Requirement};
+use catoptric::optimize::{Goal, Optimum, Options, Wanted, optimize};
+use serde_json::Value;
+
+fn template(text: &str) -> Template {
+    Template::parse(text, "scene.toml", &[]).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn options(goals: &[&str], requirements: &[&str], evaluations: usize) -> Options {
+    Options {
+        goals: goals.iter().map(|g| Goal::parse(g, &[]).unwrap()).collect(),
+        requirements: requirements
+            .iter()
+            .map(|r| Requirement::parse(r).unwrap())
+            .collect(),
+        evaluations,
+        seed: 1,
+        detail: Detail::Coarse,
+    }
+}
+
+fn search(text: &str, options: &Options) -> Optimum {
+    optimize(&template(text), options, &mut |_| true).unwrap()
+}
+
+#[test]
+fn the_same_seed_gives_the_same_answer_on_any_number_of_threads() {
+    let options = options(&["field_of_regard", "size"], &[], 90);
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| search(PARAMETRIC, &options))
+    };
+    let one = on(1);
+    assert_eq!(one, on(3));
+    assert!(
+        one.evaluations > 60 && one.evaluations <= 90,
+        "{}",
+        one.evaluations
+    );
+    assert!(one.front.len() > 1);
+    let other = search(PARAMETRIC, &Options { seed: 2, ..options });
+    assert_ne!(one.front, other.front);
+}
+
+#[test]
+fn a_known_optimum_is_found() {
+    // One facet alone decides how large the layout is, and farther is larger: the least distance is the best. Elements
+    // that look to 60° are nearest to 47° where the limit is 47°.
+    let text = r#"
+        schema_version = 1
+        name = "one"
+        [parameters]
+        reach_mm = { value = 90, low = 60, high = 120 }
+        rise_deg = { value = 30, low = 20, high = 70 }
+        [scanner]
+        preset = "ust-20lx"
+        housing = false
+        [[superstructure.facet]]
+        name = "a"
+        [superstructure.facet.shape.plate]
+        azimuth_deg = 0
+        distance_mm = "= reach_mm"
+        exit_azimuth_deg = 180
+        exit_elevation_deg = "= rise_deg"
+        width_mm = 30
+        height_mm = 20
+        [[superstructure.marker]]
+        name = "a"
+        position_mm = [90, 0, 30]
+        [[superstructure.marker]]
+        name = "b"
+        position_mm = [0, 90, 30]
+        [[superstructure.marker]]
+        name = "c"
+        position_mm = [0, -80, 20]
+        [room]
+        size_m = [5, 4, 3]
+    "#;
+    let found = search(text, &options(&["size.diameter_mm:down"], &[], 300));
+    let best = found.best.unwrap();
+    assert!((best.parameters["reach_mm"] - 60.0).abs() < 0.1, "{best:?}");
+    assert!(found.beats_start_in_every_goal);
+    let wanted = [Wanted::parse("180,47,4").unwrap()];
+    let directions = Options {
+        goals: vec![Goal::parse("directions", &wanted).unwrap()],
+        ..options(&["size"], &[], 300)
+    };
+    let found = search(text, &directions);
+    let best = found.best.unwrap();
+    // The four nearest of a fan whose beams are 0.25° apart are 0.25° away on average at the best.
+    assert!((best.parameters["rise_deg"] - 47.0).abs() < 0.5, "{best:?}");
+    assert!(
+        best.goals["directions"] < 0.3 && found.start.goals["directions"] > 10.0,
+        "{best:?}"
+    );
+}
+
+#[test]
+fn what_is_required_is_kept() {
+    let requirements = [
+        "size.diameter_mm<=165",
+        "facets.*.margin_across_mm>=3",
+        "stopped_by_facets<=0",
+    ];
+    let found = search(PARAMETRIC, &options(&["field_of_regard"], &requirements, 200));
+    assert!(
+        !found.start.is_kept(),
+        "the prototype is wider, and has less room"
+    );
+    assert!(
+        found.start.unmet.iter().any(|u| u.contains("diameter")),
+        "{:?}",
+        found.start.unmet
+    );
+    let best = found.best.unwrap();
+    let scene = template(PARAMETRIC).with(&best.choice()).unwrap();
+    let analysis = layout::analyze(&scene, None, Detail::Coarse).unwrap();
+    assert!(analysis.size.diameter_mm <= 165.0 && analysis.stopped_by_facets == 0);
+    assert!(analysis.facets.iter().all(|f| f.margin_across_mm.unwrap() >= 3.0));
+    assert_eq!(best.goals["field_of_regard"], analysis.field_of_regard);
+}
+
+#[test]
+fn a_search_that_is_told_to_stop_gives_what_it_has() {
+    let mut batches = 0;
+    let found = optimize(
+        &template(PARAMETRIC),
+        &options(&["field_of_regard", "size"], &[], 400),
+        &mut |_| {
+            batches += 1;
+            batches < 3
+        },
+    )
+    .unwrap();
+    assert!(found.interrupted);
+    assert_eq!(found.evaluations, 1 + 3 * 16);
+    assert!(!found.front.is_empty());
+}
+
+#[test]
+fn the_hand_made_prototype_is_beaten_in_both_goals() {
+    let (folder, _) = folder_with(PARAMETRIC);
+    let arguments = [
+        "optimize",
+        "scene.toml",
+        "--goal",
+        "field_of_regard",
+        "--goal",
+        "lost_beams",
+        "--evaluations",
+        "160",
+        "--out",
+        "found",
+        "--json",
+        "-q",
+    ];
+    let output = run(folder.path(), &arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let found: Value = serde_json::from_str(&stdout(&output)).unwrap();
+    assert_eq!(found["beats_start_in_every_goal"], true);
+    let goal = |of: &str, name: &str| found[of]["goals"][name].as_f64().unwrap();
+    assert!(goal("best", "field_of_regard") > 1.02 * goal("start", "field_of_regard"));
+    assert!(goal("best", "lost_beams") < 0.8 * goal("start", "lost_beams"));
+    // What is written is what was looked at, with every sub-ray.
+    let path = folder.path().join("found/best.toml");
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(
+        text.starts_with("# Found by catoptric optimize in scene.toml: field_of_regard 0.00"),
+        "{text}"
+    );
+    // The designer's own file, with other numbers.
+    assert!(
+        text.contains("second_deg = \"= first_deg + span_deg + gap_deg\"") && text.contains("# between two")
+    );
+    let written = scene::load(&path, &[]).unwrap();
+    let analysis = layout::analyze(&written, None, Detail::Full).unwrap();
+    assert_eq!(analysis.field_of_regard, goal("best", "field_of_regard"));
+    assert_eq!(analysis.lost as f64, goal("best", "lost_beams"));
+    // It can be simulated, and it says why it is better.
+    let checked = run(folder.path(), &["check", "found/best.toml"]);
+    assert_eq!(checked.status.code(), Some(0), "{}", stderr(&checked));
+    let left = found["why"]["left_as_it_was"].as_array().unwrap();
+    assert!(left.len() > 5, "{left:?}");
+    let page = std::fs::read_to_string(folder.path().join("found/report.html")).unwrap();
+    for words in [
+        "Why it is better",
+        "left as drawn",
+        "<svg",
+        "gap_deg",
+        "better than the drawing in every goal",
+    ] {
+        assert!(page.contains(words), "{words}");
+    }
+    let csv = std::fs::read_to_string(folder.path().join("found/front.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 1 + found["front"].as_array().unwrap().len());
+    for k in 1..=found["front"].as_array().unwrap().len().min(12) {
+        scene::load(&folder.path().join(format!("found/front-{k:02}.toml")), &[]).unwrap();
+    }
+}
+
+#[test]
+fn what_makes_no_search_is_said() {
+    let (folder, _) = folder_with(PARAMETRIC);
+    let refuse = |arguments: &[&str], code: i32, words: &[&str]| {
+        let mut all = vec!["optimize", "scene.toml", "--evaluations", "20", "--coarse"];
+        all.extend(arguments);
+        let output = run(folder.path(), &all);
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(code), "{said}");
+        for word in words {
+            assert!(said.contains(word), "{word:?} is not in {said:?}");
+        }
+    };
+    refuse(
+        &["--goal", "feild_of_regard"],
+        2,
+        &["is no goal", "did you mean field_of_regard?"],
+    );
+    refuse(
+        &["--goal", "szie.height_mm:up"],
+        2,
+        &["no figure of a layout", "did you mean size.height_mm?"],
+    );
+    refuse(&["--goal", "directions"], 2, &["need one another"]);
+    refuse(
+        &["--goal", "size", "--direction", "90,-60"],
+        2,
+        &["need one another"],
+    );
+    refuse(
+        &["--goal", "directions", "--direction", "90,-100"],
+        2,
+        &["is no direction"],
+    );
+    refuse(&["--goal", "size", "--goal", "size"], 2, &["given twice"]);
+    refuse(
+        &["--goal", "size", "--require", "lots<=3"],
+        2,
+        &["no figure of a layout"],
+    );
+    refuse(
+        &["--goal", "size", "--require", "size.diameter_mm<=10"],
+        1,
+        &["keeps every requirement", "diameter_mm is"],
+    );
+    let output = run(folder.path(), &["optimize", "scene.toml"]);
+    assert_eq!(output.status.code(), Some(2));
+    std::fs::write(folder.path().join("fixed.toml"), crate::scenes::PROTOTYPE).unwrap();
+    let output = run(folder.path(), &["optimize", "fixed.toml", "--goal", "size"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(
+        stderr(&output).contains("no parameter with both `low` and `high`"),
+        "{}",
+        stderr(&output)
+    );
+}
