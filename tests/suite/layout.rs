@@ -19,6 +19,14 @@ use catoptric::sim::{Laboratory, Scene, color};
 use nalgebra::{Point3, Rotation3, Unit, Vector3};
 use std::path::{Path, PathBuf};
 
+/// The layouts that are built in.
+const GALLERY: [&str; 4] = [
+    "prototype.toml",
+    "two-mirror.toml",
+    "gallery/pyramid.toml",
+    "gallery/altimeter.toml",
+];
+
 fn load(path: &str) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(path);
     scenes::load(&path, &[]).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
@@ -76,6 +84,10 @@ fn assert_is_the_truth(scene: &Scene, analysis: &Analysis, name: &str) {
 fn classes_are_those_of_the_truth_in_every_scene() {
     let scenes = recordable();
     assert!(scenes.len() > 30, "{}", scenes.len());
+    for layout in scenes::Layout::ALL {
+        let drawn = scenes::parse(scenes::scene_template(layout), "template.toml", &[]).unwrap();
+        assert!(scenes.iter().any(|(_, scene)| *scene == drawn), "{layout:?} is missing");
+    }
     for (path, scene) in scenes {
         let analysis = layout::analyze(&scene, Some(scene.seed), Detail::Full).unwrap();
         assert_is_the_truth(&scene, &analysis, &path.display().to_string());
@@ -84,12 +96,13 @@ fn classes_are_those_of_the_truth_in_every_scene() {
 
 #[test]
 fn classes_of_a_drawing_are_those_of_a_structure_built_exactly_so() {
-    for name in ["prototype.toml", "two-mirror.toml"] {
+    for name in GALLERY {
         let mut scene = load(name);
         scene.superstructure.as_built = catoptric::sim::scene::AsBuilt {
             tilt_sd_deg: 0.0,
             shift_sd_mm: 0.0,
             slope_rms_mrad: 0.0,
+            thickness_sd_mm: 0.0,
         };
         scene.scanner.mount.yaw_tolerance_deg = 0.0;
         scene.scanner.mount.tilt_tolerance_deg = 0.0;
@@ -295,7 +308,7 @@ fn point_at(scene: &Scene, beam: usize, range: f64) -> Point3<f64> {
 
 #[test]
 fn sensitivities_are_the_simulators_finite_differences() {
-    for name in ["prototype.toml", "two-mirror.toml"] {
+    for name in GALLERY {
         let mut scene = load(name);
         scene.scanner.sub_rays = 1;
         let structure = Structure::nominal(&scene).unwrap();
