@@ -13,6 +13,7 @@ mod plan;
 mod plots;
 mod scores;
 mod study;
+mod tolerance;
 mod trials;
 mod verdict;
 mod words;
@@ -22,6 +23,7 @@ pub(crate) use figure::color as facet_color;
 pub use layout::{Drawn, layout, layout_pictures};
 pub use plan::plan;
 pub use study::study;
+pub use tolerance::{tolerance, tolerance_plot};
 
 use crate::apply::PointCloud;
 use crate::score::Score;

@@ -30,5 +30,6 @@ mod scenes;
 mod study;
 mod sub_rays;
 mod tiers;
+mod tolerance;
 mod tracing;
 mod traps;

@@ -225,7 +225,7 @@ impl Laboratory {
             believed.angle_gain_sd_mm * (1.0 - cos),
             believed.bias.angle.gain_mm * sin * tilt,
             // The mirror's own thickness is added, whatever it really is.
-            self.scene.superstructure.as_built.thickness_sd_mm / cos.max(0.1),
+            self.scene.superstructure.as_built.thickness_sd_mm / cos.max(f64::EPSILON),
         ];
         terms.iter().map(|mm| mm * mm * 1e-6).sum()
     }
