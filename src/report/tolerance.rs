@@ -60,8 +60,8 @@ pub fn tolerance(found: &Tolerance) -> String {
     );
     html += &format!(
         "<footer>Structures are built from the drawing under the seeds from {} on; {} loses most. Errors are in the sensor \
-         frame, over the elements that one facet deflects alone in the drawing and as built. Per axis is what a direction's \
-         error is over √2. Elements without a direction are split, blocked, lost or too faint.</footer>\n",
+         frame, over the elements that one facet deflects alone in the drawing and as built. Elements without a \
+         direction are split, blocked, trapped or too faint.</footer>\n",
         found.seed, found.worst_seed
     );
     page(&format!("{} – catoptric tolerance", found.name), &html)
@@ -194,21 +194,21 @@ fn plot(found: &Tolerance) -> String {
         ..Shapes::default()
     };
     let lines = [
-        ("rms", found.direction_deg.rms, 1.18),
-        ("95 %", found.direction_deg.p95, 1.18),
+        ("rms", found.direction_deg.rms, 1.04),
+        ("95 %", found.direction_deg.p95, 1.14),
     ];
     for (name, at, height) in lines {
         let Some(at) = at else {
             continue;
         };
         shapes.strokes.push(Stroke {
-            points: vec![(at, 0.0), (at, 1.1 * highest)],
+            points: vec![(at, 0.0), (at, height * highest)],
             color: BLACK,
             width: 2,
             opacity: 0.8,
         });
         shapes.words.push(Word {
-            at: (at, height * highest),
+            at: (at, (height + 0.05) * highest),
             text: format!("{name} {}°", number(at, 2)),
             color: BLACK,
         });

@@ -7,8 +7,8 @@ use crate::score::percentile;
 use catoptric_sim::Scene;
 use serde::Serialize;
 
-/// About how many bars a histogram has.
-const BARS: f64 = 40.0;
+/// Bars that a histogram has at most, save for the one of the greatest value.
+const BARS: f64 = 60.0;
 
 /// What manufacturing errors do to a layout.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -172,7 +172,7 @@ impl Histogram {
         let width_deg = round_above(largest / BARS);
         let mut counts = Vec::new();
         for value in values {
-            // At most about as many as bars are wanted.
+            // At most the number of bars.
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             let bar = (value / width_deg) as usize;
             if bar >= counts.len() {
