@@ -127,14 +127,8 @@ impl Requirement {
             .into_iter()
             .filter(|(_, value)| !value.is_some_and(|v| self.holds(v)));
         let words = |(key, value): &(String, Option<f64>)| match value {
-            Some(value) => Unmet(format!(
-                "{name}: {key} is {value}, required {}",
-                self.text
-            )),
-            None => Unmet(format!(
-                "{name}: {key} has no value, required {}",
-                self.text
-            )),
+            Some(value) => Unmet(format!("{name}: {key} is {value}, required {}", self.text)),
+            None => Unmet(format!("{name}: {key} has no value, required {}", self.text)),
         };
         Ok(unmet.map(words).collect())
     }

@@ -15,7 +15,10 @@ pub fn tolerance(found: &Tolerance) -> String {
     );
     html += &format!("<p>{}</p>\n", escape(&errors(found)));
     html += "<h2>Before and after calibration</h2>\n";
-    html += &table(&["Direction, off by (°)", "rms", "median", "95 %", "at most"], &stages(found));
+    html += &table(
+        &["Direction, off by (°)", "rms", "median", "95 %", "at most"],
+        &stages(found),
+    );
     html += "<h2>How far directions are off before calibration</h2>\n";
     html += &figure(
         &plot(found),
@@ -52,7 +55,10 @@ pub fn tolerance(found: &Tolerance) -> String {
             ]
         })
         .collect();
-    html += &table(&["Alone", "direction, rms (°)", "point at 4 m, rms (mm)"], &sources);
+    html += &table(
+        &["Alone", "direction, rms (°)", "point at 4 m, rms (mm)"],
+        &sources,
+    );
     html += "<h2>Elements that are lost</h2>\n";
     html += &table(
         &["Elements", "as drawn", "as built, mean", "as built, worst"],
@@ -167,7 +173,12 @@ fn lost(found: &Tolerance) -> Vec<Vec<String>> {
             found.lost_mean,
             found.lost_worst,
         ),
-        row("No longer their facet's", 0, found.changed_mean, found.changed_worst),
+        row(
+            "No longer their facet's",
+            0,
+            found.changed_mean,
+            found.changed_worst,
+        ),
     ]
 }
 
@@ -219,5 +230,10 @@ fn plot(found: &Tolerance) -> String {
         x_label: "direction off by (°)".to_owned(),
         y_label: "share of elements (%)".to_owned(),
     };
-    fine(SIZE, &axes, "How far directions are off before calibration", &shapes)
+    fine(
+        SIZE,
+        &axes,
+        "How far directions are off before calibration",
+        &shapes,
+    )
 }

@@ -136,11 +136,7 @@ impl Bench {
         let setting = Setting::new(&scene, &structure, Mirrors::Attached, Vec::new())?;
         let drawn = trace(&sensor, &setting, &scene);
         drop(setting);
-        Ok(Self {
-            sensor,
-            drawn,
-            scene,
-        })
+        Ok(Self { sensor, drawn, scene })
     }
 
     fn build(&self, seed: u64) -> Result<Draw, SimError> {

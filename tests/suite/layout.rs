@@ -86,7 +86,10 @@ fn classes_are_those_of_the_truth_in_every_scene() {
     assert!(scenes.len() > 30, "{}", scenes.len());
     for layout in scenes::Layout::ALL {
         let drawn = scenes::parse(scenes::scene_template(layout), "template.toml", &[]).unwrap();
-        assert!(scenes.iter().any(|(_, scene)| *scene == drawn), "{layout:?} is missing");
+        assert!(
+            scenes.iter().any(|(_, scene)| *scene == drawn),
+            "{layout:?} is missing"
+        );
     }
     for (path, scene) in scenes {
         let analysis = layout::analyze(&scene, Some(scene.seed), Detail::Full).unwrap();
@@ -109,7 +112,7 @@ fn classes_of_a_drawing_are_those_of_a_structure_built_exactly_so() {
         scene.scanner.mount.shift_tolerance_mm = 0.0;
         let analysis = layout::analyze(&scene, None, Detail::Full).unwrap();
         assert_is_the_truth(&scene, &analysis, name);
-        assert!(analysis.counts[&Class::Split] > 0 && analysis.counts[&Class::Deflected] > 100);
+        assert!(analysis.counts[&Class::Split] > 0 && analysis.counts[&Class::Deflected] > 10);
     }
 }
 

@@ -303,10 +303,7 @@ fn build_facet(
     };
     let slope = Slope::new(&face, rms, &mut Draws::new(seed, Purpose::FacetSlope, index));
     let back = match facet.two_sided {
-        true => Some(
-            Back::of(&face, thickness)
-                .ok_or_else(|| fail("its corners lie on a line"))?,
-        ),
+        true => Some(Back::of(&face, thickness).ok_or_else(|| fail("its corners lie on a line"))?),
         false => None,
     };
     Ok(BuiltFacet {
