@@ -279,7 +279,7 @@ mod tests {
     #[test]
     fn a_distribution_is_that_of_its_values() {
         let found = Distribution::of(&[3.0, 4.0]);
-        assert!((found.rms.unwrap() - 12.5_f64.sqrt()).abs() < 1e-15);
+        assert!(found.rms.is_some_and(|rms| (rms - 12.5_f64.sqrt()).abs() < 1e-15));
         assert_eq!((found.median, found.max), (Some(3.5), Some(4.0)));
         assert_eq!(Distribution::of(&[]).rms, None);
     }
