@@ -98,6 +98,34 @@ fn classes_are_those_of_the_truth_in_every_scene() {
 }
 
 #[test]
+fn layouts_of_the_gallery_can_be_calibrated() {
+    use catoptric::calib::{Calibrator, Method};
+    // The other two have many tests of their own.
+    for name in ["gallery/pyramid.toml", "gallery/altimeter.toml"] {
+        let mut scene = load(name);
+        scene.experiment.scans_per_pose = 30;
+        for seed in [1, 2] {
+            let laboratory = Laboratory::new(&scene, seed).unwrap();
+            let (dataset, truth) = (laboratory.dataset().unwrap(), laboratory.truth().unwrap());
+            let calibration = Method::Joint.calibrate(&dataset).unwrap();
+            let score = catoptric::score(&dataset, &calibration, Some(&truth));
+            assert!(score.beams.solved >= 10, "{name} {seed}: {:?}", score.beams);
+            assert_eq!(
+                (score.beams.missed, score.beams.wrong),
+                (Some(0), Some(0)),
+                "{name} {seed}"
+            );
+            // Elements share the error of the mounting, so that one draw may be well above the bound.
+            let (error, bound) = (score.per_axis_rms_deg, score.crlb_per_axis_deg);
+            assert!(
+                error > 0.0 && error < 3.0 * bound && bound < 0.1,
+                "{name} {seed}: {error} {bound}"
+            );
+        }
+    }
+}
+
+#[test]
 fn classes_of_a_drawing_are_those_of_a_structure_built_exactly_so() {
     for name in GALLERY {
         let mut scene = load(name);
