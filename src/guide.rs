@@ -12,6 +12,8 @@
 //! 10. [`ci`]: property tests and gates, jobs to copy
 //! 11. [`planning`]: which board poses to record next
 //! 12. [`layouts`]: what a mirror layout sees, loses and allows, and files for making it
+//! 14. [`gallery`]: four layouts to start from, what they show and how well they calibrate
+//! 15. [`tolerances`]: what manufacturing errors do, and what a calibration leaves of them
 //!
 //! The chapters are Markdown files in `docs/guide/`; their Rust examples are run by the tests.
 
@@ -59,3 +61,9 @@ pub mod layouts {}
 
 #[doc = include_str!("../docs/guide/13-optimizing.md")]
 pub mod optimizing {}
+
+#[doc = include_str!("../docs/guide/14-gallery.md")]
+pub mod gallery {}
+
+#[doc = include_str!("../docs/guide/15-tolerances.md")]
+pub mod tolerances {}

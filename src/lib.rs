@@ -35,6 +35,7 @@ pub mod study;
 pub mod tables;
 #[cfg(feature = "testing")]
 pub mod testing;
+pub mod tolerance;
 pub mod validate;
 
 pub use apply::{CloudFrame, PointCloud, apply};

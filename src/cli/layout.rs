@@ -50,7 +50,7 @@ struct SideBySide<'a> {
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let requirements = requirements(&arguments.require)?;
+    let requirements = requirements(&arguments.require, EXAMPLE)?;
     let mut scenes = Vec::new();
     for path in &arguments.scenes {
         scenes.push(scene::load(path, &arguments.set)?);
@@ -102,18 +102,23 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     }
 }
 
-fn requirements(texts: &[String]) -> Result<Vec<Requirement>, CliError> {
+/// A requirement as it is given.
+const EXAMPLE: &str = "field_of_regard>=0.004";
+
+/// Reads what was given with `--require`.
+pub(super) fn requirements(texts: &[String], example: &str) -> Result<Vec<Requirement>, CliError> {
     texts
         .iter()
-        .map(|text| Requirement::parse(text).map_err(refused))
+        .map(|text| Requirement::parse(text).map_err(|e| refused(e, example)))
         .collect()
 }
 
-fn refused(error: RequirementError) -> CliError {
+/// What is wrong with a requirement.
+pub(super) fn refused(error: RequirementError, example: &str) -> CliError {
     CliError::Invalid {
         message: format!("--require: {error}"),
         help: Some(match error {
-            RequirementError::Form { .. } => "--require 'field_of_regard>=0.004'".to_owned(),
+            RequirementError::Form { .. } => format!("--require '{example}'"),
             RequirementError::Unknown { help, .. } => help,
         }),
     }
@@ -123,7 +128,7 @@ fn unmet(requirements: &[Requirement], analyses: &[Analysis]) -> Result<Vec<Stri
     let mut unmet = Vec::new();
     for analysis in analyses {
         for requirement in requirements {
-            let found = requirement.judge(analysis).map_err(refused)?;
+            let found = requirement.judge(analysis).map_err(|e| refused(e, EXAMPLE))?;
             unmet.extend(found.iter().map(|u| format!("not met: {u}")));
         }
     }

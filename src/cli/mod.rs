@@ -24,6 +24,7 @@ mod score;
 mod simulate;
 mod study;
 mod sub_rays;
+mod tolerance;
 mod trace;
 mod truth_tables;
 mod validate;
@@ -91,6 +92,8 @@ enum Verb {
     Layout(layout::Arguments),
     /// Search a scene's parameters for better layouts
     Optimize(optimize::Arguments),
+    /// Say what manufacturing errors do to a layout, and what a calibration leaves of them
+    Tolerance(tolerance::Arguments),
     /// Write a layout as solids, a 3D scene, a drawing table or frames
     Export(export::Arguments),
     /// Turn a scan into a point cloud
@@ -166,6 +169,7 @@ fn run(cli: Cli) -> Result<(), CliError> {
         Verb::Plan(arguments) => plan::run(&arguments, &context),
         Verb::Layout(arguments) => layout::run(&arguments, &context),
         Verb::Optimize(arguments) => optimize::run(&arguments, &context),
+        Verb::Tolerance(arguments) => tolerance::run(&arguments, &context),
         Verb::Export(arguments) => export::run(&arguments, &context),
         Verb::Apply(arguments) => apply::run(&arguments, &context),
         Verb::Report(arguments) => report::run(&arguments, &context),

@@ -25,6 +25,10 @@ enum LayoutName {
     Prototype,
     /// Two mirrors beside a 270° scanner
     TwoMirror,
+    /// Half a hexagonal pyramid before the scanner
+    Pyramid,
+    /// A small mirror that folds eleven beams straight down
+    Altimeter,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
@@ -41,6 +45,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
     let text = scene::scene_template(match arguments.layout {
         LayoutName::Prototype => Layout::Prototype,
         LayoutName::TwoMirror => Layout::TwoMirror,
+        LayoutName::Pyramid => Layout::Pyramid,
+        LayoutName::Altimeter => Layout::Altimeter,
     });
     // `create_new` leaves no moment in which another program's file could be overwritten.
     let file = OpenOptions::new().write(true).create_new(true).open(path);

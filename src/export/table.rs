@@ -5,7 +5,7 @@ use catoptric_sim::Scene;
 use catoptric_sim::layout::area_vector;
 
 /// Columns of the table; tolerances are 1σ.
-const HEADER: [&str; 19] = [
+const HEADER: [&str; 20] = [
     "facet",
     "corner",
     "x_mm",
@@ -23,6 +23,7 @@ const HEADER: [&str; 19] = [
     "thickness_mm",
     "tilt_tolerance_sd_deg",
     "shift_tolerance_sd_mm",
+    "thickness_tolerance_sd_mm",
     "slope_tolerance_rms_mrad",
     "reflectivity",
 ];
@@ -63,6 +64,7 @@ pub fn drawing_table(scene: &Scene, drawing: &Drawing) -> Result<Vec<u8>, csv::E
                 1e3 * plate_thickness(scene),
                 as_built.tilt_sd_deg,
                 as_built.shift_sd_mm,
+                as_built.thickness_sd_mm,
                 as_built.slope_rms_mrad,
                 superstructure.mirror.reflectivity,
             ];

@@ -49,6 +49,15 @@ pub enum Layout {
     Prototype,
     /// Two mirrors beside a 270° scanner.
     TwoMirror,
+    /// Half a hexagonal pyramid before the scanner.
+    Pyramid,
+    /// A small mirror that folds eleven beams straight down.
+    Altimeter,
+}
+
+impl Layout {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Prototype, Self::TwoMirror, Self::Pyramid, Self::Altimeter];
 }
 
 /// A commented scene to start from.
@@ -56,6 +65,8 @@ pub fn scene_template(layout: Layout) -> &'static str {
     match layout {
         Layout::Prototype => include_str!("../../scenes/prototype.toml"),
         Layout::TwoMirror => include_str!("../../scenes/two-mirror.toml"),
+        Layout::Pyramid => include_str!("../../scenes/gallery/pyramid.toml"),
+        Layout::Altimeter => include_str!("../../scenes/gallery/altimeter.toml"),
     }
 }
 

@@ -32,7 +32,7 @@ pub enum RequirementError {
         text: String,
     },
     /// Nothing has that name.
-    #[error("{key:?} is no figure of a layout")]
+    #[error("{key:?} is no figure")]
     Unknown {
         /// The name.
         key: String,
@@ -94,7 +94,20 @@ impl Requirement {
     /// # Errors
     /// [`RequirementError::Unknown`] if no figure has its name.
     pub fn judge(&self, analysis: &Analysis) -> Result<Vec<Unmet>, RequirementError> {
-        let figures = figures(analysis);
+        self.judge_figures(
+            &analysis.name,
+            &figures(analysis),
+            "field_of_regard, lost, counts.split, facets.*.margin_mm",
+        )
+    }
+
+    /// The same for any figures with names, of something with a name itself.
+    pub(crate) fn judge_figures(
+        &self,
+        name: &str,
+        figures: &[(String, Option<f64>)],
+        examples: &str,
+    ) -> Result<Vec<Unmet>, RequirementError> {
         let all = figures.iter().filter(|(key, _)| matches(&self.key, key));
         let all: Vec<&(String, Option<f64>)> = all.collect();
         if all.is_empty() {
@@ -103,9 +116,7 @@ impl Requirement {
             let near = nearest(&self.key, names.iter().map(String::as_str));
             let help = match near {
                 Some(near) => format!("did you mean {near}?"),
-                None => "every number of --json has a name, its keys joined by dots: field_of_regard, lost, \
-                         counts.split, facets.*.margin_mm"
-                    .to_owned(),
+                None => format!("every number of --json has a name, its keys joined by dots: {examples}"),
             };
             return Err(RequirementError::Unknown {
                 key: self.key.clone(),
@@ -116,14 +127,8 @@ impl Requirement {
             .into_iter()
             .filter(|(_, value)| !value.is_some_and(|v| self.holds(v)));
         let words = |(key, value): &(String, Option<f64>)| match value {
-            Some(value) => Unmet(format!(
-                "{}: {key} is {value}, required {}",
-                analysis.name, self.text
-            )),
-            None => Unmet(format!(
-                "{}: {key} has no value, required {}",
-                analysis.name, self.text
-            )),
+            Some(value) => Unmet(format!("{name}: {key} is {value}, required {}", self.text)),
+            None => Unmet(format!("{name}: {key} has no value, required {}", self.text)),
         };
         Ok(unmet.map(words).collect())
     }
@@ -171,17 +176,24 @@ impl fmt::Display for Unmet {
 
 /// Every number of an analysis with its name, those of single elements and runs aside; `None` for one without a value.
 pub fn figures(analysis: &Analysis) -> Vec<(String, Option<f64>)> {
-    let mut found = Vec::new();
     // An analysis has string keys and finite numbers: it is always a value.
-    if let Ok(Value::Object(fields)) = serde_json::to_value(Analysis {
+    let value = serde_json::to_value(Analysis {
         elements: Vec::new(),
         runs: Vec::new(),
         ..analysis.clone()
-    }) {
-        for (key, value) in &fields {
-            if !matches!(key.as_str(), "elements" | "runs" | "schema_version" | "seed") {
-                collect(key, value, &mut found);
-            }
+    });
+    numbers(
+        &value.unwrap_or_default(),
+        &["elements", "runs", "schema_version", "seed"],
+    )
+}
+
+/// Every number of an object with its name, save for those below some keys; `None` for one without a value.
+pub(crate) fn numbers(object: &Value, skipped: &[&str]) -> Vec<(String, Option<f64>)> {
+    let mut found = Vec::new();
+    for (key, value) in object.as_object().into_iter().flatten() {
+        if !skipped.contains(&key.as_str()) {
+            collect(key, value, &mut found);
         }
     }
     found
@@ -216,7 +228,7 @@ fn matches(pattern: &str, key: &str) -> bool {
 fn starred(key: &str) -> String {
     for list in ["accuracy.facets.", "facets."] {
         if let Some(rest) = key.strip_prefix(list)
-            // Names may hold dots, figures of facets do not; but their two limits do.
+            // Names may hold dots, figures of facets do not, but for those of several numbers.
             && let Some(figure) = FACET_FIGURES.iter().find(|f| rest.ends_with(**f)).copied()
         {
             return format!("{list}*{figure}");
@@ -230,8 +242,8 @@ fn starred(key: &str) -> String {
     key.to_owned()
 }
 
-/// Figures of a facet that are two numbers.
-const FACET_FIGURES: [&str; 8] = [
+/// Figures of a facet that are several numbers.
+const FACET_FIGURES: [&str; 16] = [
     ".beams.0",
     ".beams.1",
     ".exit_azimuth_deg.0",
@@ -240,4 +252,12 @@ const FACET_FIGURES: [&str; 8] = [
     ".exit_elevation_deg.1",
     ".mirror_at_m.0",
     ".mirror_at_m.1",
+    ".direction_deg.rms",
+    ".direction_deg.median",
+    ".direction_deg.p95",
+    ".direction_deg.max",
+    ".point_at_4m_mm.rms",
+    ".point_at_4m_mm.median",
+    ".point_at_4m_mm.p95",
+    ".point_at_4m_mm.max",
 ];

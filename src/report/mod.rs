@@ -14,6 +14,7 @@ mod plan;
 mod plots;
 mod scores;
 mod study;
+mod tolerance;
 mod trials;
 mod verdict;
 mod words;
@@ -24,6 +25,7 @@ pub use layout::{Drawn, layout, layout_pictures};
 pub use optimum::{front_picture, goal_value, optimum};
 pub use plan::plan;
 pub use study::study;
+pub use tolerance::{tolerance, tolerance_plot};
 
 use crate::apply::PointCloud;
 use crate::score::Score;

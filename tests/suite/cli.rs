@@ -7,7 +7,7 @@ use std::process::Stdio;
 #[test]
 fn new_writes_a_scene_that_check_accepts() {
     let folder = tempfile::tempdir().unwrap();
-    for layout in ["prototype", "two-mirror"] {
+    for layout in ["prototype", "two-mirror", "pyramid", "altimeter"] {
         let name = format!("{layout}.toml");
         let output = run(folder.path(), &["new", &name, "--layout", layout]);
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));

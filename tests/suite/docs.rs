@@ -605,6 +605,22 @@ fn documented_figures_of_a_layout_are_those_of_its_json() {
     assert_eq!(first_column(&text, "## What becomes of each element"), classes);
 }
 
+#[test]
+fn documented_figures_of_a_tolerance_are_those_of_its_json() {
+    use catoptric::tolerance::{Bounds, Calibrated, Workshop};
+    let text = read("docs/guide/15-tolerances.md");
+    let scene = scene::load(&root().join("scenes/two-mirror.toml"), &[]).unwrap();
+    let workshop = Workshop::new(&scene).unwrap();
+    let mut tolerance = workshop.summarize(&[workshop.build(1).unwrap()]);
+    tolerance.bound = Some(Bounds::of(&[]));
+    tolerance.calibrated = Some(Calibrated::of(&[]));
+    assert_eq!(
+        first_column(&text, "## tolerance --json"),
+        keys(&serde_json::to_value(&tolerance).unwrap(), &[]),
+        "documented (left) and written (right)"
+    );
+}
+
 /// The files that the picture of a dataset's folder lists.
 fn files_of_dataset(text: &str) -> Vec<String> {
     let picture = &code_blocks(text, "text")[0];

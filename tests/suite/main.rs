@@ -32,5 +32,6 @@ mod scenes;
 mod study;
 mod sub_rays;
 mod tiers;
+mod tolerance;
 mod tracing;
 mod traps;

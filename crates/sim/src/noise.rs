@@ -48,6 +48,8 @@ pub enum Purpose {
     Design = 15,
     /// A distance to the bare structure that was measured without the scanner; row = facet.
     BareDistance = 16,
+    /// Thickness of a mirror as built; row = facet.
+    MirrorThickness = 17,
 }
 
 /// The draws of one row.

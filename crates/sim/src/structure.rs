@@ -23,6 +23,8 @@ pub struct BuiltFacet {
     pub face: Polygon,
     /// The bare structure behind the mirror, by its thickness.
     pub backing: Polygon,
+    /// From the bare structure to the reflecting face, in metres.
+    pub thickness: f64,
     /// Glass before the reflecting surface.
     pub glass: Option<Glass>,
     /// What a mirror with two reflecting sides has beside its face.
@@ -164,6 +166,7 @@ impl BuiltFacet {
             },
             name,
             backing,
+            thickness,
             glass,
             back: match back {
                 Some(back) => Some(back?),
@@ -283,26 +286,35 @@ fn build_facet(
     });
     let place = sensor_from_drawing * error;
     let corners: Vec<_> = drawn.iter().map(|c| place * c).collect();
-    let face = Polygon::new(corners).ok_or_else(|| fail("its corners lie on a line"))?;
-    let behind = face.normal.into_inner() * (scene.superstructure.mirror.thickness_mm * 1e-3);
-    let backing = face.corners.iter().map(|c| c - behind).collect();
-    let backing = Polygon::new(backing).ok_or_else(|| fail("its corners lie on a line"))?;
+    let flat = |corners| Polygon::new(corners).ok_or_else(|| fail("its corners lie on a line"));
+    let mut face = flat(corners)?;
+    let mut thickness = scene.superstructure.mirror.thickness_mm * 1e-3;
+    let behind = face.normal.into_inner() * thickness;
+    let backing = flat(face.corners.iter().map(|c| c - behind).collect())?;
+    if let Some((seed, index)) = seed_and_index
+        && as_built.thickness_sd_mm > 0.0
+    {
+        // The bare structure stays where it is. No mirror is thinner than nothing.
+        let draw = Draws::new(seed, Purpose::MirrorThickness, index).normal();
+        let thicker = (draw * as_built.thickness_sd_mm * 1e-3).max(-thickness);
+        let ahead = face.normal.into_inner() * thicker;
+        face = flat(face.corners.iter().map(|c| c + ahead).collect())?;
+        thickness += thicker;
+    }
     let (rms, (seed, index)) = match seed_and_index {
         Some(key) => (as_built.slope_rms_mrad * 1e-3, key),
         None => (0.0, (0, 0)),
     };
     let slope = Slope::new(&face, rms, &mut Draws::new(seed, Purpose::FacetSlope, index));
     let back = match facet.two_sided {
-        true => Some(
-            Back::of(&face, scene.superstructure.mirror.thickness_mm * 1e-3)
-                .ok_or_else(|| fail("its corners lie on a line"))?,
-        ),
+        true => Some(Back::of(&face, thickness).ok_or_else(|| fail("its corners lie on a line"))?),
         false => None,
     };
     Ok(BuiltFacet {
         name: facet.name.clone(),
         face,
         backing,
+        thickness,
         glass: scene.superstructure.mirror.glass,
         back,
         slope,
@@ -391,6 +403,7 @@ mod tests {
         let facet = BuiltFacet {
             name: String::new(),
             backing: face.clone(),
+            thickness: 0.0,
             face,
             glass: None,
             back: None,

@@ -134,7 +134,7 @@ impl Laboratory {
             plain.map(|(beam, plain)| looked_at(&r, beam, plain)).collect()
         });
         if let Some(sd_mm) = self.scene.experiment.bare_distance_sd_mm {
-            return self.measured_bare(sd_mm, thickness);
+            return self.measured_bare(sd_mm);
         }
         let mut distance_m = vec![0.0; beam::COUNT];
         let mut variance: f64 = 0.0;
@@ -158,7 +158,7 @@ impl Laboratory {
     }
 
     /// Step 3 with another instrument: the distances of a facet's beams all share one error.
-    fn measured_bare(&self, sd_mm: f64, thickness: f64) -> Result<session::BareStructure, SimError> {
+    fn measured_bare(&self, sd_mm: f64) -> Result<session::BareStructure, SimError> {
         let served = self.nominal_facets()?;
         let mut distance_m = vec![0.0; beam::COUNT];
         for (index, built) in self.structure.facets.iter().enumerate() {
@@ -179,12 +179,13 @@ impl Laboratory {
                 let u = beam::direction(beam::azimuth(beam));
                 let facing = normal.dot(&u).abs();
                 let to_face = normal.dot(&built.face.corners[0].coords) / normal.dot(&u);
-                *distance = to_face + thickness * 1e-3 / facing + error;
+                *distance = to_face + built.thickness / facing + error;
             }
         }
+        let superstructure = &self.scene.superstructure;
         Ok(session::BareStructure {
-            mirror_thickness_mm: thickness,
-            distance_sd_mm: sd_mm,
+            mirror_thickness_mm: superstructure.mirror.thickness_mm,
+            distance_sd_mm: libm::hypot(sd_mm, superstructure.as_built.thickness_sd_mm),
             first_beam: 0,
             distance_m,
         })
@@ -223,6 +224,8 @@ impl Laboratory {
             believed.color_bias_sd_mm,
             believed.angle_gain_sd_mm * (1.0 - cos),
             believed.bias.angle.gain_mm * sin * tilt,
+            // The mirror's own thickness is added, whatever it really is.
+            self.scene.superstructure.as_built.thickness_sd_mm / cos.max(f64::EPSILON),
         ];
         terms.iter().map(|mm| mm * mm * 1e-6).sum()
     }

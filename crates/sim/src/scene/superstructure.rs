@@ -281,6 +281,11 @@ pub struct AsBuilt {
     /// Root mean square of the slope of a facet's surface about its plane, in milliradians (assumed).
     #[schemars(range(min = 0.0, max = 50.0))]
     pub slope_rms_mrad: f64,
+    /// Departure of a mirror's thickness from `mirror.thickness_mm`, in millimetres: its face is then that much farther
+    /// from the bare structure.
+    #[serde(skip_serializing_if = "is_zero")]
+    #[schemars(range(min = 0.0, max = 20.0))]
+    pub thickness_sd_mm: f64,
 }
 
 impl Default for AsBuilt {
@@ -289,6 +294,7 @@ impl Default for AsBuilt {
             tilt_sd_deg: 1.0,
             shift_sd_mm: 0.5,
             slope_rms_mrad: 0.2,
+            thickness_sd_mm: 0.0,
         }
     }
 }
