@@ -1,7 +1,7 @@
 //! The search for a layout: named parameters within their limits, one or several goals, and requirements to keep.
 //!
 //! Every candidate is the scene with other numbers for its parameters, checked as any scene is and looked at by
-//! [`layout::analyze`]. With several goals there is no best layout but a front of those that no other beats in all of
+//! [`crate::layout::analyze`]. With several goals there is no best layout but a front of those that no other beats in all of
 //! them. The search is argmin's particle swarm (Kennedy and Eberhart's, as in the Standard PSO of 2011), which needs no
 //! derivatives of what jumps from beam to beam; for every direction λ along the front one swarm goes after the least
 //!

@@ -86,6 +86,11 @@ fn a_known_optimum_is_found() {
         position_mm = [0, -80, 20]
         [room]
         size_m = [5, 4, 3]
+        rig_position_m = [0, 0, 1.5]
+        [[board]]
+        name = "board"
+        width_mm = 600
+        height_mm = 600
     "#;
     let found = search(text, &options(&["size.diameter_mm:down"], &[], 300));
     let best = found.best.unwrap();

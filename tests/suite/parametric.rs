@@ -253,7 +253,7 @@ fn a_ring_is_simulated_like_any_facets() {
         [[superstructure.pattern]]
         ring = { of = "petal", count = 5, step_deg = 30 }
     "#;
-    let markers = "[[superstructure.marker]]\nname = \"a\"\nposition_mm = [90, 0, 30]\n[[superstructure.marker]]\nname = \"b\"\nposition_mm = [0, 90, 30]\n[[superstructure.marker]]\nname = \"c\"\nposition_mm = [0, -80, 20]\n[room]\nsize_m = [5, 4, 3]\n";
+    let markers = "[[superstructure.marker]]\nname = \"a\"\nposition_mm = [90, 0, 30]\n[[superstructure.marker]]\nname = \"b\"\nposition_mm = [0, 90, 30]\n[[superstructure.marker]]\nname = \"c\"\nposition_mm = [0, -80, 20]\n[room]\nsize_m = [5, 4, 3]\nrig_position_m = [0, 0, 1.5]\n[[board]]\nname = \"board\"\nwidth_mm = 600\nheight_mm = 600\n";
     let scene = parsed(&format!("{petal}{markers}"), &[]);
     let found = layout::analyze(&scene, None, Detail::Coarse).unwrap();
     let names: Vec<&str> = found.facets.iter().map(|f| f.name.as_str()).collect();
