@@ -235,7 +235,7 @@ fn what_makes_no_search_is_said() {
     refuse(
         &["--goal", "szie.height_mm:up"],
         2,
-        &["no figure of a layout", "did you mean size.height_mm?"],
+        &["is no figure", "did you mean size.height_mm?"],
     );
     refuse(&["--goal", "directions"], 2, &["need one another"]);
     refuse(
@@ -249,11 +249,7 @@ fn what_makes_no_search_is_said() {
         &["is no direction"],
     );
     refuse(&["--goal", "size", "--goal", "size"], 2, &["given twice"]);
-    refuse(
-        &["--goal", "size", "--require", "lots<=3"],
-        2,
-        &["no figure of a layout"],
-    );
+    refuse(&["--goal", "size", "--require", "lots<=3"], 2, &["is no figure"]);
     refuse(
         &["--goal", "size", "--require", "size.diameter_mm<=10"],
         1,
