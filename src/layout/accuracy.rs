@@ -5,10 +5,10 @@
 //! beam and without noise, and each reading is repeated as often as the scene says, alternately above and below itself by
 //! the standard deviation of one reading. The structure is as built under a seed: facets are then as uneven as they will be.
 
+use crate::score::true_directions;
 use catoptric_calib::{TrueDirection, limit};
 use catoptric_model::{Dataset, PoseKind, PoseRecord, beam};
 use catoptric_sim::laboratory::Returns;
-use catoptric_sim::truth::BeamClass;
 use catoptric_sim::{Laboratory, Scene, SimError};
 use nalgebra::Matrix2;
 use rayon::prelude::*;
@@ -78,18 +78,7 @@ fn find(scene: &Scene, seed: u64, accuracy: &mut Accuracy) -> Result<(), String>
         .and_then(|l| l.truth())
         .map_err(words)?;
     let laboratory = Laboratory::new(&looked_at_once(scene), seed).map_err(words)?;
-    let directions: Vec<TrueDirection> = truth
-        .beams
-        .iter()
-        .filter(|b| b.status == BeamClass::Deflected)
-        .filter_map(|b| {
-            Some(TrueDirection {
-                beam: b.beam,
-                facet: b.facets.first()?.clone(),
-                deflection: b.deflection()?,
-            })
-        })
-        .collect();
+    let directions = true_directions(&truth);
     accuracy.board_poses = laboratory.board_poses();
     let session = laboratory.session().map_err(words)?;
     if directions.is_empty() {

@@ -39,15 +39,10 @@ pub(super) fn record(
 ) -> PoseRecord {
     PoseRecord {
         label: PoseLabel {
-            pose,
-            kind,
-            scans: 2,
             board: board.map(|_| "board".to_owned()),
             color: board.map(|_| "white".to_owned()),
             facet: facet.map(str::to_owned),
-            beams: None,
-            test: None,
-            flight: None,
+            ..PoseLabel::of(pose, kind, 2)
         },
         room_from_rig,
         room_from_board: board,

@@ -5,8 +5,8 @@ use catoptric_calib::covariance::{MountUncertainty, budget};
 use catoptric_calib::observability::weakness;
 use catoptric_calib::observations::BoardInSensor;
 use catoptric_calib::{TrueDirection, limit};
-use catoptric_calib::{observations, pose};
-use catoptric_model::{Dataset, Pose, PoseKind, PoseRecord};
+use catoptric_calib::{locate, observations, pose};
+use catoptric_model::{Dataset, Pose, PoseKind};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
 use nalgebra::{Matrix2, Point3};
@@ -25,6 +25,19 @@ pub struct Knowable {
     pub(super) open: BTreeSet<usize>,
 }
 
+/// Where every beam goes that is deflected once and unsplit.
+pub(crate) fn true_directions(truth: &Truth) -> Vec<TrueDirection> {
+    let deflected = truth.beams.iter().filter(|b| b.status == BeamClass::Deflected);
+    let directions = deflected.filter_map(|b| {
+        Some(TrueDirection {
+            beam: b.beam,
+            facet: b.facets.first()?.clone(),
+            deflection: b.deflection()?,
+        })
+    });
+    directions.collect()
+}
+
 /// The least covariance of (θ_a, φ), in rad², that any estimate from this dataset can have, for every beam that is
 /// deflected once and unsplit: facets, boards, mounting and biases are common to all of them.
 fn of_experiment(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize, Matrix2<f64>> {
@@ -33,19 +46,7 @@ fn of_experiment(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize, Matrix2<f6
         // Nothing is believed to be in the way.
         return BTreeMap::new();
     }
-    let directions: Vec<TrueDirection> = truth
-        .beams
-        .iter()
-        .filter(|b| b.status == BeamClass::Deflected)
-        .filter_map(|b| {
-            Some(TrueDirection {
-                beam: b.beam,
-                facet: b.facets.first()?.clone(),
-                deflection: b.deflection()?,
-            })
-        })
-        .collect();
-    let limits = limit(dataset, &directions).unwrap_or_default();
+    let limits = limit(dataset, &true_directions(truth)).unwrap_or_default();
     limits
         .into_iter()
         .filter_map(|(beam, c)| Some((beam, c?)))
@@ -58,7 +59,7 @@ fn of_experiment(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize, Matrix2<f6
 /// this dataset leaves it. A method that ties elements together, by their facet, may do better.
 pub fn knowable(dataset: &Dataset, truth: &Truth) -> Knowable {
     let session = &dataset.session;
-    let summaries: Vec<_> = dataset.poses.iter().map(PoseRecord::summarize).collect();
+    let summaries = locate::summaries(dataset);
     let mount = pose::estimate(dataset, &summaries).uncertainty;
     let rig_from_sensor = Pose::from(&truth.rig_from_sensor);
     let boards: Vec<_> = dataset

@@ -45,6 +45,7 @@ pub(crate) use element::wrap;
 #[cfg(feature = "testing")]
 pub(crate) use statistics::mahalanobis_squared;
 
+pub(crate) use bound::true_directions;
 pub use bound::{Knowable, knowable};
 pub use element::ElementError;
 pub use figures::{ApartScore, BeamCounts, DistanceError, OpenCounts, PointError, Score, Spread, Verdict};

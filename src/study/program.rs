@@ -209,9 +209,10 @@ mod tests {
 
     #[test]
     fn a_failure_reads_alike_wherever_it_was() {
-        let folder = Path::new("/tmp/of-chance");
-        let words = "no /tmp/of-chance/dataset/x,\n no /tmp/of-chance/calibration.json, no /tmp/of-chance/y"
-            .to_owned();
+        let folder = Path::new("/folder/of-chance");
+        let words =
+            "no /folder/of-chance/dataset/x,\n no /folder/of-chance/calibration.json, no /folder/of-chance/y"
+                .to_owned();
         let said = shortened(&anywhere(folder, words));
         assert_eq!(said, "no {dataset}/x, no {out}, no {folder}/y");
         let long = shortened(&format!("ended: {}why", "word ".repeat(200)));

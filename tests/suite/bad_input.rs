@@ -33,15 +33,16 @@ pub(crate) fn place_of(text: &str, part: &str) -> (usize, usize) {
 /// Spoils the scene and expects exactly one problem: at `at`, saying all of `words`.
 #[track_caller]
 pub(crate) fn expect_one(from: &str, to: &str, at: &str, words: &[&str]) {
-    let text = spoiled(from, to);
-    let problems = problems_with(&text, &[]);
+    expect_one_in(&spoiled(from, to), at, words);
+}
+
+/// Expects exactly one problem in a scene: at `at`, saying all of `words`.
+#[track_caller]
+pub(crate) fn expect_one_in(text: &str, at: &str, words: &[&str]) {
+    let problems = problems_with(text, &[]);
     assert_eq!(problems.list.len(), 1, "{problems}");
     let problem = &problems.list[0];
-    assert_eq!(
-        problems.position(problem),
-        Some(place_of(&text, at)),
-        "{problems}"
-    );
+    assert_eq!(problems.position(problem), Some(place_of(text, at)), "{problems}");
     let said = format!("{} {}", problem.message, problem.help.as_deref().unwrap_or(""));
     for word in words {
         assert!(said.contains(word), "{word:?} is not in {said:?}");

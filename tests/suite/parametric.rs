@@ -3,7 +3,7 @@
 //! Places of errors are computed here by searching the text. That a copy is where its original's mirror image is, is
 //! proven in `crates/sim/src/pattern/tests.rs`.
 
-use crate::bad_input::{place_of, problems_with};
+use crate::bad_input::{expect_one_in, place_of, problems_with};
 use crate::common::{VALID, folder_with, run, stderr, stdout};
 use crate::scenes::PROTOTYPE;
 use catoptric::io::scene;
@@ -107,19 +107,7 @@ fn a_parameter_is_set_by_its_name() {
 #[track_caller]
 fn expect_one(from: &str, to: &str, at: &str, words: &[&str]) {
     assert_eq!(PARAMETRIC.matches(from).count(), 1, "{from:?} must occur once");
-    let text = PARAMETRIC.replace(from, to);
-    let problems = problems_with(&text, &[]);
-    let problem = &problems.list[0];
-    assert_eq!(
-        problems.position(problem),
-        Some(place_of(&text, at)),
-        "{problems}"
-    );
-    let said = format!("{} {}", problem.message, problem.help.as_deref().unwrap_or(""));
-    for word in words {
-        assert!(said.contains(word), "{word:?} is not in {said:?}");
-    }
-    assert_eq!(problems.list.len(), 1, "{problems}");
+    expect_one_in(&PARAMETRIC.replace(from, to), at, words);
 }
 
 #[test]

@@ -16,6 +16,7 @@ use catoptric_model::{
     BeamEstimate, Calibration, Dataset, Deflection, MirrorPlane, Status, Summary, beam, calibration, mirror,
 };
 use nalgebra::{Unit, Vector3};
+use std::borrow::Cow;
 
 /// Solved elements from which a facet's plane as built is taken.
 const LEAST_ELEMENTS: usize = 5;
@@ -38,8 +39,7 @@ const LEAST_ELEMENTS: usize = 5;
 /// }
 /// ```
 pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result<Calibration, CalibError> {
-    dataset.check()?;
-    let (dataset, warnings) = tracking::put_right(dataset);
+    let (dataset, warnings) = believable(dataset)?;
     let dataset = dataset.as_ref();
     let session = &dataset.session;
     let prepared = prepare(dataset)?;
@@ -98,11 +98,16 @@ pub(crate) struct Prepared {
     boards: Vec<Option<BoardInSensor>>,
 }
 
-/// Checks a dataset and places the sensor in the rig (steps 5 and 6).
-pub(crate) fn prepare(dataset: &Dataset) -> Result<Prepared, CalibError> {
+/// Checks a dataset, and puts right or leaves out what cannot be believed of it, with a sentence for each.
+pub(crate) fn believable(dataset: &Dataset) -> Result<(Cow<'_, Dataset>, Vec<String>), CalibError> {
     dataset.check()?;
+    check_session(&dataset.session)?;
+    Ok(tracking::put_right(dataset))
+}
+
+/// Places the sensor in the rig (steps 5 and 6) from a [`believable`] dataset.
+pub(crate) fn prepare(dataset: &Dataset) -> Result<Prepared, CalibError> {
     let session = &dataset.session;
-    check_session(session)?;
     let drawn = session
         .facets
         .iter()

@@ -31,7 +31,7 @@ pub mod jacobian;
 mod joint;
 mod judge;
 pub mod least_squares;
-mod locate;
+pub mod locate;
 mod mount_data;
 pub mod observability;
 pub mod observations;

@@ -19,7 +19,7 @@ const FREE: f64 = 3.0;
 const FREE_PART: f64 = 0.05;
 
 /// Statistics of every beam in every stretch: of its main body, where it has one beside outliers.
-pub(crate) fn summaries(dataset: &Dataset) -> Vec<Vec<Summary>> {
+pub fn summaries(dataset: &Dataset) -> Vec<Vec<Summary>> {
     let noise = dataset.session.believed.range_noise_sd_mm * 1e-3;
     let plain: Vec<Vec<Summary>> = dataset.poses.iter().map(PoseRecord::summarize).collect();
     let robust: Vec<Vec<Option<Summary>>> = dataset
@@ -100,17 +100,7 @@ mod tests {
     fn record(beams: &[Vec<f64>]) -> PoseRecord {
         let scans = beams[0].len();
         PoseRecord {
-            label: PoseLabel {
-                pose: 0,
-                kind: PoseKind::Room,
-                scans,
-                board: None,
-                color: None,
-                facet: None,
-                beams: None,
-                test: None,
-                flight: None,
-            },
+            label: PoseLabel::of(0, PoseKind::Room, scans),
             room_from_rig: Pose::identity(),
             room_from_board: None,
             motion: None,

@@ -27,6 +27,23 @@ pub enum PoseKind {
     Flight,
 }
 
+impl PoseLabel {
+    /// The note of a stretch of which nothing more is to be noted.
+    pub fn of(pose: usize, kind: PoseKind, scans: usize) -> Self {
+        Self {
+            pose,
+            kind,
+            scans,
+            board: None,
+            color: None,
+            facet: None,
+            beams: None,
+            test: None,
+            flight: None,
+        }
+    }
+}
+
 impl PoseKind {
     /// Whether it says what the mirrors do: they are attached, and nothing moves.
     pub fn is_evidence(self) -> bool {
@@ -336,17 +353,7 @@ mod tests {
     #[test]
     fn a_summary_leaves_codes_out() {
         let pose = PoseRecord {
-            label: PoseLabel {
-                pose: 0,
-                kind: PoseKind::Room,
-                scans: 3,
-                board: None,
-                color: None,
-                facet: None,
-                beams: None,
-                test: None,
-                flight: None,
-            },
+            label: PoseLabel::of(0, PoseKind::Room, 3),
             room_from_rig: Pose::identity(),
             room_from_board: None,
             motion: None,

@@ -145,15 +145,11 @@ fn stretch(session: &Session, pose: usize, scans: usize, frames: usize, seed: u6
     tracks.retain(|t| !t.frames.is_empty());
     Stretch {
         label: PoseLabel {
-            pose,
-            kind: PoseKind::Facet,
-            scans,
             board: Some("white".to_owned()),
             color: Some("white".to_owned()),
             facet: Some("port".to_owned()),
             beams: Some([1, 3]),
-            test: None,
-            flight: None,
+            ..PoseLabel::of(pose, PoseKind::Facet, scans)
         },
         start_s,
         scan_period_s: 0.025,

@@ -6,12 +6,11 @@
 
 use super::problem::{FIGURE, FIGURE_ORDERS, FIGURE_RMS, Flatness, orders};
 use super::{Assigned, along, begin, components, direct_group, group, mounting_as_drawn};
-use crate::calibrate::{plane_between, prepare};
+use crate::calibrate::{believable, plane_between, prepare};
 use crate::error::CalibError;
 use crate::least_squares;
 use crate::observations::azimuth;
 use crate::options::{Method, Options};
-use crate::tracking;
 use catoptric_model::{Dataset, Deflection, MirrorPlane, frame};
 use nalgebra::{DMatrix, DVector, Matrix2, Unit, Vector3};
 use std::collections::BTreeMap;
@@ -38,8 +37,7 @@ pub fn limit(
     dataset: &Dataset,
     truth: &[TrueDirection],
 ) -> Result<BTreeMap<usize, Option<Matrix2<f64>>>, CalibError> {
-    dataset.check()?;
-    let (dataset, _) = tracking::put_right(dataset);
+    let (dataset, _) = believable(dataset)?;
     let dataset = dataset.as_ref();
     let prepared = prepare(dataset)?;
     let options = Options::default();

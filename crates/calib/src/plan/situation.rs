@@ -1,13 +1,12 @@
 //! What the experimenter knows before the next pose: the drawing or what was recorded, never the truth.
 
-use crate::calibrate::{calibrate, plane_as_built, plane_as_drawn, prepare};
+use crate::calibrate::{believable, calibrate, plane_as_built, plane_as_drawn, prepare};
 use crate::covariance::MountUncertainty;
 use crate::error::CalibError;
 use crate::observations::{BoardInSensor, azimuth, cone_half_angle};
 use crate::options::{Method, Options};
 use crate::pose;
 use crate::spread;
-use crate::tracking;
 use catoptric_model::session::{BoardSheet, NominalFacet};
 use catoptric_model::{
     BoardPlane, Dataset, Deflection, MirrorPlane, Pose, PoseKind, PoseLabel, PoseRecord, Session, Status,
@@ -117,8 +116,7 @@ impl Situation {
     /// # Errors
     /// As [`calibrate`](fn@calibrate).
     pub fn recorded(dataset: &Dataset) -> Result<Self, CalibError> {
-        dataset.check()?;
-        let (dataset, _) = tracking::put_right(dataset);
+        let (dataset, _) = believable(dataset)?;
         let dataset = dataset.as_ref();
         let session = &dataset.session;
         let options = Options::default();
@@ -327,15 +325,9 @@ fn expected_mount(session: &Session, room_from_rig: &Pose, placed: &[Placed]) ->
         summaries.push(predicted(session, &board, place.readings));
         poses.push(PoseRecord {
             label: PoseLabel {
-                pose: poses.len(),
-                kind: PoseKind::Direct,
-                scans: place.readings,
                 board: Some(place.board.clone()),
-                color: None,
-                facet: None,
                 beams: place.beams,
-                test: None,
-                flight: None,
+                ..PoseLabel::of(poses.len(), PoseKind::Direct, place.readings)
             },
             room_from_rig: *room_from_rig,
             room_from_board: Some(place.room_from_board),

@@ -401,15 +401,10 @@ impl Lab<'_> {
         }
         PoseRecord {
             label: PoseLabel {
-                pose: 0,
-                kind,
-                scans: world.scans,
                 board: board.map(|_| "board".to_owned()),
                 color: board.map(|_| "white".to_owned()),
                 facet,
-                beams: None,
-                test: None,
-                flight: None,
+                ..PoseLabel::of(0, kind, world.scans)
             },
             room_from_rig: self.room_from_rig,
             room_from_board: board.map(|b| self.tracked(&(self.room_from_sensor * b), draw)),
