@@ -102,13 +102,17 @@ fn tier_5_is_not_answered_with_a_guess() {
         );
         assert!(open.elements > 100, "{open:?}");
         assert_eq!((open.abstained + open.solved, open.wrong), (open.elements, 0));
+        let solved_before = |facet: &str| {
+            let beams = calibration.beams.iter();
+            beams
+                .filter(|b| b.facet.as_deref() == Some(facet) && b.deflection().is_some())
+                .count()
+        };
+        // Their ranges tell the open direction only by how they bend over it, which no covariance states rightly.
+        assert_eq!((solved_before("hinge"), solved_before("face-on")), (0, 0));
         if method != Method::Joint {
             assert_eq!(open.solved, 0, "an element by itself cannot know");
         }
-        let sound = calibration
-            .beams
-            .iter()
-            .filter(|b| b.facet.as_deref() == Some("sound"));
-        assert!(sound.filter(|b| b.deflection().is_some()).count() > 50);
+        assert!(solved_before("sound") > 50);
     }
 }

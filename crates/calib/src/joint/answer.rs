@@ -9,6 +9,7 @@ use crate::pose;
 use catoptric_model::calibration::{FacetEstimate, MountEstimate};
 use catoptric_model::{Deflection, PoseData, RangeBias, frame};
 use nalgebra::{DMatrix, DVector, Dyn, Matrix2, Matrix6, OMatrix, U6, Vector6};
+use std::collections::BTreeSet;
 
 /// Part of a residual's variance that must be left for it to say anything.
 const LEAST_LEFT: f64 = 1e-6;
@@ -62,6 +63,17 @@ struct Spread {
     fitted: Vec<f64>,
 }
 
+/// What an element's direction along its tangent basis, and what is fitted to its sights, depend on.
+pub(super) struct Dependence {
+    /// Covariance of the departure where all else is known.
+    inner: Matrix2<f64>,
+    /// From the departure's two axes to the tangent basis.
+    turn: Matrix2<f64>,
+    /// Derivatives with respect to w and to the group's own parameters: two rows for the direction, one for each sight.
+    pub(super) shared: DMatrix<f64>,
+    pub(super) own: DMatrix<f64>,
+}
+
 impl Joint<'_> {
     /// Where the own parameters of a group begin among all.
     pub(super) fn offset(&self, group: usize) -> usize {
@@ -73,7 +85,7 @@ impl Joint<'_> {
     }
 
     /// Every deflected element at a state, linearized, with its group and its facet.
-    fn linearized<'g>(
+    pub(super) fn linearized<'g>(
         &'g self,
         state: &'g State,
     ) -> impl Iterator<Item = (usize, usize, &'g Element, Fan, Linear)> + 'g {
@@ -150,48 +162,71 @@ impl Joint<'_> {
         fan: &Fan,
         linear: &Linear,
     ) -> Option<Spread> {
-        let (across, up) = frame::tangent_basis(&linear.v);
-        let tangent = [across, up];
-        let tau2 = self.flatness.tau.powi(2);
-        let inner = (Matrix2::identity() + linear.h.transpose() * &linear.h * tau2).try_inverse()? * tau2;
-        let gain = inner * linear.h.transpose();
-        // From the departure's two axes to the tangent basis.
-        let turn = Matrix2::from_fn(|i, j| tangent[i].dot(&linear.axes[j]));
+        let by = self.dependence(facet, fan, linear)?;
         let rows = linear.y.len();
-        let width = self.shared_dimension();
-        let first = self.offset(group);
-        let own = linear.own.ncols();
-        let mut combination = DMatrix::zeros(2 + rows, information.dimension());
-        for (from, part) in [(0, &linear.shared), (first, &linear.own)] {
-            let columns = part.ncols();
-            let taken = &gain * part;
-            combination
-                .view_mut((0, from), (2, columns))
-                .copy_from(&-(turn * &taken));
-            combination
-                .view_mut((2, from), (rows, columns))
-                .copy_from(&(part - &linear.h * taken));
-        }
-        debug_assert!(first + own <= information.dimension() && width <= first);
-        for (row, axis) in tangent.iter().enumerate() {
-            for (column, turned) in fan.directions() {
-                combination[(row, first + facet * FACET_PARAMETERS + column)] += axis.dot(&turned);
-            }
-        }
-        let c = information.covariance_of(&combination)?;
-        let direction = c.fixed_view::<2, 2>(0, 0) + turn * inner * turn.transpose();
-        let departing = &linear.h * inner * linear.h.transpose();
+        let c = information.covariance_of(&self.among_all(information.dimension(), group, &by))?;
+        let direction = c.fixed_view::<2, 2>(0, 0) + by.turn * by.inner * by.turn.transpose();
+        let departing = &linear.h * by.inner * linear.h.transpose();
         Some(Spread {
             direction: (direction + direction.transpose()) * 0.5,
             fitted: (0..rows).map(|i| c[(2 + i, 2 + i)] + departing[(i, i)]).collect(),
         })
     }
 
-    /// The facets' planes; one that the boards leave open has no covariance and is left out.
-    pub(super) fn facets(&self, solution: &Solution, names: &dyn Fn(usize) -> String) -> Vec<FacetEstimate> {
+    /// How an element's direction and its fitted sights depend on the parameters.
+    pub(super) fn dependence(&self, facet: usize, fan: &Fan, linear: &Linear) -> Option<Dependence> {
+        let (across, up) = frame::tangent_basis(&linear.v);
+        let tangent = [across, up];
+        let tau2 = self.flatness.tau.powi(2);
+        let inner = (Matrix2::identity() + linear.h.transpose() * &linear.h * tau2).try_inverse()? * tau2;
+        let gain = inner * linear.h.transpose();
+        let turn = Matrix2::from_fn(|i, j| tangent[i].dot(&linear.axes[j]));
+        let rows = linear.y.len();
+        let by = |part: &DMatrix<f64>| {
+            let taken = &gain * part;
+            let mut all = DMatrix::zeros(2 + rows, part.ncols());
+            all.rows_mut(0, 2).copy_from(&-(turn * &taken));
+            all.rows_mut(2, rows).copy_from(&(part - &linear.h * taken));
+            all
+        };
+        let (shared, mut own) = (by(&linear.shared), by(&linear.own));
+        for (row, axis) in tangent.iter().enumerate() {
+            for (column, turned) in fan.directions() {
+                own[(row, facet * FACET_PARAMETERS + column)] += axis.dot(&turned);
+            }
+        }
+        Some(Dependence {
+            inner,
+            turn,
+            shared,
+            own,
+        })
+    }
+
+    /// A dependence with all parameters of the problem as columns.
+    pub(super) fn among_all(&self, dimension: usize, group: usize, by: &Dependence) -> DMatrix<f64> {
+        let mut all = DMatrix::zeros(by.own.nrows(), dimension);
+        all.columns_mut(0, by.shared.ncols()).copy_from(&by.shared);
+        all.columns_mut(self.offset(group), by.own.ncols())
+            .copy_from(&by.own);
+        all
+    }
+
+    /// The facets' planes; one that the boards leave open has no covariance and is left out, as are those in `bent`.
+    pub(super) fn facets(
+        &self,
+        solution: &Solution,
+        names: &dyn Fn(usize) -> String,
+        bent: &BTreeSet<usize>,
+    ) -> Vec<FacetEstimate> {
         let mut all = Vec::new();
         for (number, group) in self.groups.iter().enumerate() {
-            for (i, facet) in group.facets.iter().enumerate() {
+            let straight = group
+                .facets
+                .iter()
+                .enumerate()
+                .filter(|(_, f)| !bent.contains(&f.facet));
+            for (i, facet) in straight {
                 let first = self.offset(number) + i * FACET_PARAMETERS;
                 let among = [first, first + 1, first + 2];
                 let shape = Self::shape(solution.state.own(number), i);

@@ -36,12 +36,13 @@ impl Joint<'_> {
         start: State,
         options: &least_squares::Options,
     ) -> Result<Solution, ProblemError> {
-        let problem = self.with_priors();
+        let problem = self.with_priors(self);
         least_squares::minimize(&problem, start, options)
     }
 
-    /// The problem with what is believed of w, of the boards' errors and of the facets' figures, all in their own σ.
-    pub(super) fn with_priors(&self) -> WithPriors<'_, Self> {
+    /// A problem in these parameters with what is believed of w, of the boards' errors and of the facets' figures, all in
+    /// their own σ.
+    pub(super) fn with_priors<'p, P>(&self, problem: &'p P) -> WithPriors<'p, P> {
         let standard = |block: usize, mean: DVector<f64>| {
             let sd = vec![1.0; mean.len()];
             Prior::independent(block, Block::Vector(mean), &sd)
@@ -55,7 +56,7 @@ impl Joint<'_> {
                 .collect()
         };
         WithPriors {
-            problem: self,
+            problem,
             shared: vec![standard(0, self.prior_mean.clone())],
             own: self.groups.iter().map(of_group).collect(),
         }
@@ -96,7 +97,7 @@ impl Joint<'_> {
 
     /// L at the minimum, as the problem linearized at a state has it.
     fn likelihood(&self, state: &State) -> Result<f64, ProblemError> {
-        let linear = least_squares::linearize(&self.with_priors(), state)?;
+        let linear = least_squares::linearize(&self.with_priors(self), state)?;
         let mut sum = linear.least_sum_of_squares + linear.information.log_determinant();
         for (number, group) in self.groups.iter().enumerate() {
             let own = state.own(number);

@@ -92,11 +92,12 @@ pub fn limit(
         figure: of_all(|f| f.figure),
         tau: of_all(|f| f.tau),
     };
-    let linear =
-        least_squares::linearize(&joint.with_priors(), &state).map_err(|problem| CalibError::Foreign {
+    let linear = least_squares::linearize(&joint.with_priors(&joint), &state).map_err(|problem| {
+        CalibError::Foreign {
             name: "limit".to_owned(),
             what: problem.to_string(),
-        })?;
+        }
+    })?;
     Ok(joint
         .covariances(&state, &linear.information)
         .into_iter()

@@ -10,6 +10,7 @@ mod fit;
 mod held;
 mod limit;
 mod problem;
+mod reach;
 
 use crate::common::CommonErrors;
 use crate::element::Workspace;
@@ -26,6 +27,7 @@ use catoptric_model::{Assessment, BeamEstimate, MirrorPlane, Pose, RangeBias, St
 use fit::Fit;
 use nalgebra::{DVector, Dyn, Matrix2, OMatrix, U6, Vector2};
 use problem::{BareFacet, Board, Element, Facet, Flatness, Group, Joint, Mounting, Sight};
+use reach::STRAIGHT_SD;
 use std::collections::BTreeMap;
 
 pub use limit::{TrueDirection, limit};
@@ -330,6 +332,7 @@ fn solve(
         answers = joint.answers(&fit.solution);
     }
     let solution = &fit.solution;
+    let bent = joint.bent(solution);
     let mut assessment = departing.then(|| joint.assess(session, &fit, &answers));
     if let Some(assessment) = &mut assessment
         && work.options.cross_validation
@@ -340,9 +343,12 @@ fn solve(
     Ok(Outcome {
         beams: answers
             .iter()
-            .map(|a| (a.beam, a.estimate(names(a.facet), solution.iterations)))
+            .map(|a| {
+                let estimate = a.estimate(names(a.facet), solution.iterations, bent.contains(&a.facet));
+                (a.beam, estimate)
+            })
             .collect(),
-        facets: joint.facets(solution, &names),
+        facets: joint.facets(solution, &names, &bent),
         mount: if departing { joint.mount(solution) } else { None },
         bias: if departing {
             joint.corrected_bias(solution)
@@ -360,7 +366,8 @@ impl Answer {
         self.chi_squared > freedom + GATE_SIGMAS * (2.0 * freedom).sqrt() + GATE_SIGMAS * GATE_SIGMAS
     }
 
-    fn estimate(&self, facet: String, iterations: usize) -> BeamEstimate {
+    /// What is said of the element; where its facet is `bent`, not what is known too badly for its covariance to hold.
+    fn estimate(&self, facet: String, iterations: usize, bent: bool) -> BeamEstimate {
         let found = BeamEstimate {
             facet: Some(facet),
             poses: Some(self.seen.len()),
@@ -385,7 +392,7 @@ impl Answer {
         let eigen = tangent.symmetric_eigen();
         let weakest = eigen.eigenvalues.imax();
         let sd = eigen.eigenvalues[weakest].max(0.0).sqrt();
-        if sd > WEAKEST_SD {
+        if sd > WEAKEST_SD || (bent && sd > STRAIGHT_SD) {
             let along = eigen.eigenvectors.column(weakest);
             let direction = Vector2::new(along[0] / cos, along[1]).normalize();
             let direction = if direction[direction.iamax()] < 0.0 {
@@ -393,13 +400,17 @@ impl Answer {
             } else {
                 direction
             };
-            return open(
-                direction,
+            let reason = if sd > WEAKEST_SD {
                 format!(
                     "the boards of its facet leave a direction open, known to {:.1}° at best",
                     sd.to_degrees()
-                ),
-            );
+                )
+            } else {
+                "the boards of its facet tell a direction only by how their ranges bend over it: two directions fit \
+                 nearly alike"
+                    .to_owned()
+            };
+            return open(direction, reason);
         }
         let scale = Matrix2::from_diagonal(&Vector2::new(1.0 / cos, 1.0));
         let c = scale * tangent * scale;

@@ -182,6 +182,26 @@ impl Elimination {
         DVector::from_vec(z)
     }
 
+    /// (JᵀJ)⁻¹g from z of [`half_solve`](Self::half_solve), with 0 for dependent columns.
+    pub(super) fn other_half(&self, z: &DVector<f64>) -> DVector<f64> {
+        let mut from = 0;
+        let own: Vec<DVector<f64>> = self
+            .groups
+            .iter()
+            .map(|group| {
+                let part = z.rows(from, group.own.rank).into_owned();
+                from += group.own.rank;
+                part
+            })
+            .collect();
+        let x = self.shared.solve(&z.rows(from, self.shared.rank).into_owned());
+        let mut all = x.as_slice().to_vec();
+        for (group, part) in self.groups.iter().zip(own) {
+            all.extend_from_slice(group.own.solve(&(part - &group.coupling * &x)).as_slice());
+        }
+        DVector::from_vec(all).component_div(&self.scale)
+    }
+
     /// ‖J·p‖.
     pub(super) fn image_norm(&self, p: &DVector<f64>) -> f64 {
         let p = p.component_mul(&self.scale);

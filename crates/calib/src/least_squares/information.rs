@@ -107,6 +107,19 @@ impl Information {
         Some(DMatrix::from_fn(count, count, |i, j| halves[i].dot(&halves[j])))
     }
 
+    /// The likeliest change of all parameters that changes g·x by one standard deviation: (JᵀJ)⁻¹g/√(gᵀ(JᵀJ)⁻¹g).
+    ///
+    /// ‖J·step‖ = 1. `None` if g·x is open, or g is zero.
+    ///
+    /// # Panics
+    ///
+    /// If g has another dimension.
+    pub fn step_along(&self, g: &DVector<f64>) -> Option<DVector<f64>> {
+        let half = self.linear.half_solve(g);
+        let sd = half.norm();
+        (sd > 0.0 && !self.is_open(g)).then(|| self.linear.other_half(&half) / sd)
+    }
+
     /// Covariance of some parameters; `None` if one of them is open.
     ///
     /// # Panics

@@ -184,6 +184,21 @@ fn elimination_gives_what_the_dense_matrix_gives() {
 }
 
 #[test]
+fn the_step_along_a_combination_is_the_likeliest_that_changes_it_by_one_sd() {
+    let (boards, truth) = Boards::simulated(6, 12, &mut Sample::new(11));
+    let problem = boards.with_priors();
+    let found = minimize(&problem, start(&truth), &Options::default()).expect("it is defined");
+    let covariance = found.information.covariance().expect("priors hold all");
+    let mut sample = Sample::new(12);
+    let g = DVector::from_fn(covariance.nrows(), |_, _| sample.normal());
+    let step = found.information.step_along(&g).expect("priors hold all");
+    let sd = (g.transpose() * &covariance * &g)[0].sqrt();
+    assert!((g.dot(&step) / sd - 1.0).abs() < 1e-9);
+    assert!((step - &covariance * &g / sd).norm() < 1e-9 * (&covariance * &g / sd).norm());
+    assert_eq!(found.information.step_along(&DVector::zeros(g.len())), None);
+}
+
+#[test]
 fn what_a_group_leaves_open_is_found_as_in_the_dense_matrix() {
     // Without priors a facet's turn is the mounting's, each drift is its board's offset and the bias.
     let (boards, truth) = Boards::simulated(6, 12, &mut Sample::new(9));

@@ -1,0 +1,180 @@
+//! Does a covariance hold as far as it reaches?
+//!
+//! Boards that stand face-on to a beam tell its direction by the curvature of the range only, ½·s·δ². Noise moves the
+//! estimate to some δ̂, where they seem to have a lever, s·δ̂, and so to say something; yet −δ̂ fits as well. The profile of
+//! ‖f‖² over a direction, all else at its best for each, shows it (Bates and Watts, "Nonlinear Regression Analysis and Its
+//! Applications", 1988, section 6.1): it rises by k² over k standard deviations as far as the problem is linear, and by
+//! k²(1 ± 1/q)² where it bends, with q = δ̂ over the standard deviation.
+
+use super::problem::{Fan, Joint, Linear};
+use crate::least_squares::{self, GroupJacobian, GroupedProblem, Point, Solution};
+use catoptric_model::frame;
+use nalgebra::{DVector, Matrix2, Vector2, Vector3};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Standard deviations by which a direction is moved: as far as a 95 % region reaches.
+const REACH: f64 = 2.0;
+
+/// Rise of the profile, over that of a linear problem, within which it counts as one: q ≥ 7.5.
+const LINEAR_RISE: std::ops::Range<f64> = 0.75..1.33;
+
+/// Standard deviation below which nothing bends, in radians (0.1°): ranges over twice of it do by 0.03 mm at 5 m.
+pub(super) const STRAIGHT_SD: f64 = 0.1 * std::f64::consts::PI / 180.0;
+
+/// Part of its standard deviation to which a moved direction is held.
+const HELD: f64 = 1e-2;
+
+/// How closely a profile is wanted: its rise is compared with a quarter.
+const SEARCH: least_squares::Options = least_squares::Options {
+    reduction_tolerance: 1e-6,
+    step_tolerance: 1e-9,
+    gradient_tolerance: 1e-9,
+    max_evaluations: 60,
+    first_radius: 1.0,
+    rank_threshold: 1e-11,
+};
+
+/// A direction of one element that is moved from where it was found.
+struct Moved<'a> {
+    joint: &'a Joint<'a>,
+    group: usize,
+    /// Index of the element in its group.
+    element: usize,
+    /// Unit vector across the direction found, along which it is moved.
+    axis: Vector3<f64>,
+    /// Angle to which it is moved, and how closely it is held there, in radians.
+    to: f64,
+    held: f64,
+}
+
+/// The direction of a facet that is known least.
+struct Weakest {
+    element: usize,
+    sd: f64,
+    axis: Vector3<f64>,
+    /// The combination of parameters that it is.
+    combination: DVector<f64>,
+}
+
+impl Joint<'_> {
+    /// Facets, by their index in the session, whose covariance does not hold as far as it reaches.
+    pub(super) fn bent(&self, solution: &Solution) -> BTreeSet<usize> {
+        let bends = |group: usize, weakest: &Weakest| {
+            [REACH, -REACH].iter().any(|k| {
+                let rise = self.rise(solution, group, weakest, *k);
+                !rise.is_some_and(|r| LINEAR_RISE.contains(&r))
+            })
+        };
+        let weakest = self.weakest(solution);
+        let bent = weakest.iter().filter(|((group, _), w)| bends(*group, w));
+        bent.map(|((group, facet), _)| self.groups[*group].facets[*facet].facet)
+            .collect()
+    }
+
+    /// The least known direction of each facet, by group and facet, if it is known badly enough for anything to bend.
+    fn weakest(&self, solution: &Solution) -> BTreeMap<(usize, usize), Weakest> {
+        let information = &solution.information;
+        let mut weakest: BTreeMap<(usize, usize), Weakest> = BTreeMap::new();
+        for (group, facet, element, fan, linear) in self.linearized(&solution.state) {
+            let Some(by) = self.dependence(facet, &fan, &linear) else {
+                continue;
+            };
+            let rows = self
+                .among_all(information.dimension(), group, &by)
+                .rows(0, 2)
+                .into_owned();
+            let Some(c) = information.covariance_of(&rows) else {
+                continue;
+            };
+            let eigen = Matrix2::new(c[(0, 0)], c[(0, 1)], c[(1, 0)], c[(1, 1)]).symmetric_eigen();
+            let largest = eigen.eigenvalues.imax();
+            let sd = eigen.eigenvalues[largest].max(0.0).sqrt();
+            let place = (group, facet);
+            if sd > STRAIGHT_SD && weakest.get(&place).is_none_or(|w| w.sd < sd) {
+                let along = eigen.eigenvectors.column(largest);
+                let (across, up) = frame::tangent_basis(&linear.v);
+                let found = self.groups[group].elements.iter().position(|e| e == element);
+                weakest.insert(
+                    place,
+                    Weakest {
+                        element: found.unwrap_or(0),
+                        sd,
+                        axis: across.into_inner() * along[0] + up.into_inner() * along[1],
+                        combination: rows.transpose() * along,
+                    },
+                );
+            }
+        }
+        weakest
+    }
+
+    /// How much ‖f‖² rises over k standard deviations, in k². `None` where nothing is defined so far away.
+    fn rise(&self, solution: &Solution, group: usize, weakest: &Weakest, k: f64) -> Option<f64> {
+        let step = solution.information.step_along(&weakest.combination)?;
+        let moved = Moved {
+            joint: self,
+            group,
+            element: weakest.element,
+            axis: weakest.axis,
+            to: k * weakest.sd,
+            held: HELD * weakest.sd,
+        };
+        let problem = self.with_priors(&moved);
+        let profile = least_squares::minimize(&problem, solution.state.retract(&(step * k)), &SEARCH).ok()?;
+        Some((profile.sum_of_squares - solution.sum_of_squares) / (k * k))
+    }
+}
+
+impl Moved<'_> {
+    /// The element linearized, and how far from where it is to be, in parts of how closely it is held.
+    fn row(&self, shared: &Point, own: &Point) -> Option<(Linear, f64)> {
+        let group = &self.joint.groups[self.group];
+        let boards = self.joint.boards(group, shared, own)?;
+        let element = &group.elements[self.element];
+        let linear = self.joint.element(group, element, shared, own, &boards, true)?;
+        let angle = libm::asin(linear.v.dot(&self.axis).clamp(-1.0, 1.0));
+        let off = (angle - self.to) / self.held;
+        Some((linear, off))
+    }
+}
+
+impl GroupedProblem for Moved<'_> {
+    fn groups(&self) -> usize {
+        self.joint.groups()
+    }
+
+    fn residuals(&self, group: usize, shared: &Point, own: &Point) -> Option<DVector<f64>> {
+        let residuals = self.joint.residuals(group, shared, own)?;
+        if group != self.group {
+            return Some(residuals);
+        }
+        let (_, off) = self.row(shared, own)?;
+        Some(residuals.push(off))
+    }
+
+    fn jacobian(&self, group: usize, shared: &Point, own: &Point) -> Option<GroupJacobian> {
+        let mut jacobian = self.joint.jacobian(group, shared, own)?;
+        if group != self.group {
+            return Some(jacobian);
+        }
+        let (linear, _) = self.row(shared, own)?;
+        let group = &self.joint.groups[self.group];
+        let element = &group.elements[self.element];
+        let facet = element.facet?;
+        let fan = Fan::of(element, &Joint::shape(own, facet)?, &self.joint.flatness)?;
+        let by = self.joint.dependence(facet, &fan, &linear)?;
+        let (across, up) = frame::tangent_basis(&linear.v);
+        let cos = (1.0 - linear.v.dot(&self.axis).powi(2)).sqrt();
+        let along = Vector2::new(across.dot(&self.axis), up.dot(&self.axis)) / (cos * self.held);
+        let row = jacobian.shared.nrows();
+        jacobian.shared = jacobian.shared.insert_row(row, 0.0);
+        jacobian.own = jacobian.own.insert_row(row, 0.0);
+        jacobian
+            .shared
+            .set_row(row, &(along.transpose() * by.shared.rows(0, 2)));
+        jacobian
+            .own
+            .set_row(row, &(along.transpose() * by.own.rows(0, 2)));
+        Some(jacobian)
+    }
+}
