@@ -6,7 +6,7 @@
 //! Applications", 1988, section 6.1): it rises by k² over k standard deviations as far as the problem is linear, and by
 //! k²(1 ± 1/q)² where it bends, with q = δ̂ over the standard deviation.
 
-use super::problem::{Fan, Joint, Linear};
+use super::problem::{Element, Fan, Joint, Linear};
 use crate::least_squares::{self, GroupJacobian, GroupedProblem, Point, Solution};
 use catoptric_model::frame;
 use nalgebra::{DVector, Matrix2, Vector2, Vector3};
@@ -38,8 +38,7 @@ const SEARCH: least_squares::Options = least_squares::Options {
 struct Moved<'a> {
     joint: &'a Joint<'a>,
     group: usize,
-    /// Index of the element in its group.
-    element: usize,
+    element: &'a Element,
     /// Unit vector across the direction found, along which it is moved.
     axis: Vector3<f64>,
     /// Angle to which it is moved, and how closely it is held there, in radians.
@@ -48,8 +47,8 @@ struct Moved<'a> {
 }
 
 /// The direction of a facet that is known least.
-struct Weakest {
-    element: usize,
+struct Weakest<'a> {
+    element: &'a Element,
     sd: f64,
     axis: Vector3<f64>,
     /// The combination of parameters that it is.
@@ -72,7 +71,7 @@ impl Joint<'_> {
     }
 
     /// The least known direction of each facet, by group and facet, if it is known badly enough for anything to bend.
-    fn weakest(&self, solution: &Solution) -> BTreeMap<(usize, usize), Weakest> {
+    fn weakest<'a>(&'a self, solution: &'a Solution) -> BTreeMap<(usize, usize), Weakest<'a>> {
         let information = &solution.information;
         let mut weakest: BTreeMap<(usize, usize), Weakest> = BTreeMap::new();
         for (group, facet, element, fan, linear) in self.linearized(&solution.state) {
@@ -93,11 +92,10 @@ impl Joint<'_> {
             if sd > STRAIGHT_SD && weakest.get(&place).is_none_or(|w| w.sd < sd) {
                 let along = eigen.eigenvectors.column(largest);
                 let (across, up) = frame::tangent_basis(&linear.v);
-                let found = self.groups[group].elements.iter().position(|e| e == element);
                 weakest.insert(
                     place,
                     Weakest {
-                        element: found.unwrap_or(0),
+                        element,
                         sd,
                         axis: across.into_inner() * along[0] + up.into_inner() * along[1],
                         combination: rows.transpose() * along,
@@ -130,8 +128,9 @@ impl Moved<'_> {
     fn row(&self, shared: &Point, own: &Point) -> Option<(Linear, f64)> {
         let group = &self.joint.groups[self.group];
         let boards = self.joint.boards(group, shared, own)?;
-        let element = &group.elements[self.element];
-        let linear = self.joint.element(group, element, shared, own, &boards, true)?;
+        let linear = self
+            .joint
+            .element(group, self.element, shared, own, &boards, true)?;
         let angle = libm::asin(linear.v.dot(&self.axis).clamp(-1.0, 1.0));
         let off = (angle - self.to) / self.held;
         Some((linear, off))
@@ -158,10 +157,8 @@ impl GroupedProblem for Moved<'_> {
             return Some(jacobian);
         }
         let (linear, _) = self.row(shared, own)?;
-        let group = &self.joint.groups[self.group];
-        let element = &group.elements[self.element];
-        let facet = element.facet?;
-        let fan = Fan::of(element, &Joint::shape(own, facet)?, &self.joint.flatness)?;
+        let facet = self.element.facet?;
+        let fan = Fan::of(self.element, &Joint::shape(own, facet)?, &self.joint.flatness)?;
         let by = self.joint.dependence(facet, &fan, &linear)?;
         let (across, up) = frame::tangent_basis(&linear.v);
         let cos = (1.0 - linear.v.dot(&self.axis).powi(2)).sqrt();
