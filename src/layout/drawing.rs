@@ -4,8 +4,10 @@ use super::element::{Class, exit, trace};
 use super::field::{Cell, cells};
 use super::footprint::{Footprint, footprints};
 use super::size::HOUSING;
+use catoptric_model::Pose;
 use catoptric_sim::cast::Triangle;
 use catoptric_sim::optics::{End, Mirrors, Setting};
+use catoptric_sim::placement::room_from_rig;
 use catoptric_sim::reading::Sensor;
 use catoptric_sim::structure::{BuiltFacet, Structure};
 use catoptric_sim::{Scene, SimError};
@@ -16,6 +18,8 @@ use nalgebra::{Point3, Unit, Vector3};
 pub struct Drawing {
     /// Name of the scene.
     pub name: String,
+    /// Where the scanner stands in the room.
+    pub room_from_sensor: Pose,
     /// The mirrors.
     pub facets: Vec<BuiltFacet>,
     /// Posts and housing.
@@ -86,6 +90,7 @@ impl Drawing {
         };
         Ok(Self {
             name: scene.name.clone(),
+            room_from_sensor: room_from_rig(&scene.room) * structure.rig_from_sensor,
             rays,
             footprints,
             cells: cells(sensor.shape()),

@@ -31,6 +31,7 @@
 //! ```
 
 mod accuracy;
+mod depth;
 mod drawing;
 mod element;
 mod facet;
@@ -41,6 +42,7 @@ mod sensitivity;
 mod size;
 
 pub use accuracy::{Accuracy, FacetAccuracy, predict};
+pub use depth::{Depth, depth};
 pub use drawing::{Drawing, DrawnPart, DrawnRay};
 pub use element::{Class, DARK, Element};
 pub(crate) use element::{Traced, exit, trace};

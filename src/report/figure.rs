@@ -227,7 +227,7 @@ fn frame<'a>(area: &Sheet<'a>, axes: &Axes, y_labels: bool) -> Result<Chart<'a>,
 }
 
 /// A number at an axis: no more digits than it needs, a true minus, and one zero only.
-fn tick(value: f64) -> String {
+pub(super) fn tick(value: f64) -> String {
     // Ticks are round numbers; what is beyond the sixth decimal is rounding.
     let text = format!("{value:.6}");
     let text = text.trim_end_matches('0').trim_end_matches('.');

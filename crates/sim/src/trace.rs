@@ -77,6 +77,19 @@ impl Scenery {
         })
     }
 
+    /// The room with what stands in it, without the rig.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn room(scene: &Scene) -> Result<Self, SimError> {
+        Ok(Self {
+            stage: Stage::new(scene, &Pose::identity())?,
+            scene: scene.clone(),
+            room_from_frame: None,
+            structure: Structure::empty(),
+        })
+    }
+
     /// Builds the index; a ray may meet `max_bounces` mirrors in a row.
     ///
     /// # Errors

@@ -1,6 +1,7 @@
 //! The page about mirror layouts, one or several side by side, and its pictures as files.
 
 mod canvas;
+mod depth;
 mod perspective;
 mod sides;
 mod tables;
@@ -8,7 +9,7 @@ mod views;
 
 use super::figure::{css, standalone};
 use super::page::{escape, figure as block, legend, page, table};
-use crate::layout::{Analysis, Drawing};
+use crate::layout::{Analysis, Depth, Drawing};
 use catoptric_sim::{Scene, SimError};
 use sides::SIDES;
 use views::LOST;
@@ -18,6 +19,7 @@ use views::LOST;
 pub struct Drawn {
     analysis: Analysis,
     drawing: Drawing,
+    depth: Depth,
 }
 
 impl Drawn {
@@ -29,8 +31,10 @@ impl Drawn {
         let mut scene = scene.clone();
         // As closely as the analysis looked; there are as many as a scene can hold.
         scene.scanner.sub_rays = u32::try_from(analysis.sub_rays).unwrap_or(scene.scanner.sub_rays);
+        let drawing = Drawing::new(&scene, analysis.seed)?;
         Ok(Self {
-            drawing: Drawing::new(&scene, analysis.seed)?,
+            depth: crate::layout::depth(&scene, &drawing)?,
+            drawing,
             analysis: analysis.clone(),
         })
     }
@@ -56,8 +60,9 @@ pub fn layout(layouts: &[Drawn]) -> String {
     let (headings, rows) = tables::key_figures(layouts);
     let headings: Vec<&str> = headings.iter().map(String::as_str).collect();
     html += &table(&headings, &rows);
-    let chapters: [(&str, OfLayout); 5] = [
+    let chapters: [(&str, OfLayout); 6] = [
         ("Where it looks", field),
+        ("What it reads in its room", ranges),
         ("What becomes of the scan", scan),
         ("The structure", structure),
         ("From three sides", three_sides),
@@ -93,6 +98,7 @@ pub fn layout_pictures(layouts: &[Drawn]) -> Vec<(String, Vec<u8>)> {
             files.push((format!("{prefix}{name}.svg"), standalone(svg).into_bytes()));
         };
         add("field".to_owned(), &views::map(drawn));
+        add("depth".to_owned(), &depth::depth(drawn));
         add("scan".to_owned(), &views::scan(drawn));
         for side in &SIDES {
             add(side.name.to_owned(), &sides::side(drawn, side));
@@ -195,6 +201,21 @@ fn field(drawn: &Drawn) -> Chapter {
                   line is thinnest where the scanner's spot lies along the scan."
             .to_owned(),
         legend: perspective::legend(drawn),
+        headings,
+        rows,
+        wide: false,
+    }
+}
+
+fn ranges(drawn: &Drawn) -> Chapter {
+    let (headings, rows) = tables::ranges(drawn);
+    Chapter {
+        pictures: depth::depth(drawn),
+        caption: "The scene's room without its boards, unrolled like the map above: in grey how far everything is from the \
+                  scanner, darker where it is nearer, and in color what each element reads there, the way over its mirror \
+                  included and without errors of range."
+            .to_owned(),
+        legend: Vec::new(),
         headings,
         rows,
         wide: false,

@@ -226,7 +226,7 @@ fn shaded(color: RGBColor, [a, b, c]: &[Point3<f64>; 3], camera: &Camera) -> RGB
 }
 
 /// Bytes as RFC 4648 writes them.
-fn base64(bytes: &[u8]) -> String {
+pub(super) fn base64(bytes: &[u8]) -> String {
     const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for three in bytes.chunks(3) {

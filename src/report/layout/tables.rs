@@ -119,6 +119,39 @@ pub(super) fn key_figures(layouts: &[Drawn]) -> (Vec<String>, Rows) {
     (headings, rows.collect())
 }
 
+/// What the elements of every facet read in the room, and the undeflected ones.
+pub(super) fn ranges(drawn: &Drawn) -> (Headings, Rows) {
+    let own = |facet: Option<usize>| {
+        let rays = drawn.drawing.rays.iter();
+        let of = rays.filter(move |r| r.class.sees() && r.facets.last().copied() == facet);
+        let mut ranges: Vec<f64> = of.filter_map(|r| drawn.depth.read_m[r.beam]).collect();
+        ranges.sort_by(f64::total_cmp);
+        ranges
+    };
+    let row = |name: String, facet: Option<usize>| {
+        let ranges = own(facet);
+        let at = |place: Option<&f64>| number(place.copied().unwrap_or(f64::NAN), 2);
+        vec![
+            name,
+            ranges.len().to_string(),
+            at(ranges.first()),
+            at(ranges.get(ranges.len() / 2)),
+            at(ranges.last()),
+        ]
+    };
+    let facets = drawn.analysis.facets.iter().enumerate();
+    let mut rows: Rows = facets.map(|(i, f)| row(f.name.clone(), Some(i))).collect();
+    rows.push(row("undeflected".to_owned(), None));
+    let headings = &[
+        "facet",
+        "elements that read",
+        "nearest (m)",
+        "median (m)",
+        "farthest (m)",
+    ];
+    (headings, rows)
+}
+
 /// Where each fan goes.
 pub(super) fn directions(drawn: &Drawn) -> (Headings, Rows) {
     let row = |f: &FacetView| {

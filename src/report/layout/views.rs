@@ -73,23 +73,15 @@ pub(super) fn map(drawn: &Drawn) -> String {
         shapes.areas.push(Area { points, color: LOST });
     }
     for ray in drawing.rays.iter().filter(|r| r.class.sees()) {
-        let Some(turn) = turn(drawn, ray) else { continue };
-        let cell = drawing.cells[ray.beam];
-        let half = 0.5 * beam::STEP;
-        let corners = [(-half, -1.0), (half, -1.0), (half, 1.0), (-half, 1.0)].map(|(along, across)| {
-            let v = turn * beam::spherical(cell.azimuth + along, across * cell.half_height).into_inner();
-            degrees(&v)
-        });
         let fill = if ray.facets.is_empty() {
             DIRECT
         } else {
             ray_color(ray)
         };
-        shapes.areas.extend(
-            on_map(corners)
-                .into_iter()
-                .map(|points| Area { points, color: fill }),
-        );
+        let cell = cell(drawn, ray).into_iter();
+        shapes
+            .areas
+            .extend(cell.map(|points| Area { points, color: fill }));
     }
     for (number, facet) in drawn.analysis.facets.iter().enumerate() {
         let of = |r: &&DrawnRay| r.class == Class::Deflected && r.facets.first() == Some(&number);
@@ -115,6 +107,20 @@ pub(super) fn map(drawn: &Drawn) -> String {
         });
     }
     fine(MAP, &axes, "Field of regard", &shapes)
+}
+
+/// The outline of an element's cell on the map, in two parts at the seam; empty for one that does not leave.
+pub(super) fn cell(drawn: &Drawn, ray: &DrawnRay) -> Vec<Vec<(f64, f64)>> {
+    let Some(turn) = turn(drawn, ray) else {
+        return Vec::new();
+    };
+    let cell = drawn.drawing.cells[ray.beam];
+    let half = 0.5 * beam::STEP;
+    let corners = [(-half, -1.0), (half, -1.0), (half, 1.0), (-half, 1.0)].map(|(along, across)| {
+        let v = turn * beam::spherical(cell.azimuth + along, across * cell.half_height).into_inner();
+        degrees(&v)
+    });
+    on_map(corners)
 }
 
 /// The product of the reflections on a ray's way: from directions of the scan to where it looks.
