@@ -47,6 +47,7 @@ pub(super) fn session(mirrors: &[Mirror]) -> Session {
         bare_structure: BareStructure {
             mirror_thickness_mm: 1.0,
             distance_sd_mm: 0.5,
+            scanned: false,
             first_beam: 0,
             distance_m: Vec::new(),
         },

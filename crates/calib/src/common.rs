@@ -3,8 +3,12 @@
 use catoptric_model::{RangeBias, Session};
 use nalgebra::RowDVector;
 
+/// Color of the bare structure, which boards do not have.
+const STRUCTURE: &str = "structure";
+
 /// The uncertain numbers behind E_r, E_a and E_c, each with its standard deviation: the nodes of the distance table,
-/// then A_a, then E_c of each color a board has.
+/// then A_a, then E_c of each color a board has; and last the drift while the scanner ranged the bare structure, if it was
+/// the scanner that did.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CommonErrors<'a> {
     session: &'a Session,
@@ -22,7 +26,8 @@ impl<'a> CommonErrors<'a> {
 
     /// How many there are.
     pub fn len(&self) -> usize {
-        self.session.believed.bias.distance.range_m.len() + 1 + self.colors.len()
+        let drift = usize::from(self.session.bare_structure.scanned);
+        self.session.believed.bias.distance.range_m.len() + 1 + self.colors.len() + drift
     }
 
     /// Never: A_a is always among them.
@@ -49,6 +54,25 @@ impl<'a> CommonErrors<'a> {
         row
     }
 
+    /// Error of a bare distance that one standard deviation of each number causes, in metres: of what the scanner ranged
+    /// and the believed biases corrected.
+    pub fn bare_row(&self, distance: f64, cos_incidence: f64) -> RowDVector<f64> {
+        if !self.session.bare_structure.scanned {
+            return RowDVector::zeros(self.len());
+        }
+        let mut row = self.row(distance, cos_incidence, STRUCTURE);
+        let last = self.len() - 1;
+        row[last] = self.session.believed.drift_sd_mm * 1e-3;
+        row
+    }
+
+    /// Standard deviation of a bare distance by all else, which the facets do not share, in metres.
+    pub fn bare_sd(&self, distance: f64, cos_incidence: f64) -> f64 {
+        let whole = self.session.bare_structure.distance_sd_mm * 1e-3;
+        let shared = self.bare_row(distance, cos_incidence).norm_squared();
+        (whole * whole - shared).max(0.0).sqrt()
+    }
+
     /// What each number is called, and its standard deviation in the unit of that name.
     pub(crate) fn named(&self) -> Vec<(String, f64)> {
         let beliefs = &self.session.believed;
@@ -57,7 +81,10 @@ impl<'a> CommonErrors<'a> {
         let gain = ("A_a (mm)".to_owned(), beliefs.angle_gain_sd_mm);
         let colors = self.colors.iter();
         let colors = colors.map(|color| (format!("E_c of {color} (mm)"), beliefs.color_bias_sd_mm));
-        nodes.chain([gain]).chain(colors).collect()
+        let drift = beliefs.drift_sd_mm;
+        let bare = (self.session.bare_structure.scanned)
+            .then(|| ("drift before the bare structure (mm)".to_owned(), drift));
+        nodes.chain([gain]).chain(colors).chain(bare).collect()
     }
 
     /// The believed biases changed by so many standard deviations of each number.

@@ -162,6 +162,10 @@ pub struct BareStructure {
     pub mirror_thickness_mm: f64,
     /// Uncertainty of a bare distance, in millimetres.
     pub distance_sd_mm: f64,
+    /// Whether the scanner itself ranged them, in one recording: then they share its drift there, and what is not known of
+    /// the believed biases by which they are corrected. Both are part of the uncertainty.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub scanned: bool,
     /// First beam of `distance_m`.
     pub first_beam: usize,
     /// Mean bias-corrected range of each beam to the bare structure, in metres; 0 where there is none.

@@ -70,6 +70,7 @@ fn session(beams: usize) -> Session {
         bare_structure: BareStructure {
             mirror_thickness_mm: 3.0,
             distance_sd_mm: 1.0,
+            scanned: false,
             first_beam: 2,
             distance_m: vec![0.1, 0.0, 0.12],
         },

@@ -1,8 +1,8 @@
 //! The error budget of one element: how far its direction can be off under every error the experimenter believes in.
 //!
 //! Per board: white noise σ²/N, a drift constant, the board's markers (one offset and two tilts of its plane). Common
-//! to all boards: the nodes of E_r, A_a, E_c of each color, the distance d, and the mounting of the sensor. They make
-//! Σ (K × K); the estimate x̂ = (HᵀWH)⁻¹HᵀW·(z − r) then has the sandwich covariance, and no unbiased estimate can
+//! to all boards: the nodes of E_r, A_a, E_c of each color, the distance d, and the mounting of the sensor. A d that the
+//! scanner ranged has errors of E_r and A_a in it, which partly cancel those of the readings. They make Σ (K × K); the estimate x̂ = (HᵀWH)⁻¹HᵀW·(z − r) then has the sandwich covariance, and no unbiased estimate can
 //! have less than the bound (HᵀΣ⁻¹H)⁻¹.
 
 mod plane;
@@ -10,7 +10,7 @@ mod plane;
 use crate::common::CommonErrors;
 use crate::jacobian;
 use crate::observations::BoardView;
-use catoptric_model::{Deflection, Session, range};
+use catoptric_model::{Deflection, Session, beam, range};
 use nalgebra::{DMatrix, DVector, Dyn, Matrix2, Matrix6, OMatrix, RowDVector, RowVector6, U2, U6, Vector2};
 
 pub(crate) use plane::PlaneFit;
@@ -150,9 +150,14 @@ impl Sighting {
         if mount.common.ncols() == biases.len() {
             biases += mount_row * &mount.common;
         }
+        // What a bare distance is off by is taken for a part of the way.
+        let bare_cos = (0.5 * (1.0 - beam::direction(beam_azimuth).dot(&v)))
+            .max(0.0)
+            .sqrt();
+        biases -= common.bare_row(deflection.distance, bare_cos) * gradient.distance;
         let mut shared = RowDVector::zeros(common.len() + 1);
         shared.columns_mut(0, common.len()).copy_from(&biases);
-        shared[common.len()] = gradient.distance * session.bare_structure.distance_sd_mm * 1e-3;
+        shared[common.len()] = gradient.distance * common.bare_sd(deflection.distance, bare_cos);
         Some(Self {
             angles: gradient.angles(),
             own,

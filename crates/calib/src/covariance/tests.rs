@@ -44,6 +44,7 @@ fn session() -> Session {
         bare_structure: BareStructure {
             mirror_thickness_mm: 0.0,
             distance_sd_mm: 0.0,
+            scanned: false,
             first_beam: 0,
             distance_m: Vec::new(),
         },
@@ -137,4 +138,29 @@ fn four_markers_hold_a_plane_by_half_their_error() {
     let sigma = even(3, &session).covariance[(0, 0)] - 16e-8;
     // Offset σ/2, over cos 45° along the beam.
     assert!((sigma - (0.2e-3_f64).powi(2) * 2.0).abs() < 1e-14);
+}
+
+#[test]
+fn a_scanned_bare_distance_holds_the_common_errors_and_its_uncertainty_is_the_stated_one() {
+    let mut session = session();
+    session.believed.distance_bias_sd_mm = 0.5;
+    session.believed.angle_gain_sd_mm = 3.0;
+    session.believed.drift_sd_mm = 0.9;
+    session.bare_structure.distance_sd_mm = 1.6;
+    let with_another_instrument = CommonErrors::of(&session);
+    assert_eq!(with_another_instrument.bare_row(0.07, 0.8).norm(), 0.0);
+    assert!((with_another_instrument.bare_sd(0.07, 0.8) - 1.6e-3).abs() < 1e-15);
+    let count = with_another_instrument.len();
+    session.bare_structure.scanned = true;
+    let common = CommonErrors::of(&session);
+    assert_eq!(common.len(), count + 1);
+    let row = common.bare_row(0.07, 0.8);
+    // E_r and A_a as in a reading, and a drift that no reading of a board has.
+    assert_eq!(
+        row.columns(0, count),
+        common.row(0.07, 0.8, "structure").columns(0, count)
+    );
+    assert!((row[count] - 0.9e-3).abs() < 1e-15 && common.row(1.0, 0.8, "")[count] == 0.0);
+    let whole = row.norm_squared() + common.bare_sd(0.07, 0.8).powi(2);
+    assert!((whole.sqrt() - 1.6e-3).abs() < 1e-12);
 }

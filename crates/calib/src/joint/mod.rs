@@ -25,7 +25,7 @@ use answer::Answer;
 use catoptric_model::calibration::{FacetEstimate, MountEstimate};
 use catoptric_model::{Assessment, BeamEstimate, MirrorPlane, Pose, RangeBias, Status, beam};
 use fit::Fit;
-use nalgebra::{DVector, Dyn, Matrix2, OMatrix, U6, Vector2};
+use nalgebra::{DVector, Dyn, Matrix2, OMatrix, RowDVector, U6, Vector2};
 use problem::{BareFacet, Board, Element, Facet, Flatness, Group, Joint, Mounting, Sight};
 use reach::STRAIGHT_SD;
 use std::collections::BTreeMap;
@@ -142,6 +142,7 @@ fn board(work: &Workspace, pose: usize) -> Option<Board> {
 fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) -> Group {
     let session = &work.dataset.session;
     let noise = session.believed.range_noise_sd_mm * 1e-3;
+    let common = CommonErrors::of(session);
     let bare = |facet: usize| {
         let distances = assigned.iter().filter(|a| a.facet == facet).filter_map(|a| {
             let u = beam::direction(azimuth(session, a.beam));
@@ -150,10 +151,21 @@ fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) -> Group {
                 work.bare.distance(session, &session.facets[facet].name, a.beam)?,
             ))
         });
+        let distances: Vec<_> = distances.collect();
+        let drawn = session.facets[facet].plane();
+        let (mut row, mut variance) = (RowDVector::zeros(common.len()), 0.0);
+        for (u, distance) in &distances {
+            // By the drawing, as the distances were corrected.
+            let cos = drawn.as_ref().map_or(1.0, |plane| plane.normal.dot(u).abs());
+            row += common.bare_row(*distance, cos);
+            variance += common.bare_sd(*distance, cos).powi(2);
+        }
+        let count = distances.len().max(1) as f64;
         BareFacet {
-            distances: distances.collect(),
+            distances,
             thickness: session.bare_structure.mirror_thickness_mm * 1e-3,
-            sd: (session.bare_structure.distance_sd_mm * 1e-3).max(LEAST_SD),
+            common: row / count,
+            sd: (variance / count).sqrt().max(LEAST_SD),
         }
     };
     let mut group = Group {

@@ -16,8 +16,8 @@ use crate::least_squares::{Block, GroupJacobian, GroupedProblem, Point};
 use crate::pose;
 use catoptric_model::{BoardPlane, Pose, RangeBias, frame, mirror};
 use nalgebra::{
-    DMatrix, DVector, Dyn, Matrix2, Matrix3, Matrix6, OMatrix, Point3, RowVector3, U2, U6, Unit, Vector2,
-    Vector3, Vector6,
+    DMatrix, DVector, Dyn, Matrix2, Matrix3, Matrix6, OMatrix, Point3, RowDVector, RowVector3, U2, U6, Unit,
+    Vector2, Vector3, Vector6,
 };
 
 /// Own parameters of a board: drift, offset and two tilts of its plane.
@@ -88,6 +88,8 @@ pub(super) struct BareFacet {
     /// Direction and measured distance to the bare structure.
     pub(super) distances: Vec<(Unit<Vector3<f64>>, f64)>,
     pub(super) thickness: f64,
+    /// Mean error by one standard deviation of each of the common errors, and 1σ of what the facet shares with no other.
+    pub(super) common: RowDVector<f64>,
     pub(super) sd: f64,
 }
 
@@ -486,8 +488,8 @@ impl Joint<'_> {
         Some(Boards { placed, motion })
     }
 
-    /// Predicted less measured distance of a facet, in standard deviations, and its derivatives.
-    fn bare(facet: &BareFacet, shape: &Shape) -> Option<(f64, [f64; 3])> {
+    /// Predicted less measured distance of a facet, in standard deviations, and its derivatives by the plane.
+    fn bare(&self, facet: &BareFacet, shape: &Shape, w: &DVector<f64>) -> Option<(f64, [f64; 3])> {
         let (mut sum, mut derivative) = (0.0, [0.0; 3]);
         let (a, b) = frame::tangent_basis(&shape.normal);
         for (u, measured) in &facet.distances {
@@ -502,7 +504,8 @@ impl Joint<'_> {
             derivative[2] += 1.0 / facing;
         }
         let scale = 1.0 / (facet.distances.len() as f64 * facet.sd);
-        Some((sum * scale, derivative.map(|d| d * scale)))
+        let common = (&facet.common * w.rows(self.first_common, self.common.len()))[0] / facet.sd;
+        Some((sum * scale + common, derivative.map(|d| d * scale)))
     }
 }
 
@@ -546,7 +549,8 @@ impl GroupedProblem for Joint<'_> {
         }
         for (i, facet) in group.facets.iter().enumerate() {
             if !facet.bare.distances.is_empty() {
-                rows.push(Self::bare(&facet.bare, &Self::shape(own, i)?)?.0);
+                let shape = Self::shape(own, i)?;
+                rows.push(self.bare(&facet.bare, &shape, shared.numbers(0)?)?.0);
             }
         }
         Some(DVector::from_vec(rows))
@@ -578,7 +582,13 @@ impl GroupedProblem for Joint<'_> {
         }
         for (i, facet) in group.facets.iter().enumerate() {
             if !facet.bare.distances.is_empty() {
-                let (_, derivative) = Self::bare(&facet.bare, &Self::shape(own, i)?)?;
+                let shape = Self::shape(own, i)?;
+                let (_, derivative) = self.bare(&facet.bare, &shape, shared.numbers(0)?)?;
+                let by_common = &facet.bare.common / facet.bare.sd;
+                jacobian
+                    .shared
+                    .view_mut((row, self.first_common), (1, by_common.len()))
+                    .copy_from(&by_common);
                 for (column, value) in derivative.iter().enumerate() {
                     jacobian.own[(row, i * FACET_PARAMETERS + column)] = *value;
                 }

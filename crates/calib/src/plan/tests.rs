@@ -57,6 +57,7 @@ fn session() -> Session {
         bare_structure: BareStructure {
             mirror_thickness_mm: 0.0,
             distance_sd_mm: 0.5,
+            scanned: false,
             first_beam: 0,
             distance_m: Vec::new(),
         },

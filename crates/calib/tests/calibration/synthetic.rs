@@ -338,6 +338,7 @@ impl World {
             bare_structure: BareStructure {
                 mirror_thickness_mm: self.thickness_mm,
                 distance_sd_mm: self.distance_sd_mm,
+                scanned: false,
                 first_beam: 0,
                 distance_m: bare,
             },

@@ -152,6 +152,7 @@ impl Laboratory {
         Ok(session::BareStructure {
             mirror_thickness_mm: thickness,
             distance_sd_mm: variance.sqrt() * 1e3,
+            scanned: true,
             first_beam: 0,
             distance_m,
         })
@@ -186,6 +187,7 @@ impl Laboratory {
         Ok(session::BareStructure {
             mirror_thickness_mm: superstructure.mirror.thickness_mm,
             distance_sd_mm: libm::hypot(sd_mm, superstructure.as_built.thickness_sd_mm),
+            scanned: false,
             first_beam: 0,
             distance_m,
         })
