@@ -4,13 +4,19 @@
 //! volume hierarchy; a mesh has one of its own below it. A ray that leaves a mirror excludes that mirror by its index,
 //! never by an epsilon.
 
+mod beam;
+mod build;
+mod bundle;
 mod cylinder;
+mod exact;
+mod single;
 mod skin;
 mod triangles;
+mod wide;
 
 pub use cylinder::Cylinder;
 pub use skin::{CYLINDER_FACES, Triangle, volume};
-pub use triangles::Triangles;
+pub use triangles::{Met, Triangles};
 
 use crate::footprint::Ray;
 use crate::layout::area_vector;

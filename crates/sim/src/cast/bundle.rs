@@ -1,0 +1,365 @@
+//! A bundle of rays in lanes of f32, and the pyramid around it.
+//!
+//! The rays of a narrow cone, from nearly one point, lie in a pyramid. What is outside one of its sides, or outside one
+//! of the sides that it has in projection along an axis, is met by none of them. All of it errs outwards.
+
+use super::build::{downwards, rounded, upwards};
+use super::wide::{ROUNDING, WIDTH};
+use crate::footprint::Ray;
+use fearless_simd::{Simd, prelude::*};
+use fearless_simd::{f32x8, f32x16};
+
+/// Rays that one instruction treats.
+pub(super) const LANES: usize = 16;
+
+/// Most rays of a bundle.
+pub(super) const MOST: usize = 64;
+
+/// Number of a triangle that is none.
+pub(super) const NONE: u32 = u32::MAX;
+
+/// Rounding of a slope in the pyramid, with room to spare.
+const SLOPE_SLACK: f32 = 2e-6;
+
+/// Least cosine between the bundle's middle and each of its rays.
+const NARROW: f32 = 0.7;
+
+/// Numbers of all rays.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+pub(super) struct Row<T>(pub(super) [[T; LANES]; MOST / LANES]);
+
+/// What is behind a plane is out of the bundle.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Side {
+    normal: [f32; 3],
+    /// By axis whether a box's corner that is farthest inside has its low (0) or its high side (1).
+    inner: [usize; 3],
+    /// Greatest product of the normal with a point that is not out.
+    edge: f32,
+}
+
+/// A bundle.
+pub(super) struct Bundle {
+    pub(super) count: usize,
+    /// The point that coordinates are relative to.
+    pub(super) reference: [f32; 3],
+    /// Greatest coordinate of it.
+    pub(super) reference_reach: f32,
+    /// Whether all rays start at one point.
+    pub(super) common: bool,
+    /// Greatest offset of a start from the reference, by the sum of its coordinates.
+    pub(super) spread: f32,
+    pub(super) direction: [Row<f32>; 3],
+    /// Starts relative to the reference.
+    pub(super) offset: [Row<f32>; 3],
+    /// Direction × offset.
+    pub(super) moment: [Row<f32>; 3],
+    /// The bundle's middle direction.
+    forward: [f32; 3],
+    /// The sides in projection: two each without the first, the second and the third axis.
+    projected: [[Side; 2]; 3],
+    /// The four sides of the pyramid.
+    sides: [Side; 4],
+    near: Side,
+    far: Side,
+}
+
+impl<T: Copy> Row<T> {
+    pub(super) fn of(value: T) -> Self {
+        Self([[value; LANES]; MOST / LANES])
+    }
+
+    pub(super) fn get(&self, ray: usize) -> T {
+        self.0[ray / LANES][ray % LANES]
+    }
+
+    pub(super) fn set(&mut self, ray: usize, value: T) {
+        self.0[ray / LANES][ray % LANES] = value;
+    }
+}
+
+impl Side {
+    fn new(normal: [f32; 3], edge: f32) -> Self {
+        Self {
+            normal,
+            inner: normal.map(|n| usize::from(n < 0.0)),
+            edge,
+        }
+    }
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+fn unit(a: [f32; 3]) -> Option<[f32; 3]> {
+    let norm = dot(a, a).sqrt();
+    (norm > 1e-7).then(|| a.map(|x| x / norm))
+}
+
+#[inline(always)]
+fn row<S: Simd>(simd: S, row: &Row<f32>, vector: usize) -> f32x16<S> {
+    f32x16::simd_from(simd, row.0[vector])
+}
+
+#[inline(always)]
+fn rows<S: Simd>(simd: S, rows: &[Row<f32>; 3], vector: usize) -> [f32x16<S>; 3] {
+    [
+        row(simd, &rows[0], vector),
+        row(simd, &rows[1], vector),
+        row(simd, &rows[2], vector),
+    ]
+}
+
+#[inline(always)]
+fn along<S: Simd>(v: &[f32x16<S>; 3], n: [f32; 3]) -> f32x16<S> {
+    let s = v[0].token();
+    let splat = |x: f32| f32x16::splat(s, x);
+    v[2].mul_add(splat(n[2]), v[1].mul_add(splat(n[1]), v[0] * splat(n[0])))
+}
+
+/// Least and greatest.
+#[derive(Clone, Copy)]
+struct Span(f32, f32);
+
+/// Of what the vectors hold. Rows are filled up with copies of the first ray.
+#[inline(always)]
+fn span<S: Simd>(simd: S, vectors: usize, value: impl Fn(usize) -> f32x16<S>) -> Span {
+    let (mut low, mut high) = (
+        f32x16::splat(simd, f32::INFINITY),
+        f32x16::splat(simd, f32::NEG_INFINITY),
+    );
+    for vector in 0..vectors {
+        let value = value(vector);
+        low = low.min(value);
+        high = high.max(value);
+    }
+    Span(low.reduce_min(), high.reduce_max())
+}
+
+impl Bundle {
+    /// At most [`MOST`] rays among things whose coordinates reach so far; `None` if they are no narrow cone.
+    #[inline(always)]
+    pub(super) fn new<S: Simd>(simd: S, rays: &[Ray], reach: f32) -> Option<Self> {
+        let first = rays.first()?;
+        debug_assert!(rays.len() <= MOST);
+        let vectors = rays.len().div_ceil(LANES);
+        let reference: [f32; 3] = std::array::from_fn(|k| rounded(first.origin[k]));
+        let origin: [f64; 3] = std::array::from_fn(|k| f64::from(reference[k]));
+        let common = rays.iter().all(|r| r.origin == first.origin);
+        let mut bundle = Self {
+            count: rays.len(),
+            reference,
+            reference_reach: reference.iter().fold(0.0, |m, c| c.abs().max(m)),
+            common,
+            spread: 0.0,
+            direction: [Row::of(0.0); 3],
+            offset: [Row::of(0.0); 3],
+            moment: [Row::of(0.0); 3],
+            forward: [0.0; 3],
+            projected: [[Side::default(); 2]; 3],
+            sides: [Side::default(); 4],
+            near: Side::default(),
+            far: Side::default(),
+        };
+        for i in 0..vectors * LANES {
+            let ray = rays.get(i).unwrap_or(first);
+            for k in 0..3 {
+                bundle.direction[k].0[i / LANES][i % LANES] = rounded(ray.direction[k]);
+                if !common {
+                    bundle.offset[k].0[i / LANES][i % LANES] = rounded(ray.origin[k] - origin[k]);
+                }
+            }
+        }
+        if !common {
+            bundle.spread = 1.001
+                * span(simd, vectors, |v| {
+                    let [x, y, z] = rows(simd, &bundle.offset, v);
+                    x.abs() + y.abs() + z.abs()
+                })
+                .1;
+            for v in 0..vectors {
+                let d = rows(simd, &bundle.direction, v);
+                let o = rows(simd, &bundle.offset, v);
+                for k in 0..3 {
+                    let (p, q) = ((k + 1) % 3, (k + 2) % 3);
+                    (d[p] * o[q] - d[q] * o[p]).store_slice(&mut bundle.moment[k].0[v]);
+                }
+            }
+        }
+        bundle.surround(simd, vectors, reach).then_some(bundle)
+    }
+
+    /// Finds the sides; whether the rays are a narrow cone.
+    #[inline(always)]
+    fn surround<S: Simd>(&mut self, simd: S, vectors: usize, reach: f32) -> bool {
+        let direction = |v: usize| rows(simd, &self.direction, v);
+        let offset = |v: usize| rows(simd, &self.offset, v);
+        let mut sum = [f32x16::splat(simd, 0.0); 3];
+        for v in 0..vectors {
+            let d = direction(v);
+            for k in 0..3 {
+                sum[k] = sum[k] + d[k];
+            }
+        }
+        let sum = [sum[0].reduce_sum(), sum[1].reduce_sum(), sum[2].reduce_sum()];
+        let Some(forward) = unit(sum) else { return false };
+        if !(span(simd, vectors, |v| along(&direction(v), forward)).0 > NARROW) {
+            return false;
+        }
+        // The ray farthest from the middle shows how the bundle lies.
+        let (mut farthest, mut most) = ([0.0; 3], -1.0);
+        for v in 0..vectors {
+            let d = direction(v);
+            let off = [0, 1, 2].map(|k| d[k] - f32x16::splat(simd, forward[k]));
+            let square = off[2].mul_add(off[2], off[1].mul_add(off[1], off[0] * off[0]));
+            let greatest = square.reduce_max();
+            if greatest > most {
+                let lane = square
+                    .simd_ge(f32x16::splat(simd, greatest))
+                    .to_bitmask()
+                    .trailing_zeros() as usize;
+                most = greatest;
+                farthest = std::array::from_fn(|k| self.direction[k].0[v][lane.min(LANES - 1)] - forward[k]);
+            }
+        }
+        let across = |a: [f32; 3]| unit(std::array::from_fn(|k| a[k] - forward[k] * dot(a, forward)));
+        let any = if forward[0].abs() < 0.6 {
+            [1.0, 0.0, 0.0]
+        } else {
+            [0.0, 1.0, 0.0]
+        };
+        let wide = if most > 1e-12 { across(farthest) } else { None };
+        let Some(wide) = wide.or_else(|| across(any)) else {
+            return false;
+        };
+        let narrow = cross(forward, wide);
+        // Products of points and normals, and the reference, are rounded.
+        let slack = 16.0 * ROUNDING * (reach + self.reference_reach + self.spread);
+        let side = |normal: [f32; 3]| {
+            let rest = if self.common {
+                // The rounding of the start.
+                2.0 * ROUNDING * self.reference_reach
+            } else {
+                span(simd, vectors, |v| along(&offset(v), normal)).1
+            };
+            let size = normal.iter().map(|n| n.abs()).sum::<f32>();
+            Side::new(normal, dot(normal, self.reference) + rest + slack * size)
+        };
+        let slopes = |to: [f32; 3]| {
+            let Span(low, high) = span(simd, vectors, |v| {
+                let d = direction(v);
+                along(&d, to) / along(&d, forward)
+            });
+            Span(low - SLOPE_SLACK, high + SLOPE_SLACK)
+        };
+        let pyramid = [wide, narrow].map(|to| {
+            let Span(low, high) = slopes(to);
+            [
+                side(std::array::from_fn(|k| to[k] - high * forward[k])),
+                side(std::array::from_fn(|k| low * forward[k] - to[k])),
+            ]
+        });
+        let projected = [(1, 2), (2, 0), (0, 1)].map(|(a, b)| {
+            // The slope of the lesser over the greater.
+            let (i, j) = if forward[a].abs() >= forward[b].abs() {
+                (a, b)
+            } else {
+                (b, a)
+            };
+            let ahead = span(simd, vectors, |v| direction(v)[i]);
+            if !(ahead.0 > 0.05 || ahead.1 < -0.05) {
+                // Along the axis left out: nothing is out.
+                return [Side::new([0.0; 3], f32::INFINITY); 2];
+            }
+            let Span(low, high) = span(simd, vectors, |v| {
+                let d = direction(v);
+                d[j] / d[i]
+            });
+            let pad = |s: f32| SLOPE_SLACK * (1.0 + s.abs());
+            let (low, high) = (low - pad(low), high + pad(high));
+            let (above, below) = if ahead.0 > 0.0 { (high, low) } else { (low, high) };
+            let normal = |slope: f32, sign: f32| {
+                let mut normal = [0.0; 3];
+                (normal[j], normal[i]) = (sign, -sign * slope);
+                normal
+            };
+            [side(normal(above, 1.0)), side(normal(below, -1.0))]
+        });
+        // The depth before the reference is not beyond the way along a ray.
+        let start = |normal: [f32; 3]| side(normal).edge;
+        let near = Side::new(forward, start(forward));
+        let backward = forward.map(|f| -f);
+        let far = Side::new(backward, start(backward));
+        self.forward = forward;
+        self.sides = [pyramid[0][0], pyramid[0][1], pyramid[1][0], pyramid[1][1]];
+        self.projected = projected;
+        self.near = near;
+        self.far = far;
+        true
+    }
+
+    /// Which of eight boxes some ray may meet before `limit`, and a way along a ray that is shorter than that to them.
+    #[inline(always)]
+    pub(super) fn boxes<S: Simd>(
+        &self,
+        simd: S,
+        bounds: &[[[f32; WIDTH]; 2]; 3],
+        limit: f32,
+    ) -> (u32, f32x8<S>) {
+        let splat = |x: f32| f32x8::splat(simd, x);
+        let corner = |side: &Side, axis: usize| f32x8::simd_from(simd, bounds[axis][side.inner[axis] & 1]);
+        let term = |side: &Side, axis: usize| corner(side, axis) * splat(side.normal[axis]);
+        let all = |side: &Side| {
+            let xy = corner(side, 1).mul_add(splat(side.normal[1]), term(side, 0));
+            corner(side, 2).mul_add(splat(side.normal[2]), xy - splat(side.edge))
+        };
+        let two = |side: &Side, a: usize, b: usize| {
+            corner(side, a).mul_add(splat(side.normal[a]), term(side, b) - splat(side.edge))
+        };
+        let out = |x: f32x8<S>, y: f32x8<S>| x.max(y);
+        let [x, y, z] = &self.projected;
+        let a = out(two(&x[0], 1, 2), two(&x[1], 1, 2));
+        let b = out(two(&y[0], 2, 0), two(&y[1], 2, 0));
+        let c = out(two(&z[0], 0, 1), two(&z[1], 0, 1));
+        let d = out(all(&self.sides[0]), all(&self.sides[1]));
+        let e = out(all(&self.sides[2]), all(&self.sides[3]));
+        let outside = out(out(out(a, b), out(c, d)), out(e, all(&self.far)));
+        let near = all(&self.near) * splat(1.0 - 1e-6);
+        let met = outside.simd_le(splat(0.0)) & near.simd_le(splat(limit));
+        // Eight lanes.
+        #[allow(clippy::cast_possible_truncation)]
+        (met.to_bitmask() as u32, near)
+    }
+
+    /// Which of eight triangles some ray may meet.
+    #[inline(always)]
+    pub(super) fn triangles<S: Simd>(&self, simd: S, corners: &[[f32x8<S>; 3]; 3]) -> u32 {
+        let splat = |x: f32| f32x8::splat(simd, x);
+        let mut outside = splat(f32::NEG_INFINITY);
+        for side in self.sides.iter().chain([&self.far]) {
+            let [n0, n1, n2] = side.normal.map(splat);
+            let [a, b, c] = [&corners[0], &corners[1], &corners[2]]
+                .map(|p| p[2].mul_add(n2, p[1].mul_add(n1, p[0] * n0)));
+            outside = outside.max(a.min(b).min(c) - splat(side.edge));
+        }
+        // Eight lanes.
+        #[allow(clippy::cast_possible_truncation)]
+        let met = outside.simd_le(splat(0.0)).to_bitmask() as u32;
+        met
+    }
+}
+
+/// An interval of f32 around a number of f64.
+pub(super) fn around(x: f64) -> (f32, f32) {
+    (downwards(x), upwards(x))
+}
