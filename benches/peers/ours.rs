@@ -16,7 +16,10 @@ use std::time::Instant;
 /// Numbers of a file of little-endian words.
 fn words<T>(path: &str, from: fn([u8; 4]) -> T) -> Vec<T> {
     let bytes = fs::read(path).unwrap_or_else(|e| panic!("{path}: {e}"));
-    bytes.chunks_exact(4).map(|b| from(b.try_into().unwrap())).collect()
+    bytes
+        .chunks_exact(4)
+        .map(|b| from(b.try_into().unwrap()))
+        .collect()
 }
 
 fn resident_mb() -> f64 {
@@ -91,7 +94,10 @@ fn main() {
             }
         }),
         "parry" => {
-            let points = vertices.iter().map(|p| parry3d::math::Vector::new(p.x, p.y, p.z)).collect();
+            let points = vertices
+                .iter()
+                .map(|p| parry3d::math::Vector::new(p.x, p.y, p.z))
+                .collect();
             parry = parry3d::shape::TriMesh::new(points, triangles).unwrap();
             Box::new(|rays, met| {
                 use parry3d::query::RayCast;
@@ -99,12 +105,18 @@ fn main() {
                 for (ray, met) in rays.iter().zip(met) {
                     let ray = parry3d::query::Ray::new(vector(&ray.origin.coords), vector(&ray.direction));
                     let way = parry.cast_local_ray(&ray, 1e4, false);
-                    *met = way.map(|distance| Met { triangle: 0, distance });
+                    *met = way.map(|distance| Met {
+                        triangle: 0,
+                        distance,
+                    });
                 }
             })
         }
         beam => {
-            let count: usize = beam.strip_prefix("beam").and_then(|n| n.parse().ok()).unwrap_or(64);
+            let count: usize = beam
+                .strip_prefix("beam")
+                .and_then(|n| n.parse().ok())
+                .unwrap_or(64);
             Box::new(move |rays, met| {
                 for (rays, met) in rays.chunks(count).zip(met.chunks_mut(count)) {
                     placed_beam(&placed, rays, met);

@@ -9,6 +9,7 @@ mod build;
 mod bundle;
 mod cylinder;
 mod exact;
+mod lanes;
 mod single;
 mod skin;
 mod triangles;

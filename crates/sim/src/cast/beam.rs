@@ -2,21 +2,26 @@
 //! in lanes.
 //!
 //! A ray meets a triangle if it passes all three edges on the same side: with the corners A, B, C seen from the start,
-//! d·(B×C), d·(C×A) and d·(A×B) have one sign, and N·A/N·d is the way, N being the normal. From another start at δ an
-//! edge has (d×δ)·(B−C) on top, and the way loses N·δ/N·d. In f32 each of these has a bound on its error:
+//! d·(B×(C−B)), d·(C×(A−C)) and d·(A×(B−A)) have one sign, and N·A/N·d is the way, N being the normal. From another
+//! start at δ an edge has (d×δ)·(B−C) on top, and the way loses N·δ/N·d. In f32 each of these has a bound on its error:
 //!
 //! - a corner is off by η = 3u(M + |O|) in each coordinate, u being half a unit in the last place, M the greatest
 //!   coordinate of the mesh and O the reference;
-//! - an edge by (4η + 20uR)(R + 2|δ|), R being the way to the farthest corner;
-//! - N·d by 8ηL + 16uL², L being the longest edge; below twice that nothing is known;
+//! - an edge by (4η + 20u(R + 2|δ|))(L + 4η), R being the way to the farthest corner and L the longest edge: a corner
+//!   that moves by η turns the edge seen from the start, but the ray is no farther from any corner than L if it meets
+//!   the triangle, and so d·(η×C) = η·(C×d) ≤ ηL;
+//! - N·d by 8ηL + 16uL²; below twice that nothing is known;
 //! - the way by 2((4η + 16u(R + |δ|))|N| + 16uL³)/|N·d|: moved corners move the point on the triangle, no lever is
 //!   longer than the triangle itself, and the factor 2 pays for N·d.
 //!
 //! So each ray knows an interval that holds the nearest way in f64. What is surely hit and surely nearer takes its
-//! place; whatever overlaps is decided in f64 at once ([`Judge`]); the ways themselves are found at the end.
+//! place; whatever overlaps is decided in f64 at once ([`Judge`]); the ways themselves are found at the
+//! end.
 
 use super::bundle::{Bundle, LANES, MOST, NONE, Row, around};
 use super::exact::Judge;
+use super::lanes::{cross, dot, inlined, less, size};
+use super::triangles::Met;
 use super::wide::{Child, Leaf, ROUNDING, STACK, WIDTH, Wide};
 use super::{FARTHEST, bundle};
 use fearless_simd::{Simd, prelude::*};
@@ -42,7 +47,7 @@ type Facts = [[f32; WIDTH]; 30];
 struct At;
 
 impl At {
-    /// B×C, C×A, A×B.
+    /// B×(C−B), C×(A−C), A×(B−A).
     const CROSSES: usize = 0;
     /// B−C, C−A, A−B.
     const EDGES: usize = 9;
@@ -105,13 +110,19 @@ impl Found {
         }
     }
 
-    /// The nearest triangle of every ray, and the way to it.
-    pub(super) fn finish(mut self, judge: &Judge<'_>, mut tell: impl FnMut(usize, u32, f64), count: usize) {
-        for ray in 0..count {
-            let triangle = self.triangle.get(ray);
-            if triangle != NONE {
-                let way = self.way(judge, ray);
-                tell(ray, triangle, way);
+    /// The nearest triangle of every ray, and the distance to it.
+    #[inline(always)]
+    pub(super) fn finish<S: Simd>(&self, simd: S, judge: &Judge<'_>, met: &mut [Option<Met>]) {
+        const HALF: usize = super::exact::LANES;
+        for (number, met) in met.chunks_mut(HALF).enumerate() {
+            let first = number * HALF;
+            let (vector, start) = (first / LANES, first % LANES);
+            let mut triangles = [NONE; HALF];
+            triangles.copy_from_slice(&self.triangle.0[vector][start..start + HALF]);
+            let distances = judge.meet_each(simd, first, &triangles, NONE);
+            for (lane, met) in met.iter_mut().enumerate() {
+                let triangle = triangles[lane];
+                *met = distances[lane].map(|distance| Met { triangle, distance });
             }
         }
     }
@@ -174,8 +185,14 @@ fn leaf<S: Simd>(
     judge: &Judge<'_>,
     found: &mut Found,
 ) {
-    let load = |corner: usize, axis: usize| f32x8::simd_from(simd, leaf.corners[corner][axis]);
-    let corner = |corner: usize| [load(corner, 0), load(corner, 1), load(corner, 2)];
+    let load = inlined(
+        #[inline(always)]
+        |corner: usize, axis: usize| f32x8::simd_from(simd, leaf.corners[corner][axis]),
+    );
+    let corner = inlined(
+        #[inline(always)]
+        |corner: usize| [load(corner, 0), load(corner, 1), load(corner, 2)],
+    );
     let corners = [corner(0), corner(1), corner(2)];
     let mut met = bundle.triangles(simd, &corners) & ((1 << count) - 1);
     if met == 0 {
@@ -204,40 +221,46 @@ fn leaf<S: Simd>(
 
 #[inline(always)]
 fn facts<S: Simd>(simd: S, corners: &[[f32x8<S>; 3]; 3], reach: f32, bundle: &Bundle) -> Facts {
-    let splat = |x: f32| f32x8::splat(simd, x);
-    let seen = |corner: &[f32x8<S>; 3]| {
-        [
-            corner[0] - splat(bundle.reference[0]),
-            corner[1] - splat(bundle.reference[1]),
-            corner[2] - splat(bundle.reference[2]),
-        ]
-    };
-    let less = |a: &[f32x8<S>; 3], b: &[f32x8<S>; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    let cross = |a: &[f32x8<S>; 3], b: &[f32x8<S>; 3]| {
-        [
-            a[1].mul_sub(b[2], a[2] * b[1]),
-            a[2].mul_sub(b[0], a[0] * b[2]),
-            a[0].mul_sub(b[1], a[1] * b[0]),
-        ]
-    };
-    let size = |a: &[f32x8<S>; 3]| a[0].abs() + a[1].abs() + a[2].abs();
+    let splat = inlined(
+        #[inline(always)]
+        |x: f32| f32x8::splat(simd, x),
+    );
+    let seen = inlined(
+        #[inline(always)]
+        |corner: &[f32x8<S>; 3]| {
+            [
+                corner[0] - splat(bundle.reference[0]),
+                corner[1] - splat(bundle.reference[1]),
+                corner[2] - splat(bundle.reference[2]),
+            ]
+        },
+    );
     let [a, b, c] = [seen(&corners[0]), seen(&corners[1]), seen(&corners[2])];
     let (bc, ca, ab) = (less(&b, &c), less(&c, &a), less(&a, &b));
     // (B − A)×(C − A).
     let normal = cross(&ca, &ab);
-    let height = normal[2].mul_add(a[2], normal[1].mul_add(a[1], normal[0] * a[0]));
+    let height = dot(&normal, &a);
     let far = size(&a).max(size(&b)).max(size(&c));
     let long = size(&bc).max(size(&ca)).max(size(&ab));
     let eta = splat(3.0 * ROUNDING * (reach + bundle.reference_reach));
     let spread = splat(bundle.spread);
-    let u = |times: f32| splat(times * ROUNDING);
-    let edge_error = far.mul_add(u(20.0), eta * 4.0) * spread.mul_add(splat(2.0), far);
+    let u = inlined(
+        #[inline(always)]
+        |times: f32| splat(times * ROUNDING),
+    );
+    let edge_error = spread.mul_add(u(40.0), far.mul_add(u(20.0), eta * 4.0)) * eta.mul_add(splat(4.0), long);
     let cube = long * long * long;
     let way_error = ((far + spread).mul_add(u(16.0), eta * 4.0)).mul_add(size(&normal), cube * u(16.0)) * 2.0;
     let least_closing = long * (long.mul_add(u(16.0), eta * 8.0)) * 2.0;
     let mut facts = [[0.0; WIDTH]; 30];
-    let mut put = |at: usize, value: f32x8<S>| value.store_slice(&mut facts[at]);
-    for (i, vector) in [cross(&b, &c), cross(&c, &a), cross(&a, &b)].iter().enumerate() {
+    let mut put = inlined(
+        #[inline(always)]
+        |at: usize, value: f32x8<S>| value.store_slice(&mut facts[at]),
+    );
+    for (i, vector) in [cross(&bc, &b), cross(&ca, &c), cross(&ab, &a)]
+        .iter()
+        .enumerate()
+    {
         for k in 0..3 {
             put(At::CROSSES + 3 * i + k, vector[k]);
         }
@@ -270,34 +293,49 @@ fn triangle<S: Simd, const COMMON: bool>(
     judge: &Judge<'_>,
     found: &mut Found,
 ) -> bool {
-    let fact = |at: usize| f32x16::splat(simd, facts[at][lane]);
-    let dot = |v: &[f32x16<S>; 3], at: usize| {
-        v[2].mul_add(fact(at + 2), v[1].mul_add(fact(at + 1), v[0] * fact(at)))
-    };
-    let more = |v: &[f32x16<S>; 3], at: usize, sum: f32x16<S>| {
-        v[2].mul_add(
-            fact(at + 2),
-            v[1].mul_add(fact(at + 1), v[0].mul_add(fact(at), sum)),
-        )
-    };
+    let fact = inlined(
+        #[inline(always)]
+        |at: usize| f32x16::splat(simd, facts[at][lane]),
+    );
+    let product = inlined(
+        #[inline(always)]
+        |v: &[f32x16<S>; 3], at: usize| {
+            v[2].mul_add(fact(at + 2), v[1].mul_add(fact(at + 1), v[0] * fact(at)))
+        },
+    );
+    let more = inlined(
+        #[inline(always)]
+        |v: &[f32x16<S>; 3], at: usize, sum: f32x16<S>| {
+            v[2].mul_add(
+                fact(at + 2),
+                v[1].mul_add(fact(at + 1), v[0].mul_add(fact(at), sum)),
+            )
+        },
+    );
     let mut changed = false;
     for vector in 0..bundle.count.div_ceil(LANES) {
-        let load = |rows: &[Row<f32>; 3]| {
-            [
-                f32x16::simd_from(simd, rows[0].0[vector]),
-                f32x16::simd_from(simd, rows[1].0[vector]),
-                f32x16::simd_from(simd, rows[2].0[vector]),
-            ]
-        };
+        let load = inlined(
+            #[inline(always)]
+            |rows: &[Row<f32>; 3]| {
+                [
+                    f32x16::simd_from(simd, rows[0].0[vector]),
+                    f32x16::simd_from(simd, rows[1].0[vector]),
+                    f32x16::simd_from(simd, rows[2].0[vector]),
+                ]
+            },
+        );
         let direction = load(&bundle.direction);
-        let edge = |i: usize| {
-            let about = dot(&direction, At::CROSSES + 3 * i);
-            if COMMON {
-                about
-            } else {
-                more(&load(&bundle.moment), At::EDGES + 3 * i, about)
-            }
-        };
+        let edge = inlined(
+            #[inline(always)]
+            |i: usize| {
+                let about = product(&direction, At::CROSSES + 3 * i);
+                if COMMON {
+                    about
+                } else {
+                    more(&load(&bundle.moment), At::EDGES + 3 * i, about)
+                }
+            },
+        );
         let (u, v, w) = (edge(0), edge(1), edge(2));
         let least = u.min(v).min(w);
         let most = u.max(v).max(w);
@@ -307,11 +345,11 @@ fn triangle<S: Simd, const COMMON: bool>(
             continue;
         }
         let inside = least.simd_gt(error) | most.simd_lt(-error);
-        let closing = dot(&direction, At::NORMAL);
+        let closing = product(&direction, At::NORMAL);
         let height = if COMMON {
             fact(At::HEIGHT)
         } else {
-            fact(At::HEIGHT) - dot(&load(&bundle.offset), At::NORMAL)
+            fact(At::HEIGHT) - product(&load(&bundle.offset), At::NORMAL)
         };
         let inverse = f32x16::splat(simd, 1.0) / closing;
         let way = height * inverse;

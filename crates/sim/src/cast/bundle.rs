@@ -4,6 +4,8 @@
 //! of the sides that it has in projection along an axis, is met by none of them. All of it errs outwards.
 
 use super::build::{downwards, rounded, upwards};
+use super::lanes;
+use super::lanes::inlined;
 use super::wide::{ROUNDING, WIDTH};
 use crate::footprint::Ray;
 use fearless_simd::{Simd, prelude::*};
@@ -123,7 +125,10 @@ fn rows<S: Simd>(simd: S, rows: &[Row<f32>; 3], vector: usize) -> [f32x16<S>; 3]
 #[inline(always)]
 fn along<S: Simd>(v: &[f32x16<S>; 3], n: [f32; 3]) -> f32x16<S> {
     let s = v[0].token();
-    let splat = |x: f32| f32x16::splat(s, x);
+    let splat = inlined(
+        #[inline(always)]
+        |x: f32| f32x16::splat(s, x),
+    );
     v[2].mul_add(splat(n[2]), v[1].mul_add(splat(n[1]), v[0] * splat(n[0])))
 }
 
@@ -182,10 +187,15 @@ impl Bundle {
         }
         if !common {
             bundle.spread = 1.001
-                * span(simd, vectors, |v| {
-                    let [x, y, z] = rows(simd, &bundle.offset, v);
-                    x.abs() + y.abs() + z.abs()
-                })
+                * span(
+                    simd,
+                    vectors,
+                    #[inline(always)]
+                    |v| {
+                        let [x, y, z] = rows(simd, &bundle.offset, v);
+                        x.abs() + y.abs() + z.abs()
+                    },
+                )
                 .1;
             for v in 0..vectors {
                 let d = rows(simd, &bundle.direction, v);
@@ -202,8 +212,14 @@ impl Bundle {
     /// Finds the sides; whether the rays are a narrow cone.
     #[inline(always)]
     fn surround<S: Simd>(&mut self, simd: S, vectors: usize, reach: f32) -> bool {
-        let direction = |v: usize| rows(simd, &self.direction, v);
-        let offset = |v: usize| rows(simd, &self.offset, v);
+        let direction = inlined(
+            #[inline(always)]
+            |v: usize| rows(simd, &self.direction, v),
+        );
+        let offset = inlined(
+            #[inline(always)]
+            |v: usize| rows(simd, &self.offset, v),
+        );
         let mut sum = [f32x16::splat(simd, 0.0); 3];
         for v in 0..vectors {
             let d = direction(v);
@@ -213,15 +229,27 @@ impl Bundle {
         }
         let sum = [sum[0].reduce_sum(), sum[1].reduce_sum(), sum[2].reduce_sum()];
         let Some(forward) = unit(sum) else { return false };
-        if !(span(simd, vectors, |v| along(&direction(v), forward)).0 > NARROW) {
+        if !(span(
+            simd,
+            vectors,
+            #[inline(always)]
+            |v| along(&direction(v), forward),
+        )
+        .0 > NARROW)
+        {
             return false;
         }
         // The ray farthest from the middle shows how the bundle lies.
         let (mut farthest, mut most) = ([0.0; 3], -1.0);
         for v in 0..vectors {
             let d = direction(v);
-            let off = [0, 1, 2].map(|k| d[k] - f32x16::splat(simd, forward[k]));
-            let square = off[2].mul_add(off[2], off[1].mul_add(off[1], off[0] * off[0]));
+            let middle = [
+                f32x16::splat(simd, forward[0]),
+                f32x16::splat(simd, forward[1]),
+                f32x16::splat(simd, forward[2]),
+            ];
+            let off = lanes::less(&d, &middle);
+            let square = lanes::dot(&off, &off);
             let greatest = square.reduce_max();
             if greatest > most {
                 let lane = square
@@ -232,7 +260,10 @@ impl Bundle {
                 farthest = std::array::from_fn(|k| self.direction[k].0[v][lane.min(LANES - 1)] - forward[k]);
             }
         }
-        let across = |a: [f32; 3]| unit(std::array::from_fn(|k| a[k] - forward[k] * dot(a, forward)));
+        let across = inlined(
+            #[inline(always)]
+            |a: [f32; 3]| unit(std::array::from_fn(|k| a[k] - forward[k] * dot(a, forward))),
+        );
         let any = if forward[0].abs() < 0.6 {
             [1.0, 0.0, 0.0]
         } else {
@@ -245,58 +276,102 @@ impl Bundle {
         let narrow = cross(forward, wide);
         // Products of points and normals, and the reference, are rounded.
         let slack = 16.0 * ROUNDING * (reach + self.reference_reach + self.spread);
-        let side = |normal: [f32; 3]| {
-            let rest = if self.common {
-                // The rounding of the start.
-                2.0 * ROUNDING * self.reference_reach
-            } else {
-                span(simd, vectors, |v| along(&offset(v), normal)).1
-            };
-            let size = normal.iter().map(|n| n.abs()).sum::<f32>();
-            Side::new(normal, dot(normal, self.reference) + rest + slack * size)
-        };
-        let slopes = |to: [f32; 3]| {
-            let Span(low, high) = span(simd, vectors, |v| {
-                let d = direction(v);
-                along(&d, to) / along(&d, forward)
-            });
-            Span(low - SLOPE_SLACK, high + SLOPE_SLACK)
-        };
-        let pyramid = [wide, narrow].map(|to| {
-            let Span(low, high) = slopes(to);
-            [
-                side(std::array::from_fn(|k| to[k] - high * forward[k])),
-                side(std::array::from_fn(|k| low * forward[k] - to[k])),
-            ]
-        });
-        let projected = [(1, 2), (2, 0), (0, 1)].map(|(a, b)| {
-            // The slope of the lesser over the greater.
-            let (i, j) = if forward[a].abs() >= forward[b].abs() {
-                (a, b)
-            } else {
-                (b, a)
-            };
-            let ahead = span(simd, vectors, |v| direction(v)[i]);
-            if !(ahead.0 > 0.05 || ahead.1 < -0.05) {
-                // Along the axis left out: nothing is out.
-                return [Side::new([0.0; 3], f32::INFINITY); 2];
-            }
-            let Span(low, high) = span(simd, vectors, |v| {
-                let d = direction(v);
-                d[j] / d[i]
-            });
-            let pad = |s: f32| SLOPE_SLACK * (1.0 + s.abs());
-            let (low, high) = (low - pad(low), high + pad(high));
-            let (above, below) = if ahead.0 > 0.0 { (high, low) } else { (low, high) };
-            let normal = |slope: f32, sign: f32| {
-                let mut normal = [0.0; 3];
-                (normal[j], normal[i]) = (sign, -sign * slope);
-                normal
-            };
-            [side(normal(above, 1.0)), side(normal(below, -1.0))]
-        });
+        let side = inlined(
+            #[inline(always)]
+            |normal: [f32; 3]| {
+                let rest = if self.common {
+                    // The rounding of the start.
+                    2.0 * ROUNDING * self.reference_reach
+                } else {
+                    span(
+                        simd,
+                        vectors,
+                        #[inline(always)]
+                        |v| along(&offset(v), normal),
+                    )
+                    .1
+                };
+                let size = normal.iter().map(|n| n.abs()).sum::<f32>();
+                Side::new(normal, dot(normal, self.reference) + rest + slack * size)
+            },
+        );
+        let slopes = inlined(
+            #[inline(always)]
+            |to: [f32; 3]| {
+                let Span(low, high) = span(
+                    simd,
+                    vectors,
+                    #[inline(always)]
+                    |v| {
+                        let d = direction(v);
+                        along(&d, to) / along(&d, forward)
+                    },
+                );
+                Span(low - SLOPE_SLACK, high + SLOPE_SLACK)
+            },
+        );
+        let pair = inlined(
+            #[inline(always)]
+            |to: [f32; 3]| {
+                let Span(low, high) = slopes(to);
+                [
+                    side(std::array::from_fn(|k| to[k] - high * forward[k])),
+                    side(std::array::from_fn(|k| low * forward[k] - to[k])),
+                ]
+            },
+        );
+        let pyramid = [pair(wide), pair(narrow)];
+        let project = inlined(
+            #[inline(always)]
+            |a: usize, b: usize| {
+                // The slope of the lesser over the greater.
+                let (i, j) = if forward[a].abs() >= forward[b].abs() {
+                    (a, b)
+                } else {
+                    (b, a)
+                };
+                let ahead = span(
+                    simd,
+                    vectors,
+                    #[inline(always)]
+                    |v| direction(v)[i],
+                );
+                if !(ahead.0 > 0.05 || ahead.1 < -0.05) {
+                    // Along the axis left out: nothing is out.
+                    return [Side::new([0.0; 3], f32::INFINITY); 2];
+                }
+                let Span(low, high) = span(
+                    simd,
+                    vectors,
+                    #[inline(always)]
+                    |v| {
+                        let d = direction(v);
+                        d[j] / d[i]
+                    },
+                );
+                let pad = inlined(
+                    #[inline(always)]
+                    |s: f32| SLOPE_SLACK * (1.0 + s.abs()),
+                );
+                let (low, high) = (low - pad(low), high + pad(high));
+                let (above, below) = if ahead.0 > 0.0 { (high, low) } else { (low, high) };
+                let normal = inlined(
+                    #[inline(always)]
+                    |slope: f32, sign: f32| {
+                        let mut normal = [0.0; 3];
+                        (normal[j], normal[i]) = (sign, -sign * slope);
+                        normal
+                    },
+                );
+                [side(normal(above, 1.0)), side(normal(below, -1.0))]
+            },
+        );
+        let projected = [project(1, 2), project(2, 0), project(0, 1)];
         // The depth before the reference is not beyond the way along a ray.
-        let start = |normal: [f32; 3]| side(normal).edge;
+        let start = inlined(
+            #[inline(always)]
+            |normal: [f32; 3]| side(normal).edge,
+        );
         let near = Side::new(forward, start(forward));
         let backward = forward.map(|f| -f);
         let far = Side::new(backward, start(backward));
@@ -316,17 +391,35 @@ impl Bundle {
         bounds: &[[[f32; WIDTH]; 2]; 3],
         limit: f32,
     ) -> (u32, f32x8<S>) {
-        let splat = |x: f32| f32x8::splat(simd, x);
-        let corner = |side: &Side, axis: usize| f32x8::simd_from(simd, bounds[axis][side.inner[axis] & 1]);
-        let term = |side: &Side, axis: usize| corner(side, axis) * splat(side.normal[axis]);
-        let all = |side: &Side| {
-            let xy = corner(side, 1).mul_add(splat(side.normal[1]), term(side, 0));
-            corner(side, 2).mul_add(splat(side.normal[2]), xy - splat(side.edge))
-        };
-        let two = |side: &Side, a: usize, b: usize| {
-            corner(side, a).mul_add(splat(side.normal[a]), term(side, b) - splat(side.edge))
-        };
-        let out = |x: f32x8<S>, y: f32x8<S>| x.max(y);
+        let splat = inlined(
+            #[inline(always)]
+            |x: f32| f32x8::splat(simd, x),
+        );
+        let corner = inlined(
+            #[inline(always)]
+            |side: &Side, axis: usize| f32x8::simd_from(simd, bounds[axis][side.inner[axis] & 1]),
+        );
+        let term = inlined(
+            #[inline(always)]
+            |side: &Side, axis: usize| corner(side, axis) * splat(side.normal[axis]),
+        );
+        let all = inlined(
+            #[inline(always)]
+            |side: &Side| {
+                let xy = corner(side, 1).mul_add(splat(side.normal[1]), term(side, 0));
+                corner(side, 2).mul_add(splat(side.normal[2]), xy - splat(side.edge))
+            },
+        );
+        let two = inlined(
+            #[inline(always)]
+            |side: &Side, a: usize, b: usize| {
+                corner(side, a).mul_add(splat(side.normal[a]), term(side, b) - splat(side.edge))
+            },
+        );
+        let out = inlined(
+            #[inline(always)]
+            |x: f32x8<S>, y: f32x8<S>| x.max(y),
+        );
         let [x, y, z] = &self.projected;
         let a = out(two(&x[0], 1, 2), two(&x[1], 1, 2));
         let b = out(two(&y[0], 2, 0), two(&y[1], 2, 0));
@@ -344,12 +437,22 @@ impl Bundle {
     /// Which of eight triangles some ray may meet.
     #[inline(always)]
     pub(super) fn triangles<S: Simd>(&self, simd: S, corners: &[[f32x8<S>; 3]; 3]) -> u32 {
-        let splat = |x: f32| f32x8::splat(simd, x);
+        let splat = inlined(
+            #[inline(always)]
+            |x: f32| f32x8::splat(simd, x),
+        );
         let mut outside = splat(f32::NEG_INFINITY);
         for side in self.sides.iter().chain([&self.far]) {
-            let [n0, n1, n2] = side.normal.map(splat);
-            let [a, b, c] = [&corners[0], &corners[1], &corners[2]]
-                .map(|p| p[2].mul_add(n2, p[1].mul_add(n1, p[0] * n0)));
+            let normal = [
+                splat(side.normal[0]),
+                splat(side.normal[1]),
+                splat(side.normal[2]),
+            ];
+            let (a, b, c) = (
+                lanes::dot(&corners[0], &normal),
+                lanes::dot(&corners[1], &normal),
+                lanes::dot(&corners[2], &normal),
+            );
             outside = outside.max(a.min(b).min(c) - splat(side.edge));
         }
         // Eight lanes.

@@ -8,8 +8,14 @@
 //! changed is found from the exact products (fused multiply-add).
 
 use super::FARTHEST;
+use super::lanes::inlined;
 use crate::footprint::Ray;
+use fearless_simd::f64x8;
+use fearless_simd::{Simd, prelude::*};
 use nalgebra::{Point3, Vector3};
+
+/// Rays that are treated at once.
+pub(super) const LANES: usize = 8;
 
 /// Decides in f64 which triangles of a mesh the rays of a bundle meet.
 pub(super) struct Judge<'a> {
@@ -29,16 +35,108 @@ pub(super) struct Sheared<'a> {
 impl Judge<'_> {
     /// Distance at which a ray meets a triangle.
     pub(super) fn meet(&self, ray: usize, triangle: u32) -> Option<f64> {
-        let corners = self.triangles[triangle as usize].map(|v| self.vertices[v as usize]);
+        let [a, b, c] = self.triangles[triangle as usize];
+        let corners = [a, b, c].map(|v| self.vertices[v as usize]);
         Sheared::new(&self.rays[ray]).meet(&corners)
+    }
+
+    /// The same for eight rays from `first` on, each with a triangle of its own; to the bit what [`Judge::meet`] gives.
+    ///
+    /// Rays beyond the last one and rays with the triangle `none` have no distance.
+    #[inline(always)]
+    pub(super) fn meet_each<S: Simd>(
+        &self,
+        simd: S,
+        first: usize,
+        triangles: &[u32; LANES],
+        none: u32,
+    ) -> [Option<f64>; LANES] {
+        // By coordinate along the ray's axes: direction, and the corners seen from its origin.
+        let mut direction = [[1.0; LANES]; 3];
+        let mut corners = [[[0.0; LANES]; 3]; 3];
+        let mut wanted = 0_u64;
+        for (lane, &triangle) in triangles.iter().enumerate() {
+            let Some(ray) = self.rays.get(first + lane) else {
+                break;
+            };
+            if triangle == none {
+                continue;
+            }
+            wanted |= 1 << lane;
+            let axes = axes(ray);
+            for k in 0..3 {
+                direction[k][lane] = ray.direction[axes[k]];
+            }
+            for (corner, &vertex) in self.triangles[triangle as usize].iter().enumerate() {
+                let vertex = &self.vertices[vertex as usize];
+                for k in 0..3 {
+                    corners[corner][k][lane] = vertex[axes[k]] - ray.origin[axes[k]];
+                }
+            }
+        }
+        let load = inlined(
+            #[inline(always)]
+            |of: &[f64; LANES]| f64x8::simd_from(simd, *of),
+        );
+        let dz = load(&direction[2]);
+        let shear = [
+            load(&direction[0]) / dz,
+            load(&direction[1]) / dz,
+            f64x8::splat(simd, 1.0) / dz,
+        ];
+        let sheared = inlined(
+            #[inline(always)]
+            |corner: &[[f64; LANES]; 3]| {
+                let z = load(&corner[2]);
+                (
+                    load(&corner[0]) - shear[0] * z,
+                    load(&corner[1]) - shear[1] * z,
+                    shear[2] * z,
+                )
+            },
+        );
+        let [a, b, c] = [sheared(&corners[0]), sheared(&corners[1]), sheared(&corners[2])];
+        let zero = f64x8::splat(simd, 0.0);
+        // An edge function and whether its sign is beyond doubt, as in [`edge`].
+        let edge = inlined(
+            #[inline(always)]
+            |p: &(f64x8<S>, f64x8<S>, f64x8<S>), q: &(f64x8<S>, f64x8<S>, f64x8<S>)| {
+                let (left, right) = (p.0 * q.1, p.1 * q.0);
+                let value = left - right;
+                let sure = value
+                    .abs()
+                    .simd_gt((left.abs() + right.abs()) * f64x8::splat(simd, 2.0 * f64::EPSILON));
+                (value, sure)
+            },
+        );
+        let ((u, su), (v, sv), (w, sw)) = (edge(&c, &b), edge(&a, &c), edge(&b, &a));
+        let sum = u + v + w;
+        let distance = (u * a.2 + v * b.2 + w * c.2) / sum;
+        let front = u.simd_gt(zero) & v.simd_gt(zero) & w.simd_gt(zero);
+        let back = u.simd_lt(zero) & v.simd_lt(zero) & w.simd_lt(zero);
+        let within = distance.simd_gt(zero) & distance.simd_lt(f64x8::splat(simd, FARTHEST));
+        let met = (su & sv & sw & (front | back) & within).to_bitmask();
+        let mut distances = [0.0; LANES];
+        distance.store_slice(&mut distances);
+        let mut all = [None; LANES];
+        for lane in 0..LANES {
+            if wanted >> lane & 1 == 0 {
+                continue;
+            }
+            all[lane] = if met >> lane & 1 == 1 {
+                Some(distances[lane])
+            } else {
+                self.meet(first + lane, triangles[lane])
+            };
+        }
+        all
     }
 }
 
 impl<'a> Sheared<'a> {
     pub(super) fn new(ray: &'a Ray) -> Self {
         let d = ray.direction.into_inner();
-        let z = d.iamax();
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
+        let [x, y, z] = axes(ray);
         Self {
             ray,
             axes: [x, y, z],
@@ -67,6 +165,20 @@ impl<'a> Sheared<'a> {
         }
         let distance = (u * a.z + v * b.z + w * c.z) / sum;
         (distance > 0.0 && distance < FARTHEST).then_some(distance)
+    }
+}
+
+/// The axis along which a ray goes farthest, after the two others.
+#[inline(always)]
+fn axes(ray: &Ray) -> [usize; 3] {
+    let d = &ray.direction;
+    let (x, y, z) = (d.x.abs(), d.y.abs(), d.z.abs());
+    if x >= y && x >= z {
+        [1, 2, 0]
+    } else if y >= z {
+        [2, 0, 1]
+    } else {
+        [0, 1, 2]
     }
 }
 

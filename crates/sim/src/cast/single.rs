@@ -6,6 +6,7 @@ use super::FARTHEST;
 use super::build::{downwards, rounded, upwards};
 use super::bundle::around;
 use super::exact::Judge;
+use super::lanes::{cross, dot, inlined, less, size};
 use super::triangles::Met;
 use super::wide::{Child, Leaf, Node, ROUNDING, STACK, WIDTH, Wide};
 use crate::footprint::Ray;
@@ -78,10 +79,22 @@ impl Line {
     /// Which of eight boxes the ray meets before `limit`, and where.
     #[inline(always)]
     fn boxes<S: Simd>(&self, simd: S, node: &Node, limit: f32) -> (u32, f32x8<S>) {
-        let splat = |x: f32| f32x8::splat(simd, x);
-        let side = |k: usize, far: usize| f32x8::simd_from(simd, node.bounds[k][(self.entry[k] ^ far) & 1]);
-        let enter = |k: usize| (side(k, 0) - splat(self.early[k])) * splat(self.inverse[k]);
-        let leave = |k: usize| (side(k, 1) - splat(self.late[k])) * splat(self.inverse[k]);
+        let splat = inlined(
+            #[inline(always)]
+            |x: f32| f32x8::splat(simd, x),
+        );
+        let side = inlined(
+            #[inline(always)]
+            |k: usize, far: usize| f32x8::simd_from(simd, node.bounds[k][(self.entry[k] ^ far) & 1]),
+        );
+        let enter = inlined(
+            #[inline(always)]
+            |k: usize| (side(k, 0) - splat(self.early[k])) * splat(self.inverse[k]),
+        );
+        let leave = inlined(
+            #[inline(always)]
+            |k: usize| (side(k, 1) - splat(self.late[k])) * splat(self.inverse[k]),
+        );
         let near = enter(0).max(enter(1)).max(enter(2)).max(splat(0.0)) * splat(1.0 - 8.0 * ROUNDING);
         let far = leave(0).min(leave(1)).min(leave(2)) * splat(1.0 + 8.0 * ROUNDING);
         let met = near.simd_le(far.min(splat(limit)));
@@ -92,28 +105,36 @@ impl Line {
 
     #[inline(always)]
     fn triangles<S: Simd>(&self, simd: S, leaf: &Leaf, limit: f32) -> Outcome {
-        let splat = |x: f32| f32x8::splat(simd, x);
-        let seen = |corner: usize| {
-            [0, 1, 2].map(|k| f32x8::simd_from(simd, leaf.corners[corner][k]) - splat(self.start[k]))
-        };
-        let less = |a: &[f32x8<S>; 3], b: &[f32x8<S>; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-        let cross = |a: &[f32x8<S>; 3], b: &[f32x8<S>; 3]| {
-            [
-                a[1].mul_sub(b[2], a[2] * b[1]),
-                a[2].mul_sub(b[0], a[0] * b[2]),
-                a[0].mul_sub(b[1], a[1] * b[0]),
-            ]
-        };
-        let dot = |a: &[f32x8<S>; 3], b: &[f32x8<S>; 3]| a[2].mul_add(b[2], a[1].mul_add(b[1], a[0] * b[0]));
-        let size = |a: &[f32x8<S>; 3]| a[0].abs() + a[1].abs() + a[2].abs();
+        let splat = inlined(
+            #[inline(always)]
+            |x: f32| f32x8::splat(simd, x),
+        );
+        let seen = inlined(
+            #[inline(always)]
+            |corner: usize| {
+                [
+                    f32x8::simd_from(simd, leaf.corners[corner][0]) - splat(self.start[0]),
+                    f32x8::simd_from(simd, leaf.corners[corner][1]) - splat(self.start[1]),
+                    f32x8::simd_from(simd, leaf.corners[corner][2]) - splat(self.start[2]),
+                ]
+            },
+        );
         let [a, b, c] = [seen(0), seen(1), seen(2)];
-        let d = self.direction.map(splat);
-        // d·(B×C) = C·(d×B): a corner's product serves two edges.
-        let [da, db, dc] = [cross(&d, &a), cross(&d, &b), cross(&d, &c)];
-        let (u, v, w) = (dot(&c, &db), dot(&a, &dc), dot(&b, &da));
+        let d = [
+            splat(self.direction[0]),
+            splat(self.direction[1]),
+            splat(self.direction[2]),
+        ];
+        let (bc, ca, ab) = (less(&b, &c), less(&c, &a), less(&a, &b));
+        let (u, v, w) = (
+            dot(&d, &cross(&bc, &b)),
+            dot(&d, &cross(&ca, &c)),
+            dot(&d, &cross(&ab, &a)),
+        );
+        let long = size(&bc).max(size(&ca)).max(size(&ab));
         let far = size(&a).max(size(&b)).max(size(&c));
         let eta = splat(self.eta);
-        let error = far.mul_add(splat(20.0 * ROUNDING), eta * 4.0) * far;
+        let error = far.mul_add(splat(20.0 * ROUNDING), eta * 4.0) * eta.mul_add(splat(4.0), long);
         let (least, most) = (u.min(v).min(w), u.max(v).max(w));
         let may = least.simd_ge(-error) | most.simd_le(error);
         let mut outcome = Outcome {
@@ -126,9 +147,7 @@ impl Line {
             return outcome;
         }
         let inside = least.simd_gt(error) | most.simd_lt(-error);
-        let (bc, ca, ab) = (less(&b, &c), less(&c, &a), less(&a, &b));
         let normal = cross(&ca, &ab);
-        let long = size(&bc).max(size(&ca)).max(size(&ab));
         let cube = long * long * long;
         let error = far.mul_add(splat(16.0 * ROUNDING), eta * 4.0);
         let error = error.mul_add(size(&normal), cube * splat(16.0 * ROUNDING)) * 2.0;

@@ -98,8 +98,7 @@ impl Triangles {
             dispatch!(level, simd => match Bundle::new(simd, rays, self.wide.reach) {
                 Some(bundle) => {
                     let found = beam::follow(simd, &self.wide, &bundle, &judge);
-                    let tell = |ray: usize, triangle, distance| met[ray] = Some(Met { triangle, distance });
-                    found.finish(&judge, tell, rays.len());
+                    found.finish(simd, &judge, met);
                 }
                 None => for (ray, met) in rays.iter().zip(met.iter_mut()) {
                     *met = single::follow(simd, &self.wide, ray, &self.judge(std::slice::from_ref(ray)));
