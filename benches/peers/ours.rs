@@ -30,20 +30,21 @@ fn resident_mb() -> f64 {
 }
 
 /// Casts a block of rays.
-type Caster<'a> = Box<dyn Fn(&[Ray], &mut [Option<Met>]) + Sync + 'a>;
+type Caster<'a> = Box<dyn Fn(&[Ray], &mut [f64]) + Sync + 'a>;
 
 /// Seconds for all rays once, in blocks that threads take as they come.
-fn pass(cast: &Caster<'_>, rays: &[Ray], met: &mut [Option<Met>], threads: usize) -> f64 {
+fn pass(cast: &Caster<'_>, rays: &[Ray], ways: &mut [f64], threads: usize) -> f64 {
     const BLOCK: usize = 4096;
     let next = AtomicUsize::new(0);
-    let blocks: Vec<_> = met.chunks_mut(BLOCK).map(std::sync::Mutex::new).collect();
+    let blocks: Vec<_> = ways.chunks_mut(BLOCK).map(std::sync::Mutex::new).collect();
     let start = Instant::now();
     let work = || {
-        while let Some(block) = blocks.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let mut met = block.lock().unwrap();
-            let first = BLOCK * blocks.iter().position(|b| std::ptr::eq(b, block)).unwrap();
-            let count = met.len();
-            cast(&rays[first..first + count], &mut met);
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            let Some(block) = blocks.get(number) else { break };
+            let mut ways = block.lock().unwrap();
+            let first = BLOCK * number;
+            cast(&rays[first..first + ways.len()], &mut ways);
         }
     };
     std::thread::scope(|scope| {
@@ -87,10 +88,11 @@ fn main() {
     let build = start.elapsed().as_secs_f64();
     let memory = resident_mb() - before;
     let parry;
+    let way = |met: Option<Met>| met.map_or(f64::INFINITY, |m| m.distance);
     let cast: Caster<'_> = match engine.as_str() {
-        "single" => Box::new(|rays, met| {
-            for (ray, met) in rays.iter().zip(met) {
-                *met = placed.nearest(ray);
+        "single" => Box::new(|rays, ways| {
+            for (ray, place) in rays.iter().zip(ways) {
+                *place = way(placed.nearest(ray));
             }
         }),
         "parry" => {
@@ -99,49 +101,40 @@ fn main() {
                 .map(|p| parry3d::math::Vector::new(p.x, p.y, p.z))
                 .collect();
             parry = parry3d::shape::TriMesh::new(points, triangles).unwrap();
-            Box::new(|rays, met| {
+            Box::new(|rays, ways| {
                 use parry3d::query::RayCast;
                 let vector = |v: &Vector3<f64>| parry3d::math::Vector::new(v.x, v.y, v.z);
-                for (ray, met) in rays.iter().zip(met) {
+                for (ray, way) in rays.iter().zip(ways) {
                     let ray = parry3d::query::Ray::new(vector(&ray.origin.coords), vector(&ray.direction));
-                    let way = parry.cast_local_ray(&ray, 1e4, false);
-                    *met = way.map(|distance| Met {
-                        triangle: 0,
-                        distance,
-                    });
+                    *way = parry.cast_local_ray(&ray, 1e4, false).unwrap_or(f64::INFINITY);
                 }
             })
         }
         beam => {
-            let count: usize = beam
-                .strip_prefix("beam")
-                .and_then(|n| n.parse().ok())
-                .unwrap_or(64);
-            Box::new(move |rays, met| {
-                for (rays, met) in rays.chunks(count).zip(met.chunks_mut(count)) {
-                    placed_beam(&placed, rays, met);
+            let count: usize = beam.strip_prefix("beam").and_then(|n| n.parse().ok()).unwrap();
+            let placed = &placed;
+            Box::new(move |rays, ways| {
+                let mut met = vec![None; count];
+                for (rays, ways) in rays.chunks(count).zip(ways.chunks_mut(count)) {
+                    placed.nearest_of_beam(rays, &mut met[..rays.len()]);
+                    for (place, met) in ways.iter_mut().zip(&met) {
+                        *place = way(*met);
+                    }
                 }
             })
         }
     };
-    let mut met = vec![None; rays.len()];
-    let mut times = vec![pass(&cast, &rays, &mut met, threads)];
+    let mut ways = vec![f64::INFINITY; rays.len()];
+    let mut times = vec![pass(&cast, &rays, &mut ways, threads)];
     while times.iter().sum::<f64>() < seconds {
-        times.push(pass(&cast, &rays, &mut met, threads));
+        times.push(pass(&cast, &rays, &mut ways, threads));
     }
     times.sort_by(f64::total_cmp);
     let rate = rays.len() as f64 / times[times.len() / 2] / 1e6;
-    let bytes: Vec<u8> = met
-        .iter()
-        .flat_map(|m| m.map_or(f64::INFINITY, |m| m.distance).to_le_bytes())
-        .collect();
+    let bytes: Vec<u8> = ways.iter().flat_map(|way| way.to_le_bytes()).collect();
     fs::write(format!("{folder}/{engine}.{mesh}.{set}.f64"), bytes).unwrap();
     println!(
         "{{\"mrays\": {rate:.3}, \"best\": {:.3}, \"build_s\": {build:.4}, \"memory_mb\": {memory:.1}}}",
         rays.len() as f64 / times[0] / 1e6
     );
-}
-
-fn placed_beam(placed: &Triangles, rays: &[Ray], met: &mut [Option<Met>]) {
-    placed.nearest_of_beam(rays, met);
 }

@@ -8,7 +8,7 @@
 //! changed is found from the exact products (fused multiply-add).
 
 use super::FARTHEST;
-use super::lanes::inlined;
+use super::lanes::{inlined, less};
 use crate::footprint::Ray;
 use fearless_simd::f64x8;
 use fearless_simd::{Simd, prelude::*};
@@ -51,51 +51,86 @@ impl Judge<'_> {
         triangles: &[u32; LANES],
         none: u32,
     ) -> [Option<f64>; LANES] {
-        // By coordinate along the ray's axes: direction, and the corners seen from its origin.
         let mut direction = [[1.0; LANES]; 3];
-        let mut corners = [[[0.0; LANES]; 3]; 3];
+        let mut origin = [[0.0; LANES]; 3];
         let mut wanted = 0_u64;
-        for (lane, &triangle) in triangles.iter().enumerate() {
-            let Some(ray) = self.rays.get(first + lane) else {
-                break;
-            };
-            if triangle == none {
-                continue;
-            }
-            wanted |= 1 << lane;
-            let axes = axes(ray);
+        let mut one = none;
+        let mut alike = true;
+        for (lane, ray) in self.rays[first..].iter().take(LANES).enumerate() {
             for k in 0..3 {
-                direction[k][lane] = ray.direction[axes[k]];
+                direction[k][lane] = ray.direction[k];
+                origin[k][lane] = ray.origin[k];
             }
-            for (corner, &vertex) in self.triangles[triangle as usize].iter().enumerate() {
-                let vertex = &self.vertices[vertex as usize];
-                for k in 0..3 {
-                    corners[corner][k][lane] = vertex[axes[k]] - ray.origin[axes[k]];
-                }
+            let triangle = triangles[lane];
+            if triangle != none {
+                wanted |= 1 << lane;
+                alike &= one == none || one == triangle;
+                one = triangle;
             }
+        }
+        if wanted == 0 {
+            return [None; LANES];
         }
         let load = inlined(
             #[inline(always)]
-            |of: &[f64; LANES]| f64x8::simd_from(simd, *of),
-        );
-        let dz = load(&direction[2]);
-        let shear = [
-            load(&direction[0]) / dz,
-            load(&direction[1]) / dz,
-            f64x8::splat(simd, 1.0) / dz,
-        ];
-        let sheared = inlined(
-            #[inline(always)]
-            |corner: &[[f64; LANES]; 3]| {
-                let z = load(&corner[2]);
-                (
-                    load(&corner[0]) - shear[0] * z,
-                    load(&corner[1]) - shear[1] * z,
-                    shear[2] * z,
-                )
+            |of: &[[f64; LANES]; 3]| {
+                [
+                    f64x8::simd_from(simd, of[0]),
+                    f64x8::simd_from(simd, of[1]),
+                    f64x8::simd_from(simd, of[2]),
+                ]
             },
         );
-        let [a, b, c] = [sheared(&corners[0]), sheared(&corners[1]), sheared(&corners[2])];
+        let direction = load(&direction);
+        let origin = load(&origin);
+        // As in [`axes`].
+        let [x, y, z] = [direction[0].abs(), direction[1].abs(), direction[2].abs()];
+        let (along_x, over_z) = (x.simd_ge(y) & x.simd_ge(z), y.simd_ge(z));
+        let turned = inlined(
+            #[inline(always)]
+            |[x, y, z]: [f64x8<S>; 3]| {
+                let (if_y, if_z) = ([z, x, y], [x, y, z]);
+                let if_x = [y, z, x];
+                [
+                    along_x.select(if_x[0], over_z.select(if_y[0], if_z[0])),
+                    along_x.select(if_x[1], over_z.select(if_y[1], if_z[1])),
+                    along_x.select(if_x[2], over_z.select(if_y[2], if_z[2])),
+                ]
+            },
+        );
+        let corner = inlined(
+            #[inline(always)]
+            |corner: usize| {
+                let seen = if alike {
+                    let vertex = &self.vertices[self.triangles[one as usize][corner] as usize];
+                    [
+                        f64x8::splat(simd, vertex.x),
+                        f64x8::splat(simd, vertex.y),
+                        f64x8::splat(simd, vertex.z),
+                    ]
+                } else {
+                    let mut corners = [[0.0; LANES]; 3];
+                    for lane in 0..LANES {
+                        if wanted >> lane & 1 == 1 {
+                            let vertex =
+                                &self.vertices[self.triangles[triangles[lane] as usize][corner] as usize];
+                            for k in 0..3 {
+                                corners[k][lane] = vertex[k];
+                            }
+                        }
+                    }
+                    load(&corners)
+                };
+                turned(less(&seen, &origin))
+            },
+        );
+        let [dx, dy, dz] = turned(direction);
+        let shear = [dx / dz, dy / dz, f64x8::splat(simd, 1.0) / dz];
+        let sheared = inlined(
+            #[inline(always)]
+            |[x, y, z]: [f64x8<S>; 3]| (x - shear[0] * z, y - shear[1] * z, shear[2] * z),
+        );
+        let (a, b, c) = (sheared(corner(0)), sheared(corner(1)), sheared(corner(2)));
         let zero = f64x8::splat(simd, 0.0);
         // An edge function and whether its sign is beyond doubt, as in [`edge`].
         let edge = inlined(
