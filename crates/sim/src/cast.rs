@@ -5,6 +5,8 @@
 //! never by an epsilon.
 
 mod beam;
+#[cfg(test)]
+mod beam_tests;
 mod build;
 mod bundle;
 mod cylinder;
@@ -12,6 +14,7 @@ mod exact;
 mod lanes;
 mod single;
 mod skin;
+mod sweep;
 mod triangles;
 mod wide;
 
@@ -21,7 +24,10 @@ pub use triangles::{Met, Triangles};
 
 use crate::footprint::Ray;
 use crate::layout::area_vector;
+use bundle::Bundle;
 use catoptric_model::Pose;
+use fearless_simd::{Level, Simd, dispatch};
+use lanes::inlined;
 use nalgebra::{Point3, Unit, Vector3};
 use parry3d::bounding_volume::Aabb;
 use parry3d::math::Vector;
@@ -82,6 +88,9 @@ pub struct Hit {
 pub struct World {
     shapes: Vec<Shape>,
     bvh: Bvh,
+    /// The same boxes for beams.
+    nodes: Vec<wide::Node>,
+    reach: f32,
 }
 
 /// Farthest distance at which anything is looked for, in metres: beyond any scanner's range.
@@ -212,9 +221,17 @@ impl World {
     /// Indexes the shapes; a hit names a shape by its place in this list.
     pub fn new(shapes: Vec<Shape>) -> Self {
         let boxes: Vec<Aabb> = shapes.iter().map(Shape::bounds).collect();
+        let corner = |v: Vector| Vector3::new(v.x, v.y, v.z);
+        let corners: Vec<_> = boxes.iter().map(|b| (corner(b.mins), corner(b.maxs))).collect();
+        let reach = corners
+            .iter()
+            .fold(0.0, |m: f64, (a, b)| m.max(a.amax()).max(b.amax()));
+        let reach = build::upwards(reach);
         Self {
             bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes),
             shapes,
+            nodes: build::over_boxes(&corners, reach),
+            reach,
         }
     }
 
@@ -230,13 +247,110 @@ impl World {
         })?;
         let surface = surface as usize;
         let (_, normal) = self.shapes[surface].cast(ray)?;
-        Some(Hit {
+        Some(Hit::new(surface, distance, normal, ray))
+    }
+
+    /// The nearest surface along each of some rays, `left` aside: what [`World::cast`] says of each of them, and faster
+    /// if they are a narrow cone from nearly one point. Of surfaces at the very same distance the first counts.
+    ///
+    /// # Panics
+    /// If there are not as many places for the hits.
+    pub fn cast_beam(&self, rays: &[Ray], left: Option<usize>, hits: &mut [Option<Hit>]) {
+        self.cast_beam_at(Level::new(), rays, left, hits);
+    }
+
+    fn cast_beam_at(&self, level: Level, rays: &[Ray], left: Option<usize>, hits: &mut [Option<Hit>]) {
+        assert_eq!(rays.len(), hits.len(), "every ray has its place");
+        for (rays, hits) in rays.chunks(bundle::MOST).zip(hits.chunks_mut(bundle::MOST)) {
+            dispatch!(level, simd => match Bundle::new(simd, rays, self.reach) {
+                Some(bundle) => self.sweep(simd, &bundle, rays, left, hits),
+                None => for (ray, hit) in rays.iter().zip(hits.iter_mut()) {
+                    *hit = self.cast(ray, left);
+                },
+            });
+        }
+    }
+
+    #[inline(always)]
+    fn sweep<S: Simd>(
+        &self,
+        simd: S,
+        bundle: &Bundle,
+        rays: &[Ray],
+        left: Option<usize>,
+        hits: &mut [Option<Hit>],
+    ) {
+        let mut nearest = [(f64::INFINITY, usize::MAX); bundle::MOST];
+        let mut normals = [Vector3::x_axis(); bundle::MOST];
+        let mut met = [None; bundle::MOST];
+        let nearest_of = inlined(
+            #[inline(always)]
+            |surface: usize, limit: &mut f32| {
+                if left == Some(surface) {
+                    return;
+                }
+                let mut changed = false;
+                let mut take = inlined(
+                    #[inline(always)]
+                    |ray: usize, distance: f64, normal: Unit<Vector3<f64>>| {
+                        if (distance, surface) < nearest[ray] {
+                            nearest[ray] = (distance, surface);
+                            normals[ray] = normal;
+                            changed = true;
+                        }
+                    },
+                );
+                match &self.shapes[surface] {
+                    Shape::Polygon(polygon) => {
+                        for first in (0..rays.len()).step_by(exact::LANES) {
+                            let distances = sweep::polygon(simd, polygon, &rays[first..]);
+                            let count = exact::LANES.min(rays.len() - first);
+                            for (lane, distance) in distances[..count].iter().enumerate() {
+                                if *distance < f64::INFINITY {
+                                    take(first + lane, *distance, polygon.normal);
+                                }
+                            }
+                        }
+                    }
+                    Shape::Mesh(mesh) => {
+                        mesh.nearest_of_beam(rays, &mut met[..rays.len()]);
+                        for (i, ray) in rays.iter().enumerate() {
+                            if let Some(met) = met[i] {
+                                take(i, met.distance, mesh.normal(met.triangle, ray));
+                            }
+                        }
+                    }
+                    other => {
+                        for (i, ray) in rays.iter().enumerate() {
+                            if let Some((distance, normal)) = other.cast(ray) {
+                                take(i, distance, normal);
+                            }
+                        }
+                    }
+                }
+                if changed {
+                    let farthest = nearest[..rays.len()].iter().fold(0.0, |m: f64, n| m.max(n.0));
+                    *limit = build::upwards(farthest.min(FARTHEST));
+                }
+            },
+        );
+        sweep::boxes(simd, &self.nodes, bundle, build::upwards(FARTHEST), nearest_of);
+        for (i, hit) in hits.iter_mut().enumerate() {
+            let (distance, surface) = nearest[i];
+            *hit = (surface != usize::MAX).then(|| Hit::new(surface, distance, normals[i], &rays[i]));
+        }
+    }
+}
+
+impl Hit {
+    fn new(surface: usize, distance: f64, normal: Unit<Vector3<f64>>, ray: &Ray) -> Self {
+        Self {
             surface,
             distance,
             point: ray.origin + ray.direction.into_inner() * distance,
             normal,
             front: normal.dot(&ray.direction) < 0.0,
-        })
+        }
     }
 }
 

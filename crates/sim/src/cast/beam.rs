@@ -154,23 +154,8 @@ pub(super) fn follow<S: Simd>(simd: S, wide: &Wide, bundle: &Bundle, judge: &Jud
             continue;
         }
         let node = &wide.nodes[child.number()];
-        let (mut met, near) = bundle.boxes(simd, &node.bounds, found.limit);
-        let mut nears = [0.0; WIDTH];
-        near.store_slice(&mut nears);
-        // The nearest comes to the top.
-        let bottom = height;
-        while met != 0 {
-            let lane = met.trailing_zeros() as usize;
-            met &= met - 1;
-            let entry = (nears[lane & 7], node.children[lane & 7]);
-            let mut place = height;
-            while place > bottom && stack[place - 1].0 < entry.0 {
-                stack[place] = stack[place - 1];
-                place -= 1;
-            }
-            stack[place] = entry;
-            height += 1;
-        }
+        let (met, near) = bundle.boxes(simd, &node.bounds, found.limit);
+        height = node.push(met, near, &mut stack, height);
     }
     found
 }

@@ -5,7 +5,7 @@
 //! greatest of its parts until it has eight. The order of everything is the same on any number of threads.
 
 use super::wide::{Child, Leaf, Node, ROUNDING, WIDTH, Wide};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 /// Levels of nodes at most: below [`SORTED`] parts are halved by number.
@@ -82,6 +82,19 @@ impl Bounds {
 }
 
 impl Item {
+    /// What is between two corners, among coordinates that reach so far.
+    fn new(number: usize, low: &Vector3<f64>, high: &Vector3<f64>, reach: f32) -> Self {
+        // More than the judge in f64 can be off by.
+        let slack = reach * ROUNDING;
+        Self {
+            low: std::array::from_fn(|k| downwards(low[k]) - slack),
+            // The number of a triangle is below 2²⁸.
+            #[allow(clippy::cast_possible_truncation)]
+            number: number as u32,
+            high: std::array::from_fn(|k| upwards(high[k]) + slack),
+        }
+    }
+
     fn bounds(&self) -> Bounds {
         let ([a, b, c], [d, e, f]) = (self.low, self.high);
         Bounds {
@@ -190,54 +203,24 @@ fn leaves(count: u32) -> f32 {
 }
 
 /// Something over all items, in parallel if there are many; the order of sums does not matter to the callers.
-fn over<T: Send>(
-    items: &[Item],
-    of_some: impl Fn(&[Item]) -> T + Sync,
-    join: impl Fn(T, T) -> T + Sync + Copy,
-) -> T {
+fn over<T: Send>(items: &[Item], of_some: impl Fn(&[Item]) -> T + Sync, join: impl Fn(T, T) -> T) -> T {
     if items.len() <= 4 * PARALLEL {
         return of_some(items);
     }
     let (a, b) = items.split_at(items.len() / 2);
-    let (a, b) = rayon::join(|| over_half(a, &of_some), || over_half(b, &of_some));
+    let (a, b) = rayon::join(|| of_some(a), || of_some(b));
     join(a, b)
-}
-
-fn over_half<T: Send>(items: &[Item], of_some: &(impl Fn(&[Item]) -> T + Sync)) -> T {
-    of_some(items)
 }
 
 /// The index over triangles.
 pub(super) fn index(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Wide {
     let reach = upwards(vertices.iter().fold(0.0, |reach, v| v.coords.amax().max(reach)));
-    // More than the judge in f64 can be off by.
-    let slack = reach * ROUNDING;
     let item = |(number, corners): (usize, &[u32; 3])| {
-        let corners = corners.map(|v| vertices[v as usize].coords);
-        let side = |k: usize, pick: fn(f64, f64) -> f64| {
-            corners[1..].iter().fold(corners[0][k], |a, c| pick(a, c[k]))
-        };
-        Item {
-            low: std::array::from_fn(|k| downwards(side(k, f64::min)) - slack),
-            // The number of a triangle is below 2²⁸.
-            #[allow(clippy::cast_possible_truncation)]
-            number: number as u32,
-            high: std::array::from_fn(|k| upwards(side(k, f64::max)) + slack),
-        }
+        let [a, b, c] = corners.map(|v| vertices[v as usize].coords);
+        Item::new(number, &a.inf(&b).inf(&c), &a.sup(&b).sup(&c), reach)
     };
     let mut items: Vec<Item> = triangles.par_iter().enumerate().map(item).collect();
-    let bounds = over(
-        &items,
-        |items| items.iter().fold(Bounds::NOTHING, |all, i| all.with(&i.bounds())),
-        |a, b| a.with(&b),
-    );
-    let all = Part {
-        first: 0,
-        count: items.len(),
-        bounds,
-    };
-    let mut nodes = Vec::new();
-    node(&mut items, all, 0, &mut nodes);
+    let mut nodes = sorted(&mut items, WIDTH);
     // Leaves are named by their first item so far.
     let mut found = Vec::new();
     for child in nodes.iter_mut().flat_map(|node: &mut Node| &mut node.children) {
@@ -266,12 +249,46 @@ pub(super) fn index(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Wide {
     Wide { nodes, leaves, reach }
 }
 
-/// Appends the node of a part and all below it; `items` are those of the part.
-fn node(items: &mut [Item], part: Part, level: usize, nodes: &mut Vec<Node>) {
+/// The nodes over boxes, each given by its lowest and highest corner; a leaf's number is that of its box.
+pub(super) fn over_boxes(boxes: &[(Vector3<f64>, Vector3<f64>)], reach: f32) -> Vec<Node> {
+    let item =
+        |(number, (low, high)): (usize, &(Vector3<f64>, Vector3<f64>))| Item::new(number, low, high, reach);
+    let mut items: Vec<Item> = boxes.iter().enumerate().map(item).collect();
+    let mut nodes = sorted(&mut items, 1);
+    for child in nodes.iter_mut().flat_map(|node| &mut node.children) {
+        if child.is_leaf() {
+            *child = Child::leaf(items[child.number()].number as usize, 1);
+        }
+    }
+    nodes
+}
+
+/// Sorts items, and the nodes over them; leaves of at most so many are named by their first item.
+fn sorted(items: &mut [Item], leaf: usize) -> Vec<Node> {
+    let bounds = over(
+        items,
+        |items| items.iter().fold(Bounds::NOTHING, |all, i| all.with(&i.bounds())),
+        |a, b| a.with(&b),
+    );
+    let all = Part {
+        first: 0,
+        count: items.len(),
+        bounds,
+    };
+    if items.is_empty() {
+        return vec![Node::empty()];
+    }
+    let mut nodes = Vec::new();
+    node(items, all, (0, leaf), &mut nodes);
+    nodes
+}
+
+/// Appends the node of a part and all below it; `items` are those of the part, of which a leaf has at most so many.
+fn node(items: &mut [Item], part: Part, (level, leaf): (usize, usize), nodes: &mut Vec<Node>) {
     let mut parts = vec![part];
     while parts.len() < WIDTH {
         // The greatest of those that are more than a leaf.
-        let splittable = parts.iter().enumerate().filter(|(_, p)| p.count > WIDTH);
+        let splittable = parts.iter().enumerate().filter(|(_, p)| p.count > leaf);
         let greatest = splittable.max_by(|(_, a), (_, b)| {
             if level < SORTED {
                 a.bounds.area().total_cmp(&b.bounds.area())
@@ -295,11 +312,11 @@ fn node(items: &mut [Item], part: Part, level: usize, nodes: &mut Vec<Node>) {
         rest = others;
     }
     let below = |nodes: &mut Vec<Node>, slice: &mut [Item], part: Part| {
-        if part.count <= WIDTH {
+        if part.count <= leaf {
             return Child::leaf(part.first, part.count);
         }
         let number = nodes.len();
-        node(slice, part, level + 1, nodes);
+        node(slice, part, (level + 1, leaf), nodes);
         Child::node(number)
     };
     let children: Vec<Child> = if part.count > PARALLEL {

@@ -176,11 +176,18 @@ impl Bundle {
             near: Side::default(),
             far: Side::default(),
         };
-        for i in 0..vectors * LANES {
-            let ray = rays.get(i).unwrap_or(first);
-            for k in 0..3 {
-                bundle.direction[k].0[i / LANES][i % LANES] = rounded(ray.direction[k]);
-                if !common {
+        for (vector, rays) in rays.chunks(LANES).enumerate() {
+            for lane in 0..LANES {
+                let ray = rays.get(lane).unwrap_or(first);
+                for k in 0..3 {
+                    bundle.direction[k].0[vector][lane] = rounded(ray.direction[k]);
+                }
+            }
+        }
+        if !common {
+            for i in 0..vectors * LANES {
+                let ray = rays.get(i).unwrap_or(first);
+                for k in 0..3 {
                     bundle.offset[k].0[i / LANES][i % LANES] = rounded(ray.origin[k] - origin[k]);
                 }
             }

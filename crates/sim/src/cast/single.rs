@@ -208,12 +208,15 @@ pub(super) fn follow<S: Simd>(simd: S, wide: &Wide, ray: &Ray, judge: &Judge<'_>
         way: None,
     };
     let mut stack = [(0.0_f32, Child::NONE); STACK];
-    let mut height = 0;
-    let mut next = Some((0.0, Child::node(0)));
-    while let Some((near, child)) = next {
-        next = None;
+    stack[0] = (0.0, Child::node(0));
+    let mut height = 1;
+    while height > 0 {
+        height -= 1;
+        let (near, child) = stack[height];
         if near > nearest.high {
-        } else if child.is_leaf() {
+            continue;
+        }
+        if child.is_leaf() {
             let leaf = &wide.leaves[child.number()];
             let outcome = line.triangles(simd, leaf, nearest.high);
             let mut may = outcome.may & ((1 << child.count()) - 1);
@@ -235,27 +238,8 @@ pub(super) fn follow<S: Simd>(simd: S, wide: &Wide, ray: &Ray, judge: &Judge<'_>
             }
         } else {
             let node = &wide.nodes[child.number()];
-            let (mut met, near) = line.boxes(simd, node, nearest.high);
-            let mut nears = [0.0; WIDTH];
-            near.store_slice(&mut nears);
-            // The nearest is next, the others come to the stack with the nearest on top.
-            let bottom = height;
-            while met != 0 {
-                let lane = met.trailing_zeros() as usize & 7;
-                met &= met - 1;
-                let entry = (nears[lane], node.children[lane]);
-                let mut place = height;
-                while place > bottom && stack[place - 1].0 < entry.0 {
-                    stack[place] = stack[place - 1];
-                    place -= 1;
-                }
-                stack[place] = entry;
-                height += 1;
-            }
-        }
-        if next.is_none() && height > 0 {
-            height -= 1;
-            next = Some(stack[height]);
+            let (met, near) = line.boxes(simd, node, nearest.high);
+            height = node.push(met, near, &mut stack, height);
         }
     }
     let distance = nearest.way(judge);

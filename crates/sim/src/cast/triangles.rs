@@ -64,7 +64,7 @@ impl Triangles {
         (0..self.triangles.len()).map(|t| self.corners(t)).collect()
     }
 
-    fn judge<'a>(&'a self, rays: &'a [Ray]) -> Judge<'a> {
+    pub(super) fn judge<'a>(&'a self, rays: &'a [Ray]) -> Judge<'a> {
         Judge {
             vertices: &self.vertices,
             triangles: &self.triangles,
@@ -77,7 +77,7 @@ impl Triangles {
         self.nearest_at(Level::new(), ray)
     }
 
-    fn nearest_at(&self, level: Level, ray: &Ray) -> Option<Met> {
+    pub(super) fn nearest_at(&self, level: Level, ray: &Ray) -> Option<Met> {
         let judge = self.judge(std::slice::from_ref(ray));
         dispatch!(level, simd => single::follow(simd, &self.wide, ray, &judge))
     }
@@ -90,7 +90,7 @@ impl Triangles {
         self.nearest_of_beam_at(Level::new(), rays, met);
     }
 
-    fn nearest_of_beam_at(&self, level: Level, rays: &[Ray], met: &mut [Option<Met>]) {
+    pub(super) fn nearest_of_beam_at(&self, level: Level, rays: &[Ray], met: &mut [Option<Met>]) {
         assert_eq!(rays.len(), met.len(), "every ray has its place");
         for (rays, met) in rays.chunks(MOST_RAYS).zip(met.chunks_mut(MOST_RAYS)) {
             met.fill(None);
@@ -122,7 +122,7 @@ impl Triangles {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::noise::{Draws, Purpose};
     use rayon::prelude::*;
@@ -132,7 +132,7 @@ mod tests {
     const RAYS: u64 = 10_000_000;
 
     /// A closed mesh that can be seen whole from the origin: a divided octahedron, every vertex at a random distance.
-    fn random_star(seed: u64, divisions: u32) -> Mesh {
+    pub(in crate::cast) fn random_star(seed: u64, divisions: u32) -> Mesh {
         let mut vertices: Vec<Point3<f64>> = [
             [1.0, 0.0, 0.0],
             [-1.0, 0.0, 0.0],

@@ -4,6 +4,8 @@
 //! candidate that f64 decides about.
 
 use super::build;
+use fearless_simd::f32x8;
+use fearless_simd::{Simd, prelude::*};
 use nalgebra::Point3;
 
 /// Children of a node and triangles of a leaf.
@@ -92,6 +94,35 @@ impl Node {
             bounds: [[[FAR; WIDTH], [-FAR; WIDTH]]; 3],
             children: [Child::NONE; WIDTH],
         }
+    }
+}
+
+impl Node {
+    /// Puts the children that are met on a stack, the nearest on top; the new height.
+    #[inline(always)]
+    pub(super) fn push<S: Simd>(
+        &self,
+        mut met: u32,
+        near: f32x8<S>,
+        stack: &mut [(f32, Child); STACK],
+        mut height: usize,
+    ) -> usize {
+        let mut nears = [0.0; WIDTH];
+        near.store_slice(&mut nears);
+        let bottom = height;
+        while met != 0 {
+            let lane = met.trailing_zeros() as usize & (WIDTH - 1);
+            met &= met - 1;
+            let entry = (nears[lane], self.children[lane]);
+            let mut place = height;
+            while place > bottom && stack[place - 1].0 < entry.0 {
+                stack[place] = stack[place - 1];
+                place -= 1;
+            }
+            stack[place] = entry;
+            height += 1;
+        }
+        height
     }
 }
 
