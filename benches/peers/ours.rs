@@ -1,11 +1,12 @@
 //! Our side of the comparison with other ray casters: closest hits on meshes that `compare.py` made.
 //!
 //! `cargo bench --bench peers -- FOLDER MESH ENGINE RAYS THREADS SECONDS` prints one line of JSON and writes the
-//! distances beside the inputs. Engines are `beam` (so many rays as one beam), `single` and `parry` (in f64).
+//! distances beside the inputs. Engines are `beam` (so many rays as one beam), `single`, `polygons`
+//! (every triangle a polygon of a world, so many rays as one beam) and `parry` (in f64).
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 use catoptric::model::Pose;
-use catoptric::sim::cast::{Met, Triangles};
+use catoptric::sim::cast::{Met, Polygon, Shape, Triangles, World};
 use catoptric::sim::footprint::Ray;
 use catoptric::sim::mesh::Mesh;
 use nalgebra::{Point3, Unit, Vector3};
@@ -107,6 +108,20 @@ fn main() {
                 for (ray, way) in rays.iter().zip(ways) {
                     let ray = parry3d::query::Ray::new(vector(&ray.origin.coords), vector(&ray.direction));
                     *way = parry.cast_local_ray(&ray, 1e4, false).unwrap_or(f64::INFINITY);
+                }
+            })
+        }
+        polygons if polygons.starts_with("polygons") => {
+            let count: usize = polygons["polygons".len()..].parse().unwrap();
+            let polygon = |t: &[u32; 3]| Polygon::new(t.map(|v| vertices[v as usize]).to_vec()).unwrap();
+            let world = World::new(triangles.iter().map(|t| Shape::Polygon(polygon(t))).collect());
+            Box::new(move |rays, ways| {
+                let mut hits = vec![None; count];
+                for (rays, ways) in rays.chunks(count).zip(ways.chunks_mut(count)) {
+                    world.cast_beam(rays, None, &mut hits[..rays.len()]);
+                    for (place, hit) in ways.iter_mut().zip(&hits) {
+                        *place = hit.map_or(f64::INFINITY, |h| h.distance);
+                    }
                 }
             })
         }

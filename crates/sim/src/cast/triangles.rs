@@ -50,7 +50,7 @@ impl Triangles {
         }
     }
 
-    fn corners(&self, triangle: usize) -> [Point3<f64>; 3] {
+    pub(super) fn corners(&self, triangle: usize) -> [Point3<f64>; 3] {
         self.triangles[triangle].map(|v| self.vertices[v as usize])
     }
 
