@@ -57,8 +57,6 @@ pub(super) struct Bundle {
     pub(super) offset: [Row<f32>; 3],
     /// Direction × offset.
     pub(super) moment: [Row<f32>; 3],
-    /// The bundle's middle direction.
-    forward: [f32; 3],
     /// The sides in projection: two each without the first, the second and the third axis.
     projected: [[Side; 2]; 3],
     /// The four sides of the pyramid.
@@ -151,6 +149,37 @@ fn span<S: Simd>(simd: S, vectors: usize, value: impl Fn(usize) -> f32x16<S>) ->
     Span(low.reduce_min(), high.reduce_max())
 }
 
+/// The normals of the two sides without a third axis; `None` if the rays go along that axis: then nothing is out.
+#[inline(always)]
+fn projection(edges: &[[f32; 3]; 4], forward: [f32; 3], a: usize, b: usize) -> Option<[[f32; 3]; 2]> {
+    // The slope of the lesser over the greater.
+    let (i, j) = if forward[a].abs() >= forward[b].abs() {
+        (a, b)
+    } else {
+        (b, a)
+    };
+    let sign = 1.0_f32.copysign(forward[i]);
+    let mut least = f32::INFINITY;
+    let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+    for edge in edges {
+        least = least.min(sign * edge[i]);
+        let slope = edge[j] / edge[i];
+        low = low.min(slope);
+        high = high.max(slope);
+    }
+    if least < 0.05 {
+        return None;
+    }
+    // Products of slopes are rounded as the edges are.
+    let pad = 4.0 * SLOPE_SLACK * (1.0 + low.abs().max(high.abs()));
+    let (low, high) = (low - pad, high + pad);
+    let (above, below) = if sign > 0.0 { (high, low) } else { (low, high) };
+    let mut sides = [[0.0; 3]; 2];
+    (sides[0][j], sides[0][i]) = (1.0, -above);
+    (sides[1][j], sides[1][i]) = (-1.0, below);
+    Some(sides)
+}
+
 impl Bundle {
     /// At most [`MOST`] rays among things whose coordinates reach so far; `None` if they are no narrow cone.
     #[inline(always)]
@@ -170,7 +199,6 @@ impl Bundle {
             direction: [Row::of(0.0); 3],
             offset: [Row::of(0.0); 3],
             moment: [Row::of(0.0); 3],
-            forward: [0.0; 3],
             projected: [[Side::default(); 2]; 3],
             sides: [Side::default(); 4],
             near: Side::default(),
@@ -222,10 +250,6 @@ impl Bundle {
         let direction = inlined(
             #[inline(always)]
             |v: usize| rows(simd, &self.direction, v),
-        );
-        let offset = inlined(
-            #[inline(always)]
-            |v: usize| rows(simd, &self.offset, v),
         );
         let mut sum = [f32x16::splat(simd, 0.0); 3];
         for v in 0..vectors {
@@ -286,20 +310,10 @@ impl Bundle {
         let side = inlined(
             #[inline(always)]
             |normal: [f32; 3]| {
-                let rest = if self.common {
-                    // The rounding of the start.
-                    2.0 * ROUNDING * self.reference_reach
-                } else {
-                    span(
-                        simd,
-                        vectors,
-                        #[inline(always)]
-                        |v| along(&offset(v), normal),
-                    )
-                    .1
-                };
-                let size = normal.iter().map(|n| n.abs()).sum::<f32>();
-                Side::new(normal, dot(normal, self.reference) + rest + slack * size)
+                let [x, y, z] = [normal[0].abs(), normal[1].abs(), normal[2].abs()];
+                // The rounding of the one start, or how far others are from the reference.
+                let start = x.max(y).max(z) * self.spread.max(2.0 * ROUNDING * self.reference_reach);
+                Side::new(normal, dot(normal, self.reference) + start + slack * (x + y + z))
             },
         );
         let slopes = inlined(
@@ -314,79 +328,34 @@ impl Bundle {
                         along(&d, to) / along(&d, forward)
                     },
                 );
-                Span(low - SLOPE_SLACK, high + SLOPE_SLACK)
+                [low - SLOPE_SLACK, high + SLOPE_SLACK]
             },
         );
-        let pair = inlined(
-            #[inline(always)]
-            |to: [f32; 3]| {
-                let Span(low, high) = slopes(to);
-                [
-                    side(std::array::from_fn(|k| to[k] - high * forward[k])),
-                    side(std::array::from_fn(|k| low * forward[k] - to[k])),
-                ]
-            },
-        );
-        let pyramid = [pair(wide), pair(narrow)];
-        let project = inlined(
-            #[inline(always)]
-            |a: usize, b: usize| {
-                // The slope of the lesser over the greater.
-                let (i, j) = if forward[a].abs() >= forward[b].abs() {
-                    (a, b)
-                } else {
-                    (b, a)
-                };
-                let ahead = span(
-                    simd,
-                    vectors,
-                    #[inline(always)]
-                    |v| direction(v)[i],
-                );
-                if !(ahead.0 > 0.05 || ahead.1 < -0.05) {
-                    // Along the axis left out: nothing is out.
-                    return [Side::new([0.0; 3], f32::INFINITY); 2];
-                }
-                let Span(low, high) = span(
-                    simd,
-                    vectors,
-                    #[inline(always)]
-                    |v| {
-                        let d = direction(v);
-                        d[j] / d[i]
-                    },
-                );
-                let pad = inlined(
-                    #[inline(always)]
-                    |s: f32| SLOPE_SLACK * (1.0 + s.abs()),
-                );
-                let (low, high) = (low - pad(low), high + pad(high));
-                let (above, below) = if ahead.0 > 0.0 { (high, low) } else { (low, high) };
-                let normal = inlined(
-                    #[inline(always)]
-                    |slope: f32, sign: f32| {
-                        let mut normal = [0.0; 3];
-                        (normal[j], normal[i]) = (sign, -sign * slope);
-                        normal
-                    },
-                );
-                [side(normal(above, 1.0)), side(normal(below, -1.0))]
-            },
-        );
-        let projected = [project(1, 2), project(2, 0), project(0, 1)];
-        // The depth before the reference is not beyond the way along a ray.
-        let start = inlined(
-            #[inline(always)]
-            |normal: [f32; 3]| side(normal).edge,
-        );
-        let near = Side::new(forward, start(forward));
-        let backward = forward.map(|f| -f);
-        let far = Side::new(backward, start(backward));
-        self.forward = forward;
-        self.sides = [pyramid[0][0], pyramid[0][1], pyramid[1][0], pyramid[1][1]];
-        self.projected = projected;
-        self.near = near;
-        self.far = far;
+        let (across, up) = (slopes(wide), slopes(narrow));
+        let plus = |a: [f32; 3], s: f32, b: [f32; 3]| [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]];
+        let negative = |a: [f32; 3]| [-a[0], -a[1], -a[2]];
+        self.sides = [
+            side(plus(wide, -across[1], forward)),
+            side(negative(plus(wide, -across[0], forward))),
+            side(plus(narrow, -up[1], forward)),
+            side(negative(plus(narrow, -up[0], forward))),
+        ];
+        // Every ray is a sum of the pyramid's edges, none of them taken away.
+        let edge = |a: f32, b: f32| plus(plus(forward, a, wide), b, narrow);
+        let edges = [
+            edge(across[0], up[0]),
+            edge(across[0], up[1]),
+            edge(across[1], up[0]),
+            edge(across[1], up[1]),
+        ];
+        for (axis, (a, b)) in [(1, 2), (2, 0), (0, 1)].into_iter().enumerate() {
+            self.projected[axis] = projection(&edges, forward, a, b)
+                .map_or([Side::new([0.0; 3], f32::INFINITY); 2], |[above, below]| {
+                    [side(above), side(below)]
+                });
+        }
+        self.near = side(forward);
+        self.far = side(negative(forward));
         true
     }
 
