@@ -246,19 +246,19 @@ fn facts<S: Simd>(simd: S, corners: &[[f32x8<S>; 3]; 3], reach: f32, bundle: &Bu
         .iter()
         .enumerate()
     {
-        for k in 0..3 {
-            put(At::CROSSES + 3 * i + k, vector[k]);
+        for (k, coordinate) in vector.iter().enumerate() {
+            put(At::CROSSES + 3 * i + k, *coordinate);
         }
     }
     if !bundle.common {
         for (i, vector) in [bc, ca, ab].iter().enumerate() {
-            for k in 0..3 {
-                put(At::EDGES + 3 * i + k, vector[k]);
+            for (k, coordinate) in vector.iter().enumerate() {
+                put(At::EDGES + 3 * i + k, *coordinate);
             }
         }
     }
-    for k in 0..3 {
-        put(At::NORMAL + k, normal[k]);
+    for (k, coordinate) in normal.iter().enumerate() {
+        put(At::NORMAL + k, *coordinate);
     }
     put(At::HEIGHT, height);
     put(At::EDGE_ERROR, edge_error);

@@ -170,6 +170,8 @@ impl Bins {
     }
 
     /// The axis and the first bin of the right side with the least cost, and the two boxes.
+    // A bin is a place in three lists.
+    #[allow(clippy::needless_range_loop)]
     fn best(&self, scale: &Scale) -> Option<(usize, usize, [Bounds; 2])> {
         let mut best = None;
         let mut least = f32::INFINITY;
@@ -199,7 +201,7 @@ impl Bins {
 
 /// Leaves that hold so many triangles.
 fn leaves(count: u32) -> f32 {
-    count.div_ceil(WIDTH as u32) as f32
+    (count as usize).div_ceil(WIDTH) as f32
 }
 
 /// Something over all items, in parallel if there are many; the order of sums does not matter to the callers.
@@ -237,9 +239,9 @@ pub(super) fn index(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Wide {
         };
         for (lane, item) in items[first..first + count].iter().enumerate() {
             leaf.triangles[lane] = item.number;
-            for (corner, &vertex) in triangles[item.number as usize].iter().enumerate() {
-                for axis in 0..3 {
-                    leaf.corners[corner][axis][lane] = rounded(vertices[vertex as usize][axis]);
+            for (corner, &vertex) in leaf.corners.iter_mut().zip(&triangles[item.number as usize]) {
+                for (row, coordinate) in corner.iter_mut().zip(vertices[vertex as usize].iter()) {
+                    row[lane] = rounded(*coordinate);
                 }
             }
         }

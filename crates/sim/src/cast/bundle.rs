@@ -23,8 +23,11 @@ pub(super) const NONE: u32 = u32::MAX;
 /// Rounding of a slope in the pyramid, with room to spare.
 const SLOPE_SLACK: f32 = 2e-6;
 
-/// Least cosine between the bundle's middle and each of its rays.
-const NARROW: f32 = 0.7;
+/// Least cosine between the bundle's middle and each of its rays: in wider cones there is too much that few rays meet.
+const NARROW: f32 = 0.97;
+
+/// Greatest offset of a start, as a part of how far all things reach.
+const TOGETHER: f32 = 0.02;
 
 /// Numbers of all rays.
 #[derive(Clone, Copy)]
@@ -215,12 +218,10 @@ impl Bundle {
         if !common {
             for i in 0..vectors * LANES {
                 let ray = rays.get(i).unwrap_or(first);
-                for k in 0..3 {
-                    bundle.offset[k].0[i / LANES][i % LANES] = rounded(ray.origin[k] - origin[k]);
+                for (k, row) in bundle.offset.iter_mut().enumerate() {
+                    row.set(i, rounded(ray.origin[k] - origin[k]));
                 }
             }
-        }
-        if !common {
             bundle.spread = 1.001
                 * span(
                     simd,
@@ -232,6 +233,9 @@ impl Bundle {
                     },
                 )
                 .1;
+            if bundle.spread > TOGETHER * reach {
+                return None;
+            }
             for v in 0..vectors {
                 let d = rows(simd, &bundle.direction, v);
                 let o = rows(simd, &bundle.offset, v);
@@ -255,19 +259,18 @@ impl Bundle {
         for v in 0..vectors {
             let d = direction(v);
             for k in 0..3 {
-                sum[k] = sum[k] + d[k];
+                sum[k] += d[k];
             }
         }
         let sum = [sum[0].reduce_sum(), sum[1].reduce_sum(), sum[2].reduce_sum()];
         let Some(forward) = unit(sum) else { return false };
-        if !(span(
+        let Span(least, _) = span(
             simd,
             vectors,
             #[inline(always)]
             |v| along(&direction(v), forward),
-        )
-        .0 > NARROW)
-        {
+        );
+        if least.is_nan() || least < NARROW {
             return false;
         }
         // The ray farthest from the middle shows how the bundle lies.

@@ -93,17 +93,30 @@ impl Triangles {
     pub(super) fn nearest_of_beam_at(&self, level: Level, rays: &[Ray], met: &mut [Option<Met>]) {
         assert_eq!(rays.len(), met.len(), "every ray has its place");
         for (rays, met) in rays.chunks(MOST_RAYS).zip(met.chunks_mut(MOST_RAYS)) {
-            met.fill(None);
-            let judge = self.judge(rays);
-            dispatch!(level, simd => match Bundle::new(simd, rays, self.wide.reach) {
-                Some(bundle) => {
-                    let found = beam::follow(simd, &self.wide, &bundle, &judge);
-                    found.finish(simd, &judge, met);
-                }
-                None => for (ray, met) in rays.iter().zip(met.iter_mut()) {
-                    *met = single::follow(simd, &self.wide, ray, &self.judge(std::slice::from_ref(ray)));
-                },
-            });
+            self.nearest_of_some(level, rays, met);
+        }
+    }
+
+    /// What is no narrow cone may be two.
+    fn nearest_of_some(&self, level: Level, rays: &[Ray], met: &mut [Option<Met>]) {
+        if let [ray] = rays {
+            met[0] = self.nearest_at(level, ray);
+            return;
+        }
+        let judge = self.judge(rays);
+        let done = dispatch!(level, simd => match Bundle::new(simd, rays, self.wide.reach) {
+            Some(bundle) => {
+                let found = beam::follow(simd, &self.wide, &bundle, &judge);
+                found.finish(simd, &judge, met);
+                true
+            }
+            None => false,
+        });
+        if !done {
+            let middle = rays.len() / 2;
+            let (first, second) = met.split_at_mut(middle);
+            self.nearest_of_some(level, &rays[..middle], first);
+            self.nearest_of_some(level, &rays[middle..], second);
         }
     }
 
