@@ -4,17 +4,28 @@
 //! volume hierarchy; a mesh has one of its own below it. A ray that leaves a mirror excludes that mirror by its index,
 //! never by an epsilon.
 
+mod beam;
+#[cfg(test)]
+mod beam_tests;
+mod build;
+mod bundle;
 mod cylinder;
+mod exact;
+mod lanes;
+mod single;
 mod skin;
+mod sweep;
 mod triangles;
+mod wide;
 
 pub use cylinder::Cylinder;
 pub use skin::{CYLINDER_FACES, Triangle, volume};
-pub use triangles::Triangles;
+pub use triangles::{Met, Triangles};
 
 use crate::footprint::Ray;
 use crate::layout::area_vector;
 use catoptric_model::Pose;
+use fearless_simd::Level;
 use nalgebra::{Point3, Unit, Vector3};
 use parry3d::bounding_volume::Aabb;
 use parry3d::math::Vector;
@@ -75,6 +86,9 @@ pub struct Hit {
 pub struct World {
     shapes: Vec<Shape>,
     bvh: Bvh,
+    /// The same boxes for beams.
+    nodes: Vec<wide::Node>,
+    reach: f32,
 }
 
 /// Farthest distance at which anything is looked for, in metres: beyond any scanner's range.
@@ -205,9 +219,17 @@ impl World {
     /// Indexes the shapes; a hit names a shape by its place in this list.
     pub fn new(shapes: Vec<Shape>) -> Self {
         let boxes: Vec<Aabb> = shapes.iter().map(Shape::bounds).collect();
+        let corner = |v: Vector| Vector3::new(v.x, v.y, v.z);
+        let corners: Vec<_> = boxes.iter().map(|b| (corner(b.mins), corner(b.maxs))).collect();
+        let reach = corners
+            .iter()
+            .fold(0.0, |m: f64, (a, b)| m.max(a.amax()).max(b.amax()));
+        let reach = build::upwards(reach);
         Self {
             bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes),
             shapes,
+            nodes: build::over_boxes(&corners, reach),
+            reach,
         }
     }
 
@@ -223,13 +245,28 @@ impl World {
         })?;
         let surface = surface as usize;
         let (_, normal) = self.shapes[surface].cast(ray)?;
-        Some(Hit {
+        Some(Hit::new(surface, distance, normal, ray))
+    }
+
+    /// The nearest surface along each of some rays, `left` aside: what [`World::cast`] says of each of them, and faster
+    /// if they are a narrow cone from nearly one point. Of surfaces at the very same distance the first counts.
+    ///
+    /// # Panics
+    /// If there are not as many places for the hits.
+    pub fn cast_beam(&self, rays: &[Ray], left: Option<usize>, hits: &mut [Option<Hit>]) {
+        self.cast_beam_at(Level::new(), rays, left, hits);
+    }
+}
+
+impl Hit {
+    fn new(surface: usize, distance: f64, normal: Unit<Vector3<f64>>, ray: &Ray) -> Self {
+        Self {
             surface,
             distance,
             point: ray.origin + ray.direction.into_inner() * distance,
             normal,
             front: normal.dot(&ray.direction) < 0.0,
-        })
+        }
     }
 }
 

@@ -1,33 +1,34 @@
-//! A ray against a triangle mesh, without a gap between triangles that share an edge.
+//! A triangle mesh in its place.
 //!
-//! Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", Journal of Computer Graphics Techniques 2(1), 2013:
-//! space is sheared so that the ray becomes the z axis, and three edge functions in the x–y plane decide. A vertex
-//! is sheared alike for every triangle that holds it, and an edge's function only changes its sign when the edge is
-//! walked the other way; so two triangles never both disown a ray at the edge between them. Unlike the paper, which
-//! computes in f32 and falls back to f64 where a function is zero, the sign of a function that rounding could have
-//! changed is found from the exact products (fused multiply-add).
+//! Triangles are found in f32 by an index made for lanes and decided about in f64 without a gap between triangles that
+//! share an edge; the answer is the same with any instruction set, alone or in a beam. Of triangles that are met at the
+//! very same distance the first counts.
 
-use super::{FARTHEST, padded, to_glam};
+use super::beam::{self, MOST_RAYS};
+use super::bundle::Bundle;
+use super::exact::Judge;
+use super::single;
+use super::wide::Wide;
 use crate::footprint::Ray;
 use crate::mesh::Mesh;
 use catoptric_model::Pose;
+use fearless_simd::{Level, dispatch};
 use nalgebra::{Point3, Unit, Vector3};
-use parry3d::bounding_volume::Aabb;
-use parry3d::partitioning::{Bvh, BvhBuildStrategy};
 
 /// A mesh in its place, with an index over its triangles.
 pub struct Triangles {
     vertices: Vec<Point3<f64>>,
     triangles: Vec<[u32; 3]>,
-    bvh: Bvh,
+    wide: Wide,
 }
 
-/// A ray as the triangle test wants it.
-struct Sheared<'a> {
-    ray: &'a Ray,
-    /// The axis along which the ray goes farthest, and the two others.
-    axes: [usize; 3],
-    shear: Vector3<f64>,
+/// Where a ray meets a mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Met {
+    /// Number of the triangle.
+    pub triangle: u32,
+    /// Distance from the ray's origin, in metres.
+    pub distance: f64,
 }
 
 impl std::fmt::Debug for Triangles {
@@ -42,18 +43,14 @@ impl Triangles {
         let place = |p: &Point3<f64>| frame_from_mesh * Point3::from(p.coords * scale);
         let vertices: Vec<Point3<f64>> = mesh.vertices().iter().map(place).collect();
         let triangles = mesh.triangles().to_vec();
-        let boxes: Vec<Aabb> = triangles
-            .iter()
-            .map(|t| padded(t.iter().map(|&v| vertices[v as usize])))
-            .collect();
         Self {
-            bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes),
+            wide: Wide::new(&vertices, &triangles),
             vertices,
             triangles,
         }
     }
 
-    fn corners(&self, triangle: usize) -> [Point3<f64>; 3] {
+    pub(super) fn corners(&self, triangle: usize) -> [Point3<f64>; 3] {
         self.triangles[triangle].map(|v| self.vertices[v as usize])
     }
 
@@ -67,70 +64,78 @@ impl Triangles {
         (0..self.triangles.len()).map(|t| self.corners(t)).collect()
     }
 
-    /// Distance and normal of the nearest triangle along a ray.
-    pub(super) fn cast(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
-        let sheared = Sheared::new(ray);
-        let parry_ray = parry3d::query::Ray::new(to_glam(&ray.origin.coords), to_glam(&ray.direction));
-        let (triangle, distance) = self.bvh.cast_ray(&parry_ray, FARTHEST, |leaf, _| {
-            sheared.meet(&self.corners(leaf as usize))
-        })?;
+    pub(super) fn judge<'a>(&'a self, rays: &'a [Ray]) -> Judge<'a> {
+        Judge {
+            vertices: &self.vertices,
+            triangles: &self.triangles,
+            rays,
+        }
+    }
+
+    /// The nearest triangle along a ray.
+    pub fn nearest(&self, ray: &Ray) -> Option<Met> {
+        self.nearest_at(Level::new(), ray)
+    }
+
+    pub(super) fn nearest_at(&self, level: Level, ray: &Ray) -> Option<Met> {
+        let judge = self.judge(std::slice::from_ref(ray));
+        dispatch!(level, simd => single::follow(simd, &self.wide, ray, &judge))
+    }
+
+    /// The nearest triangle along each of some rays: fast if they are a narrow cone, from nearly one point.
+    ///
+    /// # Panics
+    /// If there are not as many places for what they meet.
+    pub fn nearest_of_beam(&self, rays: &[Ray], met: &mut [Option<Met>]) {
+        self.nearest_of_beam_at(Level::new(), rays, met);
+    }
+
+    pub(super) fn nearest_of_beam_at(&self, level: Level, rays: &[Ray], met: &mut [Option<Met>]) {
+        assert_eq!(rays.len(), met.len(), "every ray has its place");
+        for (rays, met) in rays.chunks(MOST_RAYS).zip(met.chunks_mut(MOST_RAYS)) {
+            self.nearest_of_some(level, rays, met);
+        }
+    }
+
+    /// What is no narrow cone may be two.
+    fn nearest_of_some(&self, level: Level, rays: &[Ray], met: &mut [Option<Met>]) {
+        if let [ray] = rays {
+            met[0] = self.nearest_at(level, ray);
+            return;
+        }
+        let judge = self.judge(rays);
+        let done = dispatch!(level, simd => match Bundle::new(simd, rays, self.wide.reach) {
+            Some(bundle) => {
+                let found = beam::follow(simd, &self.wide, &bundle, &judge);
+                found.finish(simd, &judge, met);
+                true
+            }
+            None => false,
+        });
+        if !done {
+            let middle = rays.len() / 2;
+            let (first, second) = met.split_at_mut(middle);
+            self.nearest_of_some(level, &rays[..middle], first);
+            self.nearest_of_some(level, &rays[middle..], second);
+        }
+    }
+
+    /// Normal of a triangle, for a ray that meets it.
+    pub(super) fn normal(&self, triangle: u32, ray: &Ray) -> Unit<Vector3<f64>> {
         let [a, b, c] = self.corners(triangle as usize);
         // A sliver without an area has no normal; any that looks back does.
-        let normal = Unit::try_new((b - a).cross(&(c - a)), f64::MIN_POSITIVE).unwrap_or(-ray.direction);
-        Some((distance, normal))
-    }
-}
-
-impl<'a> Sheared<'a> {
-    fn new(ray: &'a Ray) -> Self {
-        let d = ray.direction.into_inner();
-        let z = d.iamax();
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-        Self {
-            ray,
-            axes: [x, y, z],
-            shear: Vector3::new(d[x] / d[z], d[y] / d[z], 1.0 / d[z]),
-        }
+        Unit::try_new((b - a).cross(&(c - a)), f64::MIN_POSITIVE).unwrap_or(-ray.direction)
     }
 
-    /// Distance at which the ray meets a triangle, from either side; its edges and corners belong to it.
-    fn meet(&self, corners: &[Point3<f64>; 3]) -> Option<f64> {
-        let [kx, ky, kz] = self.axes;
-        let [a, b, c] = corners.map(|p| {
-            let p = p - self.ray.origin;
-            Vector3::new(
-                p[kx] - self.shear.x * p[kz],
-                p[ky] - self.shear.y * p[kz],
-                self.shear.z * p[kz],
-            )
-        });
-        let (u, v, w) = (edge(&c, &b), edge(&a, &c), edge(&b, &a));
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
-            return None;
-        }
-        let sum = u + v + w;
-        if sum == 0.0 {
-            return None;
-        }
-        let distance = (u * a.z + v * b.z + w * c.z) / sum;
-        (distance > 0.0 && distance < FARTHEST).then_some(distance)
+    /// Distance and normal of the nearest triangle along a ray.
+    pub(super) fn cast(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
+        let met = self.nearest(ray)?;
+        Some((met.distance, self.normal(met.triangle, ray)))
     }
-}
-
-/// The edge function p×q, its sign exact.
-fn edge(p: &Vector3<f64>, q: &Vector3<f64>) -> f64 {
-    let (left, right) = (p.x * q.y, p.y * q.x);
-    let value = left - right;
-    // Both products are off by half a unit in their last place at most, and so is the difference.
-    if value.abs() > 2.0 * f64::EPSILON * (left.abs() + right.abs()) {
-        return value;
-    }
-    let (left_rest, right_rest) = (p.x.mul_add(q.y, -left), p.y.mul_add(q.x, -right));
-    value + (left_rest - right_rest)
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::noise::{Draws, Purpose};
     use rayon::prelude::*;
@@ -140,7 +145,7 @@ mod tests {
     const RAYS: u64 = 10_000_000;
 
     /// A closed mesh that can be seen whole from the origin: a divided octahedron, every vertex at a random distance.
-    fn random_star(seed: u64, divisions: u32) -> Mesh {
+    pub(in crate::cast) fn random_star(seed: u64, divisions: u32) -> Mesh {
         let mut vertices: Vec<Point3<f64>> = [
             [1.0, 0.0, 0.0],
             [-1.0, 0.0, 0.0],

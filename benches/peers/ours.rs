@@ -1,0 +1,155 @@
+//! Our side of the comparison with other ray casters: closest hits on meshes that `compare.py` made.
+//!
+//! `cargo bench --bench peers -- FOLDER MESH ENGINE RAYS THREADS SECONDS` prints one line of JSON and writes the
+//! distances beside the inputs. Engines are `beam` (so many rays as one beam), `single`, `polygons`
+//! (every triangle a polygon of a world, so many rays as one beam) and `parry` (in f64).
+#![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
+
+use catoptric::model::Pose;
+use catoptric::sim::cast::{Met, Polygon, Shape, Triangles, World};
+use catoptric::sim::footprint::Ray;
+use catoptric::sim::mesh::Mesh;
+use nalgebra::{Point3, Unit, Vector3};
+use std::fs;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+/// Numbers of a file of little-endian words.
+fn words<T>(path: &str, from: fn([u8; 4]) -> T) -> Vec<T> {
+    let bytes = fs::read(path).unwrap_or_else(|e| panic!("{path}: {e}"));
+    bytes
+        .chunks_exact(4)
+        .map(|b| from(b.try_into().unwrap()))
+        .collect()
+}
+
+fn resident_mb() -> f64 {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix("VmRSS:"));
+    line.and_then(|l| l.split_whitespace().next()?.parse::<f64>().ok())
+        .map_or(0.0, |kb| kb / 1024.0)
+}
+
+/// Casts a block of rays.
+type Caster<'a> = Box<dyn Fn(&[Ray], &mut [f64]) + Sync + 'a>;
+
+/// Seconds for all rays once, in blocks that threads take as they come.
+fn pass(cast: &Caster<'_>, rays: &[Ray], ways: &mut [f64], threads: usize) -> f64 {
+    const BLOCK: usize = 4096;
+    let next = AtomicUsize::new(0);
+    let blocks: Vec<_> = ways.chunks_mut(BLOCK).map(std::sync::Mutex::new).collect();
+    let start = Instant::now();
+    let work = || {
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            let Some(block) = blocks.get(number) else { break };
+            let mut ways = block.lock().unwrap();
+            let first = BLOCK * number;
+            cast(&rays[first..first + ways.len()], &mut ways);
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 1..threads {
+            scope.spawn(work);
+        }
+        work();
+    });
+    start.elapsed().as_secs_f64()
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    let [folder, mesh, engine, set, threads, seconds] = arguments.as_slice() else {
+        // As all benches are run at once: nothing to compare with.
+        eprintln!("benches/peers/compare.py runs this");
+        return;
+    };
+    let (threads, seconds): (usize, f64) = (threads.parse().unwrap(), seconds.parse().unwrap());
+    let floats = |name: &str| words(&format!("{folder}/{name}.f32"), f32::from_le_bytes);
+    let vertices: Vec<Point3<f64>> = floats(&format!("{mesh}.vertices"))
+        .chunks_exact(3)
+        .map(|p| Point3::new(p[0].into(), p[1].into(), p[2].into()))
+        .collect();
+    let triangles: Vec<[u32; 3]> = words(&format!("{folder}/{mesh}.triangles.u32"), u32::from_le_bytes)
+        .chunks_exact(3)
+        .map(|t| t.try_into().unwrap())
+        .collect();
+    let rays: Vec<Ray> = floats(&format!("{set}.rays"))
+        .chunks_exact(6)
+        .map(|r| Ray {
+            origin: Point3::new(r[0].into(), r[1].into(), r[2].into()),
+            // As it is in the file, so that all engines cast the same ray.
+            direction: Unit::new_unchecked(Vector3::new(r[3].into(), r[4].into(), r[5].into())),
+        })
+        .collect();
+    let mesh_data = Mesh::new(vertices.clone(), triangles.clone()).unwrap();
+    let before = resident_mb();
+    let start = Instant::now();
+    let placed = Triangles::new(&mesh_data, 1.0, &Pose::identity());
+    let build = start.elapsed().as_secs_f64();
+    let memory = resident_mb() - before;
+    let parry;
+    let way = |met: Option<Met>| met.map_or(f64::INFINITY, |m| m.distance);
+    let cast: Caster<'_> = match engine.as_str() {
+        "single" => Box::new(|rays, ways| {
+            for (ray, place) in rays.iter().zip(ways) {
+                *place = way(placed.nearest(ray));
+            }
+        }),
+        "parry" => {
+            let points = vertices
+                .iter()
+                .map(|p| parry3d::math::Vector::new(p.x, p.y, p.z))
+                .collect();
+            parry = parry3d::shape::TriMesh::new(points, triangles).unwrap();
+            Box::new(|rays, ways| {
+                use parry3d::query::RayCast;
+                let vector = |v: &Vector3<f64>| parry3d::math::Vector::new(v.x, v.y, v.z);
+                for (ray, way) in rays.iter().zip(ways) {
+                    let ray = parry3d::query::Ray::new(vector(&ray.origin.coords), vector(&ray.direction));
+                    *way = parry.cast_local_ray(&ray, 1e4, false).unwrap_or(f64::INFINITY);
+                }
+            })
+        }
+        polygons if polygons.starts_with("polygons") => {
+            let count: usize = polygons["polygons".len()..].parse().unwrap();
+            let polygon = |t: &[u32; 3]| Polygon::new(t.map(|v| vertices[v as usize]).to_vec()).unwrap();
+            let world = World::new(triangles.iter().map(|t| Shape::Polygon(polygon(t))).collect());
+            Box::new(move |rays, ways| {
+                let mut hits = vec![None; count];
+                for (rays, ways) in rays.chunks(count).zip(ways.chunks_mut(count)) {
+                    world.cast_beam(rays, None, &mut hits[..rays.len()]);
+                    for (place, hit) in ways.iter_mut().zip(&hits) {
+                        *place = hit.map_or(f64::INFINITY, |h| h.distance);
+                    }
+                }
+            })
+        }
+        beam => {
+            let count: usize = beam.strip_prefix("beam").and_then(|n| n.parse().ok()).unwrap();
+            let placed = &placed;
+            Box::new(move |rays, ways| {
+                let mut met = vec![None; count];
+                for (rays, ways) in rays.chunks(count).zip(ways.chunks_mut(count)) {
+                    placed.nearest_of_beam(rays, &mut met[..rays.len()]);
+                    for (place, met) in ways.iter_mut().zip(&met) {
+                        *place = way(*met);
+                    }
+                }
+            })
+        }
+    };
+    let mut ways = vec![f64::INFINITY; rays.len()];
+    let mut times = vec![pass(&cast, &rays, &mut ways, threads)];
+    while times.iter().sum::<f64>() < seconds {
+        times.push(pass(&cast, &rays, &mut ways, threads));
+    }
+    times.sort_by(f64::total_cmp);
+    let rate = rays.len() as f64 / times[times.len() / 2] / 1e6;
+    let bytes: Vec<u8> = ways.iter().flat_map(|way| way.to_le_bytes()).collect();
+    fs::write(format!("{folder}/{engine}.{mesh}.{set}.f64"), bytes).unwrap();
+    println!(
+        "{{\"mrays\": {rate:.3}, \"best\": {:.3}, \"build_s\": {build:.4}, \"memory_mb\": {memory:.1}}}",
+        rays.len() as f64 / times[0] / 1e6
+    );
+}

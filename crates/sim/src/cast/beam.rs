@@ -1,0 +1,381 @@
+//! A bundle of rays through the index over triangles: boxes against the bundle as a whole, triangles against its rays
+//! in lanes.
+//!
+//! A ray meets a triangle if it passes all three edges on the same side: with the corners A, B, C seen from the start,
+//! d·(B×(C−B)), d·(C×(A−C)) and d·(A×(B−A)) have one sign, and N·A/N·d is the way, N being the normal. From another
+//! start at δ an edge has (d×δ)·(B−C) on top, and the way loses N·δ/N·d. In f32 each of these has a bound on its error:
+//!
+//! - a corner is off by η = 3u(M + |O|) in each coordinate, u being half a unit in the last place, M the greatest
+//!   coordinate of the mesh and O the reference;
+//! - an edge by (4η + 20u(R + 2|δ|))(L + 4η), R being the way to the farthest corner and L the longest edge: a corner
+//!   that moves by η turns the edge seen from the start, but the ray is no farther from any corner than L if it meets
+//!   the triangle, and so d·(η×C) = η·(C×d) ≤ ηL;
+//! - N·d by 8ηL + 16uL²; below twice that nothing is known;
+//! - the way by 2((4η + 16u(R + |δ|))|N| + 16uL³)/|N·d|: moved corners move the point on the triangle, no lever is
+//!   longer than the triangle itself, and the factor 2 pays for N·d.
+//!
+//! So each ray knows an interval that holds the nearest way in f64. What is surely hit and surely nearer takes its
+//! place; whatever overlaps is decided in f64 at once ([`Judge`]); the ways themselves are found at the
+//! end.
+
+use super::bundle::{Bundle, LANES, MOST, NONE, Row, around};
+use super::exact::Judge;
+use super::lanes::{cross, dot, inlined, less, size};
+use super::triangles::Met;
+use super::wide::{Child, Leaf, ROUNDING, STACK, WIDTH, Wide};
+use super::{FARTHEST, bundle};
+use fearless_simd::{Simd, prelude::*};
+use fearless_simd::{f32x8, f32x16, u32x16};
+
+/// What a bundle has met so far.
+pub(super) struct Found {
+    /// Bounds of the nearest way.
+    low: Row<f32>,
+    high: Row<f32>,
+    pub(super) triangle: Row<u32>,
+    /// The way in f64, of rays marked as known.
+    way: Row<f64>,
+    known: [u32; MOST / LANES],
+    /// Greatest of the upper bounds.
+    limit: f32,
+}
+
+/// What the rays need to know of eight triangles, in the order of [`At`].
+type Facts = [[f32; WIDTH]; 30];
+
+/// Places of a triangle's facts.
+struct At;
+
+impl At {
+    /// B×(C−B), C×(A−C), A×(B−A).
+    const CROSSES: usize = 0;
+    /// B−C, C−A, A−B.
+    const EDGES: usize = 9;
+    const NORMAL: usize = 18;
+    /// N·A.
+    const HEIGHT: usize = 21;
+    const EDGE_ERROR: usize = 22;
+    const WAY_ERROR: usize = 23;
+    const LEAST_CLOSING: usize = 24;
+}
+
+impl Found {
+    fn new(count: usize) -> Self {
+        let mut found = Self {
+            low: Row::of(super::build::downwards(FARTHEST)),
+            high: Row::of(super::build::upwards(FARTHEST)),
+            triangle: Row::of(NONE),
+            way: Row::of(FARTHEST),
+            known: [0; MOST / LANES],
+            limit: super::build::upwards(FARTHEST),
+        };
+        // What a row is filled up with meets nothing.
+        for ray in count..count.next_multiple_of(LANES).min(MOST) {
+            found.high.set(ray, f32::NEG_INFINITY);
+        }
+        found
+    }
+
+    /// The way of a ray's present triangle.
+    fn way(&mut self, judge: &Judge<'_>, ray: usize) -> f64 {
+        let (vector, bit) = (ray / LANES, 1 << (ray % LANES));
+        let triangle = self.triangle.get(ray);
+        if triangle == NONE {
+            return FARTHEST;
+        }
+        if self.known[vector] & bit == 0 {
+            self.known[vector] |= bit;
+            // A triangle that is surely hit is.
+            let way = judge.meet(ray, triangle).unwrap_or(FARTHEST);
+            self.way.set(ray, way);
+        }
+        self.way.get(ray)
+    }
+
+    /// Decides in f64 about a triangle that a ray may meet.
+    #[cold]
+    #[inline(never)]
+    fn decide(&mut self, judge: &Judge<'_>, ray: usize, triangle: u32) {
+        let Some(way) = judge.meet(ray, triangle) else {
+            return;
+        };
+        let present = self.way(judge, ray);
+        if way < present || (way == present && triangle < self.triangle.get(ray)) {
+            self.triangle.set(ray, triangle);
+            self.way.set(ray, way);
+            self.known[ray / LANES] |= 1 << (ray % LANES);
+            let (low, high) = around(way);
+            self.low.set(ray, low);
+            self.high.set(ray, high);
+        }
+    }
+
+    /// The nearest triangle of every ray, and the distance to it.
+    #[inline(always)]
+    pub(super) fn finish<S: Simd>(&self, simd: S, judge: &Judge<'_>, met: &mut [Option<Met>]) {
+        const HALF: usize = super::exact::LANES;
+        for (number, met) in met.chunks_mut(HALF).enumerate() {
+            let first = number * HALF;
+            let (vector, start) = (first / LANES, first % LANES);
+            let mut triangles = [NONE; HALF];
+            triangles.copy_from_slice(&self.triangle.0[vector][start..start + HALF]);
+            let distances = judge.meet_each(simd, first, &triangles, NONE);
+            for (lane, met) in met.iter_mut().enumerate() {
+                let triangle = triangles[lane];
+                *met = distances[lane].map(|distance| Met { triangle, distance });
+            }
+        }
+    }
+}
+
+/// Follows a bundle through the index.
+#[inline(always)]
+pub(super) fn follow<S: Simd>(simd: S, wide: &Wide, bundle: &Bundle, judge: &Judge<'_>) -> Found {
+    let mut found = Found::new(bundle.count);
+    let mut stack = [(0.0_f32, Child::NONE); STACK];
+    stack[0] = (0.0, Child::node(0));
+    let mut height = 1;
+    while height > 0 {
+        height -= 1;
+        let (near, child) = stack[height];
+        if near > found.limit {
+            continue;
+        }
+        if child.is_leaf() {
+            leaf(
+                simd,
+                &wide.leaves[child.number()],
+                child.count(),
+                wide.reach,
+                bundle,
+                judge,
+                &mut found,
+            );
+            continue;
+        }
+        let node = &wide.nodes[child.number()];
+        let (met, near) = bundle.boxes(simd, &node.bounds, found.limit);
+        height = node.push(met, near, &mut stack, height);
+    }
+    found
+}
+
+#[inline(always)]
+fn leaf<S: Simd>(
+    simd: S,
+    leaf: &Leaf,
+    count: usize,
+    reach: f32,
+    bundle: &Bundle,
+    judge: &Judge<'_>,
+    found: &mut Found,
+) {
+    let load = inlined(
+        #[inline(always)]
+        |corner: usize, axis: usize| f32x8::simd_from(simd, leaf.corners[corner][axis]),
+    );
+    let corner = inlined(
+        #[inline(always)]
+        |corner: usize| [load(corner, 0), load(corner, 1), load(corner, 2)],
+    );
+    let corners = [corner(0), corner(1), corner(2)];
+    let mut met = bundle.triangles(simd, &corners) & ((1 << count) - 1);
+    if met == 0 {
+        return;
+    }
+    let facts = facts(simd, &corners, reach, bundle);
+    let mut changed = false;
+    while met != 0 {
+        let lane = met.trailing_zeros() as usize & 7;
+        met &= met - 1;
+        let number = leaf.triangles[lane];
+        changed |= if bundle.common {
+            triangle::<S, true>(simd, &facts, lane, number, bundle, judge, found)
+        } else {
+            triangle::<S, false>(simd, &facts, lane, number, bundle, judge, found)
+        };
+    }
+    if changed {
+        let mut limit = f32x16::splat(simd, f32::NEG_INFINITY);
+        for vector in 0..bundle.count.div_ceil(LANES) {
+            limit = limit.max(f32x16::simd_from(simd, found.high.0[vector]));
+        }
+        found.limit = limit.reduce_max();
+    }
+}
+
+#[inline(always)]
+fn facts<S: Simd>(simd: S, corners: &[[f32x8<S>; 3]; 3], reach: f32, bundle: &Bundle) -> Facts {
+    let splat = inlined(
+        #[inline(always)]
+        |x: f32| f32x8::splat(simd, x),
+    );
+    let seen = inlined(
+        #[inline(always)]
+        |corner: &[f32x8<S>; 3]| {
+            [
+                corner[0] - splat(bundle.reference[0]),
+                corner[1] - splat(bundle.reference[1]),
+                corner[2] - splat(bundle.reference[2]),
+            ]
+        },
+    );
+    let [a, b, c] = [seen(&corners[0]), seen(&corners[1]), seen(&corners[2])];
+    let (bc, ca, ab) = (less(&b, &c), less(&c, &a), less(&a, &b));
+    // (B − A)×(C − A).
+    let normal = cross(&ca, &ab);
+    let height = dot(&normal, &a);
+    let far = size(&a).max(size(&b)).max(size(&c));
+    let long = size(&bc).max(size(&ca)).max(size(&ab));
+    let eta = splat(3.0 * ROUNDING * (reach + bundle.reference_reach));
+    let spread = splat(bundle.spread);
+    let u = inlined(
+        #[inline(always)]
+        |times: f32| splat(times * ROUNDING),
+    );
+    let edge_error = spread.mul_add(u(40.0), far.mul_add(u(20.0), eta * 4.0)) * eta.mul_add(splat(4.0), long);
+    let cube = long * long * long;
+    let way_error = ((far + spread).mul_add(u(16.0), eta * 4.0)).mul_add(size(&normal), cube * u(16.0)) * 2.0;
+    let least_closing = long * (long.mul_add(u(16.0), eta * 8.0)) * 2.0;
+    let mut facts = [[0.0; WIDTH]; 30];
+    let mut put = inlined(
+        #[inline(always)]
+        |at: usize, value: f32x8<S>| value.store_slice(&mut facts[at]),
+    );
+    for (i, vector) in [cross(&bc, &b), cross(&ca, &c), cross(&ab, &a)]
+        .iter()
+        .enumerate()
+    {
+        for (k, coordinate) in vector.iter().enumerate() {
+            put(At::CROSSES + 3 * i + k, *coordinate);
+        }
+    }
+    if !bundle.common {
+        for (i, vector) in [bc, ca, ab].iter().enumerate() {
+            for (k, coordinate) in vector.iter().enumerate() {
+                put(At::EDGES + 3 * i + k, *coordinate);
+            }
+        }
+    }
+    for (k, coordinate) in normal.iter().enumerate() {
+        put(At::NORMAL + k, *coordinate);
+    }
+    put(At::HEIGHT, height);
+    put(At::EDGE_ERROR, edge_error);
+    put(At::WAY_ERROR, way_error);
+    put(At::LEAST_CLOSING, least_closing);
+    facts
+}
+
+/// One triangle and all rays; whether a ray has met it.
+#[inline(always)]
+fn triangle<S: Simd, const COMMON: bool>(
+    simd: S,
+    facts: &Facts,
+    lane: usize,
+    number: u32,
+    bundle: &Bundle,
+    judge: &Judge<'_>,
+    found: &mut Found,
+) -> bool {
+    let fact = inlined(
+        #[inline(always)]
+        |at: usize| f32x16::splat(simd, facts[at][lane]),
+    );
+    let product = inlined(
+        #[inline(always)]
+        |v: &[f32x16<S>; 3], at: usize| {
+            v[2].mul_add(fact(at + 2), v[1].mul_add(fact(at + 1), v[0] * fact(at)))
+        },
+    );
+    let more = inlined(
+        #[inline(always)]
+        |v: &[f32x16<S>; 3], at: usize, sum: f32x16<S>| {
+            v[2].mul_add(
+                fact(at + 2),
+                v[1].mul_add(fact(at + 1), v[0].mul_add(fact(at), sum)),
+            )
+        },
+    );
+    let mut changed = false;
+    for vector in 0..bundle.count.div_ceil(LANES) {
+        let load = inlined(
+            #[inline(always)]
+            |rows: &[Row<f32>; 3]| {
+                [
+                    f32x16::simd_from(simd, rows[0].0[vector]),
+                    f32x16::simd_from(simd, rows[1].0[vector]),
+                    f32x16::simd_from(simd, rows[2].0[vector]),
+                ]
+            },
+        );
+        let direction = load(&bundle.direction);
+        let edge = inlined(
+            #[inline(always)]
+            |i: usize| {
+                let about = product(&direction, At::CROSSES + 3 * i);
+                if COMMON {
+                    about
+                } else {
+                    more(&load(&bundle.moment), At::EDGES + 3 * i, about)
+                }
+            },
+        );
+        let (u, v, w) = (edge(0), edge(1), edge(2));
+        let least = u.min(v).min(w);
+        let most = u.max(v).max(w);
+        let error = fact(At::EDGE_ERROR);
+        let may = least.simd_ge(-error) | most.simd_le(error);
+        if may.to_bitmask() == 0 {
+            continue;
+        }
+        let inside = least.simd_gt(error) | most.simd_lt(-error);
+        let closing = product(&direction, At::NORMAL);
+        let height = if COMMON {
+            fact(At::HEIGHT)
+        } else {
+            fact(At::HEIGHT) - product(&load(&bundle.offset), At::NORMAL)
+        };
+        let inverse = f32x16::splat(simd, 1.0) / closing;
+        let way = height * inverse;
+        let error = fact(At::WAY_ERROR) * inverse.abs();
+        let (low, high) = (way - error, way + error);
+        let sure = closing.abs().simd_gt(fact(At::LEAST_CLOSING));
+        let (least, most) = (
+            f32x16::simd_from(simd, found.low.0[vector]),
+            f32x16::simd_from(simd, found.high.0[vector]),
+        );
+        let zero = f32x16::splat(simd, 0.0);
+        let aside = sure & (low.simd_gt(most) | high.simd_lt(zero));
+        let nearest = inside & sure & low.simd_gt(zero) & high.simd_lt(least) & most.simd_ge(zero);
+        let (may, nearest_bits) = (may.to_bitmask() & !aside.to_bitmask(), nearest.to_bitmask());
+        if nearest_bits != 0 {
+            nearest.select(low, least).store_slice(&mut found.low.0[vector]);
+            nearest.select(high, most).store_slice(&mut found.high.0[vector]);
+            let present = u32x16::simd_from(simd, found.triangle.0[vector]);
+            let number = u32x16::splat(simd, number);
+            nearest
+                .select(number, present)
+                .store_slice(&mut found.triangle.0[vector]);
+            // Sixteen lanes.
+            #[allow(clippy::cast_possible_truncation)]
+            {
+                found.known[vector] &= !(nearest_bits as u32);
+            }
+            changed = true;
+        }
+        let mut open = may & !nearest_bits;
+        while open != 0 {
+            let ray = vector * LANES + open.trailing_zeros() as usize;
+            open &= open - 1;
+            if ray < bundle.count {
+                found.decide(judge, ray, number);
+                changed = true;
+            }
+        }
+    }
+    changed
+}
+
+/// The most that a bundle can hold.
+pub(super) const MOST_RAYS: usize = bundle::MOST;

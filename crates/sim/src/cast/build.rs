@@ -1,0 +1,433 @@
+//! Building the index: from the top, by the surface area heuristic over bins.
+//!
+//! A ray meets a box with a chance that grows with the box's surface; a split is the better the less surface it leaves
+//! for how many leaves (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007). A node splits the
+//! greatest of its parts until it has eight. The order of everything is the same on any number of threads.
+
+use super::wide::{Child, Leaf, Node, ROUNDING, WIDTH, Wide};
+use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
+
+/// Levels of nodes at most: below [`SORTED`] parts are halved by number.
+pub(super) const DEEPEST: usize = 28;
+
+/// Levels of nodes before parts are halved by number whatever that costs, so that the deepest is bounded: 2²⁸ triangles
+/// are 2²⁵ leaves, nine levels more.
+const SORTED: usize = 18;
+
+const BINS: usize = 16;
+
+/// Fewest triangles that are worth a thread of their own.
+const PARALLEL: usize = 4096;
+
+/// A box in f32 that holds what it is told to.
+#[derive(Debug, Clone, Copy)]
+struct Bounds {
+    low: [f32; 4],
+    high: [f32; 4],
+}
+
+/// A triangle to be sorted into the index.
+#[derive(Debug, Clone, Copy)]
+struct Item {
+    low: [f32; 3],
+    number: u32,
+    high: [f32; 3],
+}
+
+/// Items of one part of a node, by their place in the order, with their box.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    first: usize,
+    count: usize,
+    bounds: Bounds,
+}
+
+/// For three axes the bins of items by their middles.
+#[derive(Clone, Copy)]
+struct Bins {
+    bounds: [[Bounds; BINS]; 3],
+    counts: [[u32; BINS]; 3],
+}
+
+/// How middles become bins.
+struct Scale {
+    low: [f32; 3],
+    factor: [f32; 3],
+}
+
+impl Bounds {
+    const NOTHING: Self = Self {
+        low: [f32::INFINITY; 4],
+        high: [f32::NEG_INFINITY; 4],
+    };
+
+    fn add(&mut self, other: &Self) {
+        for k in 0..4 {
+            self.low[k] = self.low[k].min(other.low[k]);
+            self.high[k] = self.high[k].max(other.high[k]);
+        }
+    }
+
+    fn with(mut self, other: &Self) -> Self {
+        self.add(other);
+        self
+    }
+
+    /// Half of its surface; nothing has none.
+    fn area(&self) -> f32 {
+        let [x, y, z, _] = std::array::from_fn::<_, 4, _>(|k| (self.high[k] - self.low[k]).max(0.0));
+        x * y + y * z + z * x
+    }
+}
+
+impl Item {
+    /// What is between two corners, among coordinates that reach so far.
+    fn new(number: usize, low: &Vector3<f64>, high: &Vector3<f64>, reach: f32) -> Self {
+        // More than the judge in f64 can be off by.
+        let slack = reach * ROUNDING;
+        Self {
+            low: std::array::from_fn(|k| downwards(low[k]) - slack),
+            // The number of a triangle is below 2²⁸.
+            #[allow(clippy::cast_possible_truncation)]
+            number: number as u32,
+            high: std::array::from_fn(|k| upwards(high[k]) + slack),
+        }
+    }
+
+    fn bounds(&self) -> Bounds {
+        let ([a, b, c], [d, e, f]) = (self.low, self.high);
+        Bounds {
+            low: [a, b, c, 0.0],
+            high: [d, e, f, 0.0],
+        }
+    }
+
+    /// Twice its middle.
+    fn middle(&self, axis: usize) -> f32 {
+        self.low[axis] + self.high[axis]
+    }
+}
+
+impl Scale {
+    fn new(items: &[Item]) -> Self {
+        let of_some = |items: &[Item]| {
+            items.iter().fold(Bounds::NOTHING, |mut all, item| {
+                let [x, y, z] = std::array::from_fn(|k| item.middle(k));
+                let middle = [x, y, z, 0.0];
+                all.add(&Bounds {
+                    low: middle,
+                    high: middle,
+                });
+                all
+            })
+        };
+        let all = over(items, of_some, |a, b| a.with(&b));
+        let (low, high) = (all.low, all.high);
+        Self {
+            low: std::array::from_fn(|k| low[k]),
+            factor: std::array::from_fn(|k| {
+                let factor = BINS as f32 * (1.0 - f32::EPSILON) / (high[k] - low[k]);
+                if factor.is_finite() { factor } else { 0.0 }
+            }),
+        }
+    }
+
+    /// Truncation of a number from 0 to the number of bins.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    fn bin(&self, item: &Item, axis: usize) -> usize {
+        (((item.middle(axis) - self.low[axis]) * self.factor[axis]) as usize).min(BINS - 1)
+    }
+}
+
+impl Bins {
+    const NOTHING: Self = Self {
+        bounds: [[Bounds::NOTHING; BINS]; 3],
+        counts: [[0; BINS]; 3],
+    };
+
+    fn of(items: &[Item], scale: &Scale) -> Self {
+        let mut bins = Self::NOTHING;
+        for item in items {
+            let bounds = item.bounds();
+            for axis in 0..3 {
+                let bin = scale.bin(item, axis);
+                bins.bounds[axis][bin].add(&bounds);
+                bins.counts[axis][bin] += 1;
+            }
+        }
+        bins
+    }
+
+    fn with(mut self, other: &Self) -> Self {
+        for axis in 0..3 {
+            for bin in 0..BINS {
+                self.bounds[axis][bin].add(&other.bounds[axis][bin]);
+                self.counts[axis][bin] += other.counts[axis][bin];
+            }
+        }
+        self
+    }
+
+    /// The axis and the first bin of the right side with the least cost, and the two boxes.
+    // A bin is a place in three lists.
+    #[allow(clippy::needless_range_loop)]
+    fn best(&self, scale: &Scale) -> Option<(usize, usize, [Bounds; 2])> {
+        let mut best = None;
+        let mut least = f32::INFINITY;
+        for axis in (0..3).filter(|axis| scale.factor[*axis] > 0.0) {
+            let mut right = [(0.0, 0, Bounds::NOTHING); BINS];
+            let (mut bounds, mut count) = (Bounds::NOTHING, 0);
+            for bin in (1..BINS).rev() {
+                bounds.add(&self.bounds[axis][bin]);
+                count += self.counts[axis][bin];
+                right[bin] = (bounds.area() * leaves(count), count, bounds);
+            }
+            let (mut bounds, mut count) = (Bounds::NOTHING, 0);
+            for bin in 1..BINS {
+                bounds.add(&self.bounds[axis][bin - 1]);
+                count += self.counts[axis][bin - 1];
+                let (cost, others, beyond) = right[bin];
+                let cost = cost + bounds.area() * leaves(count);
+                if count > 0 && others > 0 && cost < least {
+                    least = cost;
+                    best = Some((axis, bin, [bounds, beyond]));
+                }
+            }
+        }
+        best
+    }
+}
+
+/// Leaves that hold so many triangles.
+fn leaves(count: u32) -> f32 {
+    (count as usize).div_ceil(WIDTH) as f32
+}
+
+/// Something over all items, in parallel if there are many; the order of sums does not matter to the callers.
+fn over<T: Send>(items: &[Item], of_some: impl Fn(&[Item]) -> T + Sync, join: impl Fn(T, T) -> T) -> T {
+    if items.len() <= 4 * PARALLEL {
+        return of_some(items);
+    }
+    let (a, b) = items.split_at(items.len() / 2);
+    let (a, b) = rayon::join(|| of_some(a), || of_some(b));
+    join(a, b)
+}
+
+/// The index over triangles.
+pub(super) fn index(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Wide {
+    let reach = upwards(vertices.iter().fold(0.0, |reach, v| v.coords.amax().max(reach)));
+    let item = |(number, corners): (usize, &[u32; 3])| {
+        let [a, b, c] = corners.map(|v| vertices[v as usize].coords);
+        Item::new(number, &a.inf(&b).inf(&c), &a.sup(&b).sup(&c), reach)
+    };
+    let mut items: Vec<Item> = triangles.par_iter().enumerate().map(item).collect();
+    let mut nodes = sorted(&mut items, WIDTH);
+    // Leaves are named by their first item so far.
+    let mut found = Vec::new();
+    for child in nodes.iter_mut().flat_map(|node: &mut Node| &mut node.children) {
+        if child.is_leaf() {
+            let (first, count) = (child.number(), child.count());
+            *child = Child::leaf(found.len(), count);
+            found.push((first, count));
+        }
+    }
+    let leaf = |&(first, count): &(usize, usize)| {
+        let mut leaf = Leaf {
+            corners: [[[0.0; WIDTH]; 3]; 3],
+            triangles: [u32::MAX; WIDTH],
+        };
+        for (lane, item) in items[first..first + count].iter().enumerate() {
+            leaf.triangles[lane] = item.number;
+            for (corner, &vertex) in leaf.corners.iter_mut().zip(&triangles[item.number as usize]) {
+                for (row, coordinate) in corner.iter_mut().zip(vertices[vertex as usize].iter()) {
+                    row[lane] = rounded(*coordinate);
+                }
+            }
+        }
+        leaf
+    };
+    let leaves = found.par_iter().map(leaf).collect();
+    Wide { nodes, leaves, reach }
+}
+
+/// The nodes over boxes, each given by its lowest and highest corner; a leaf's number is that of its box.
+pub(super) fn over_boxes(boxes: &[(Vector3<f64>, Vector3<f64>)], reach: f32) -> Vec<Node> {
+    let item =
+        |(number, (low, high)): (usize, &(Vector3<f64>, Vector3<f64>))| Item::new(number, low, high, reach);
+    let mut items: Vec<Item> = boxes.iter().enumerate().map(item).collect();
+    let mut nodes = sorted(&mut items, 1);
+    for child in nodes.iter_mut().flat_map(|node| &mut node.children) {
+        if child.is_leaf() {
+            *child = Child::leaf(items[child.number()].number as usize, 1);
+        }
+    }
+    nodes
+}
+
+/// Sorts items, and the nodes over them; leaves of at most so many are named by their first item.
+fn sorted(items: &mut [Item], leaf: usize) -> Vec<Node> {
+    let bounds = over(
+        items,
+        |items| items.iter().fold(Bounds::NOTHING, |all, i| all.with(&i.bounds())),
+        |a, b| a.with(&b),
+    );
+    let all = Part {
+        first: 0,
+        count: items.len(),
+        bounds,
+    };
+    if items.is_empty() {
+        return vec![Node::empty()];
+    }
+    let mut nodes = Vec::new();
+    node(items, all, (0, leaf), &mut nodes);
+    nodes
+}
+
+/// Appends the node of a part and all below it; `items` are those of the part, of which a leaf has at most so many.
+fn node(items: &mut [Item], part: Part, (level, leaf): (usize, usize), nodes: &mut Vec<Node>) {
+    let mut parts = vec![part];
+    while parts.len() < WIDTH {
+        // The greatest of those that are more than a leaf.
+        let splittable = parts.iter().enumerate().filter(|(_, p)| p.count > leaf);
+        let greatest = splittable.max_by(|(_, a), (_, b)| {
+            if level < SORTED {
+                a.bounds.area().total_cmp(&b.bounds.area())
+            } else {
+                a.count.cmp(&b.count)
+            }
+        });
+        let Some((greatest, &whole)) = greatest else { break };
+        let start = whole.first - part.first;
+        let [left, right] = split(&mut items[start..start + whole.count], whole, level);
+        parts[greatest] = left;
+        parts.insert(greatest + 1, right);
+    }
+    let own = nodes.len();
+    nodes.push(Node::empty());
+    let mut rest = items;
+    let mut slices = Vec::with_capacity(parts.len());
+    for part in &parts {
+        let (slice, others) = rest.split_at_mut(part.count);
+        slices.push((slice, *part));
+        rest = others;
+    }
+    let below = |nodes: &mut Vec<Node>, slice: &mut [Item], part: Part| {
+        if part.count <= leaf {
+            return Child::leaf(part.first, part.count);
+        }
+        let number = nodes.len();
+        node(slice, part, (level + 1, leaf), nodes);
+        Child::node(number)
+    };
+    let children: Vec<Child> = if part.count > PARALLEL {
+        let branches: Vec<(Child, Vec<Node>)> = slices
+            .into_par_iter()
+            .map(|(slice, part)| {
+                let mut nodes = Vec::new();
+                (below(&mut nodes, slice, part), nodes)
+            })
+            .collect();
+        let append = |(child, branch): (Child, Vec<Node>)| {
+            let base = nodes.len();
+            let moved = |c: Child| {
+                if c.is_leaf() || c == Child::NONE {
+                    c
+                } else {
+                    Child::node(c.number() + base)
+                }
+            };
+            nodes.extend(branch.into_iter().map(|node| Node {
+                children: node.children.map(moved),
+                ..node
+            }));
+            if child.is_leaf() { child } else { Child::node(base) }
+        };
+        branches.into_iter().map(append).collect()
+    } else {
+        slices
+            .into_iter()
+            .map(|(slice, part)| below(nodes, slice, part))
+            .collect()
+    };
+    let node = &mut nodes[own];
+    for (lane, (child, part)) in children.into_iter().zip(&parts).enumerate() {
+        node.children[lane] = child;
+        for axis in 0..3 {
+            node.bounds[axis][0][lane] = part.bounds.low[axis];
+            node.bounds[axis][1][lane] = part.bounds.high[axis];
+        }
+    }
+}
+
+/// Sorts a part into two.
+fn split(items: &mut [Item], part: Part, level: usize) -> [Part; 2] {
+    let halves = |count: usize, [left, right]: [Bounds; 2]| {
+        [
+            Part {
+                first: part.first,
+                count,
+                bounds: left,
+            },
+            Part {
+                first: part.first + count,
+                count: part.count - count,
+                bounds: right,
+            },
+        ]
+    };
+    if level < SORTED {
+        let scale = Scale::new(items);
+        let bins = over(items, |items| Bins::of(items, &scale), |a, b| a.with(&b));
+        if let Some((axis, bin, bounds)) = bins.best(&scale) {
+            let count = partition(items, |item| scale.bin(item, axis) < bin);
+            return halves(count, bounds);
+        }
+    }
+    let middle = items.len() / 2;
+    let around = |items: &[Item]| items.iter().fold(Bounds::NOTHING, |all, i| all.with(&i.bounds()));
+    halves(middle, [around(&items[..middle]), around(&items[middle..])])
+}
+
+/// Brings what fits to the front and says how much that is.
+fn partition(items: &mut [Item], fits: impl Fn(&Item) -> bool) -> usize {
+    let (mut low, mut high) = (0, items.len());
+    loop {
+        while low < high && fits(&items[low]) {
+            low += 1;
+        }
+        while low < high && !fits(&items[high - 1]) {
+            high -= 1;
+        }
+        if low >= high {
+            return low;
+        }
+        items.swap(low, high - 1);
+        low += 1;
+        high -= 1;
+    }
+}
+
+/// The nearest number in f32.
+// Rounding is what it is for.
+#[allow(clippy::cast_possible_truncation)]
+pub(super) fn rounded(x: f64) -> f32 {
+    x as f32
+}
+
+/// The nearest number in f32 that is not less.
+pub(super) fn upwards(x: f64) -> f32 {
+    let near = rounded(x);
+    if f64::from(near) < x { near.next_up() } else { near }
+}
+
+/// The nearest number in f32 that is not greater.
+pub(super) fn downwards(x: f64) -> f32 {
+    let near = rounded(x);
+    if f64::from(near) > x {
+        near.next_down()
+    } else {
+        near
+    }
+}

@@ -1,0 +1,134 @@
+//! An index over triangles for lanes: eight boxes a node, up to eight triangles a leaf, each number in a row of its own.
+//!
+//! Everything is in f32 and errs outwards: a box holds its triangles whatever was rounded. What is found here is a
+//! candidate that f64 decides about.
+
+use super::build;
+use fearless_simd::f32x8;
+use fearless_simd::{Simd, prelude::*};
+use nalgebra::Point3;
+
+/// Children of a node and triangles of a leaf.
+pub(super) const WIDTH: usize = 8;
+
+/// Half a unit in the last place of 1 in f32: the relative error of one operation.
+pub(super) const ROUNDING: f32 = f32::EPSILON / 2.0;
+
+/// Most entries that a walk through the index holds: seven siblings on each of the levels that the builder allows.
+pub(super) const STACK: usize = (WIDTH - 1) * build::DEEPEST + 1;
+
+/// Eight boxes and what is in them.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub(super) struct Node {
+    /// By axis: the low sides and the high sides. A child that is none has them exchanged, far apart.
+    pub(super) bounds: [[[f32; WIDTH]; 2]; 3],
+    pub(super) children: [Child; WIDTH],
+}
+
+/// A node or a leaf by its number; a leaf also has its number of triangles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Child(u32);
+
+/// Up to eight triangles.
+#[derive(Debug, Clone, Copy)]
+#[repr(C, align(64))]
+pub(super) struct Leaf {
+    /// By corner and axis.
+    pub(super) corners: [[[f32; WIDTH]; 3]; 3],
+    /// Their numbers in the mesh.
+    pub(super) triangles: [u32; WIDTH],
+}
+
+/// The index.
+pub(super) struct Wide {
+    pub(super) nodes: Vec<Node>,
+    pub(super) leaves: Vec<Leaf>,
+    /// Greatest coordinate of a vertex, whatever its sign: the measure of all rounding.
+    pub(super) reach: f32,
+}
+
+/// Bits of a child's number.
+const NUMBER_BITS: u32 = 28;
+
+impl Child {
+    /// No child: behind a box that nothing meets.
+    pub(super) const NONE: Self = Self(0);
+
+    pub(super) fn node(number: usize) -> Self {
+        Self(narrow(number))
+    }
+
+    pub(super) fn leaf(number: usize, count: usize) -> Self {
+        debug_assert!((1..=WIDTH).contains(&count));
+        Self(1 << 31 | narrow(count - 1) << NUMBER_BITS | narrow(number))
+    }
+
+    pub(super) fn is_leaf(self) -> bool {
+        self.0 >> 31 == 1
+    }
+
+    pub(super) fn number(self) -> usize {
+        (self.0 & ((1 << NUMBER_BITS) - 1)) as usize
+    }
+
+    /// Triangles of a leaf.
+    pub(super) fn count(self) -> usize {
+        (self.0 >> NUMBER_BITS & 7) as usize + 1
+    }
+}
+
+/// A number of triangles is less than 2²⁸: their vertices alone would fill a gigabyte.
+fn narrow(number: usize) -> u32 {
+    let number = u32::try_from(number).unwrap_or(u32::MAX);
+    assert!(number < 1 << NUMBER_BITS, "more than 268 million triangles");
+    number
+}
+
+impl Node {
+    /// Without children.
+    pub(super) fn empty() -> Self {
+        // Finite, so that a product with zero is none that is not a number.
+        const FAR: f32 = 1e30;
+        Self {
+            bounds: [[[FAR; WIDTH], [-FAR; WIDTH]]; 3],
+            children: [Child::NONE; WIDTH],
+        }
+    }
+}
+
+impl Node {
+    /// Puts the children that are met on a stack, the nearest on top; the new height.
+    #[inline(always)]
+    pub(super) fn push<S: Simd>(
+        &self,
+        mut met: u32,
+        near: f32x8<S>,
+        stack: &mut [(f32, Child); STACK],
+        mut height: usize,
+    ) -> usize {
+        let mut nears = [0.0; WIDTH];
+        near.store_slice(&mut nears);
+        let bottom = height;
+        while met != 0 {
+            let lane = met.trailing_zeros() as usize & (WIDTH - 1);
+            met &= met - 1;
+            let entry = (nears[lane], self.children[lane]);
+            let mut place = height;
+            while place > bottom && stack[place - 1].0 < entry.0 {
+                stack[place] = stack[place - 1];
+                place -= 1;
+            }
+            stack[place] = entry;
+            height += 1;
+        }
+        height
+    }
+}
+
+impl Wide {
+    /// Indexes triangles over vertices, in metres.
+    pub(super) fn new(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Self {
+        build::index(vertices, triangles)
+    }
+}
