@@ -1,6 +1,7 @@
 //! In which order the messages of a stretch are written: by time, and at one time by kind.
 
 use super::messages::NS_PER_S;
+use catoptric_model::dataset::nanoseconds;
 use catoptric_model::{Pose, PoseKind, Stretch};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -23,13 +24,6 @@ pub(super) enum Event {
 
 /// The frames of the tracks that are of one time, as (track, frame).
 pub(super) type Simultaneous = Vec<(usize, usize)>;
-
-/// Whole nanoseconds of a time that was checked to be finite and not negative.
-pub(super) fn nanoseconds(seconds: f64) -> u64 {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
-    let ns = (seconds * NS_PER_S as f64).round() as u64;
-    ns
-}
 
 /// The frames of all bodies by time.
 pub(super) fn simultaneous_frames(stretch: &Stretch) -> BTreeMap<u64, Simultaneous> {

@@ -128,6 +128,17 @@ pub struct PoseLabel {
 /// Name of the rig as a motion-capture subject.
 pub const RIG_SUBJECT: &str = "rig";
 
+/// Whole nanoseconds of a time in seconds that is finite and not negative: the resolution of a recording.
+pub fn nanoseconds(seconds: f64) -> u64 {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "as is said"
+    )]
+    let ns = (seconds * 1e9).round() as u64;
+    ns
+}
+
 /// One motion-capture frame of one body, in the room frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackedFrame {

@@ -1,5 +1,6 @@
 //! A stretch in the making: chance is added scan by scan to what the sensor sees.
 
+use super::chance::ScanLuck;
 use super::{Chances, Laboratory, Returns};
 use crate::scene::EchoChoice;
 use catoptric_model::{Stretch, beam};
@@ -9,20 +10,52 @@ pub struct Recorder<'a> {
     laboratory: &'a Laboratory,
     number: usize,
     chances: Chances<'a>,
-    ranges: Vec<f64>,
-    echoes: Option<Vec<Vec<f64>>>,
+    readings: Readings,
+}
+
+/// The readings of scans in a row.
+pub(super) struct Readings {
+    pub(super) ranges: Vec<f64>,
+    pub(super) echoes: Option<Vec<Vec<f64>>>,
 }
 
 impl Laboratory {
     /// Begins to record a stretch; scan after scan is added, as many as [`Laboratory::scans_of`] says.
     pub fn recorder(&self, number: usize) -> Recorder<'_> {
-        let all_echoes = self.scene.detection.echo == EchoChoice::All;
         Recorder {
             laboratory: self,
             number,
             chances: self.chances(number),
-            ranges: Vec::with_capacity(self.planned[number].scans * beam::COUNT),
+            readings: self.readings(self.planned[number].scans),
+        }
+    }
+
+    /// Room for the readings of so many scans.
+    pub(super) fn readings(&self, scans: usize) -> Readings {
+        let all_echoes = self.scene.detection.echo == EchoChoice::All;
+        Readings {
+            ranges: Vec::with_capacity(scans * beam::COUNT),
             echoes: all_echoes.then(Vec::new),
+        }
+    }
+}
+
+impl Readings {
+    /// Adds a scan.
+    pub(super) fn add(&mut self, laboratory: &Laboratory, returns: &Returns, luck: &ScanLuck) {
+        let sensor = &laboratory.sensor;
+        let beams = returns.iter().map(Option::as_ref).enumerate();
+        match &mut self.echoes {
+            None => self
+                .ranges
+                .extend(beams.map(|(beam, found)| sensor.read(found, &luck.of(beam)))),
+            Some(echoes) => {
+                for (beam, found) in beams {
+                    let chance = luck.of(beam);
+                    self.ranges.push(sensor.read(found, &chance));
+                    echoes.push(sensor.read_all(found, &chance));
+                }
+            }
         }
     }
 }
@@ -30,31 +63,33 @@ impl Laboratory {
 impl Recorder<'_> {
     /// Adds a scan from what [`super::Sight::returns`] found for it.
     pub fn add(&mut self, returns: &Returns) {
-        let sensor = &self.laboratory.sensor;
-        // They never end.
-        let chances = self.chances.next().unwrap_or_default();
-        let readings = returns.iter().map(Option::as_ref).zip(&chances);
-        self.ranges
-            .extend(readings.clone().map(|(found, chance)| sensor.read(found, chance)));
-        if let Some(echoes) = &mut self.echoes {
-            echoes.extend(readings.map(|(found, chance)| sensor.read_all(found, chance)));
-        }
+        let luck = self.chances.next_scan();
+        self.readings.add(self.laboratory, returns, luck);
     }
 
     /// The stretch, with what motion capture saw meanwhile.
     pub fn finish(self) -> Stretch {
-        let (laboratory, number) = (self.laboratory, self.number);
-        let scan_period_s = laboratory.scene.scanner.limits().scan_period_s();
-        let start_s = laboratory.start_s(number);
-        let duration_s = laboratory.planned[number].scans as f64 * scan_period_s;
+        let frames = 0..self.laboratory.frames_of(self.number);
+        self.laboratory.stretch_of(self.number, self.readings, frames)
+    }
+}
+
+impl Laboratory {
+    /// Readings with frames and all that is noted of the stretch.
+    pub(super) fn stretch_of(
+        &self,
+        number: usize,
+        readings: Readings,
+        frames: std::ops::Range<u64>,
+    ) -> Stretch {
         Stretch {
-            label: laboratory.label(number),
-            start_s,
-            scan_period_s,
+            label: self.label(number),
+            start_s: self.start_s(number),
+            scan_period_s: self.scene.scanner.limits().scan_period_s(),
             beams: beam::COUNT,
-            ranges: self.ranges,
-            echoes: self.echoes,
-            tracks: laboratory.tracks(number, start_s, duration_s),
+            ranges: readings.ranges,
+            echoes: readings.echoes,
+            tracks: self.tracks(number, frames),
         }
     }
 }
