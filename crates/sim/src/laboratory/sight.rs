@@ -85,6 +85,11 @@ impl Sight<'_> {
         self.trajectory.is_some() || self.after.is_some()
     }
 
+    /// Whether the sensor itself moves, so that no two scans are alike.
+    pub fn flies(&self) -> bool {
+        self.trajectory.is_some()
+    }
+
     /// Whether a scan may see something else than the one before it; the first has none.
     pub fn changes_at(&self, scan: usize) -> bool {
         scan > 0 && (self.trajectory.is_some() || self.after.as_ref().is_some_and(|(from, _)| *from == scan))
