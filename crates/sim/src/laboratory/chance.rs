@@ -3,9 +3,9 @@
 //! Every draw is a function of (seed, purpose, scan, beam) alone. Correlated noise begins anew with each stretch, so
 //! that scan k of a stretch follows exactly from the innovations of its scans 0 to k and from nothing else.
 
-use super::Laboratory;
+use super::{Laboratory, Returns};
 use crate::noise::{Columns, Draws, Purpose};
-use crate::reading::Chance;
+use crate::reading::{Chance, Return};
 use crate::scene::{Correlated, ErrorModel, Scene};
 use catoptric_model::beam;
 use std::sync::Arc;
@@ -147,7 +147,9 @@ impl Luck<'_> {
     }
 
     /// Draws a scan; `states` are those of its correlated noise.
-    pub(super) fn draw(&self, scan: usize, states: &[f64], into: &mut ScanLuck) {
+    ///
+    /// With `seen`, what its beams met, only what decides of them is drawn.
+    pub(super) fn draw(&self, scan: usize, states: &[f64], seen: Option<&Returns>, into: &mut ScanLuck) {
         let (errors, row) = (&self.scene.errors, self.row(scan));
         if errors.model != ErrorModel::None {
             let time_s = self.start_s + scan as f64 * self.scene.scanner.limits().scan_period_s();
@@ -177,11 +179,20 @@ impl Luck<'_> {
                 }
             }
         }
-        if self.scene.detection.noise_over_threshold > 0.0 {
+        let sharp = self.scene.detection.noise_over_threshold == 0.0;
+        // All echoes that are sure to be detected, no draw decides.
+        if sharp || seen.is_some_and(|returns| returns.iter().flatten().all(is_sure)) {
+            into.detection.clear();
+        } else {
             into.detection
                 .draw(beam::COUNT, self.seed, Purpose::Detection, row);
         }
     }
+}
+
+/// Whether all echoes of a beam are detected whatever is drawn.
+fn is_sure(found: &Return) -> bool {
+    found.probability >= 1.0 && found.others.iter().all(|other| other.probability >= 1.0)
 }
 
 impl ScanLuck {
@@ -226,11 +237,11 @@ impl Chances<'_> {
         states
     }
 
-    /// Draws the next scan.
-    pub(super) fn next_scan(&mut self) -> &ScanLuck {
+    /// Draws the next scan; `seen` as for [`Luck::draw`].
+    pub(super) fn next_scan(&mut self, seen: Option<&Returns>) -> &ScanLuck {
         let scan = self.done;
         let states = self.step();
-        self.luck.draw(scan, &states, &mut self.scan);
+        self.luck.draw(scan, &states, seen, &mut self.scan);
         &self.scan
     }
 }
@@ -240,7 +251,7 @@ impl Iterator for Chances<'_> {
     type Item = Vec<Chance>;
 
     fn next(&mut self) -> Option<Vec<Chance>> {
-        let scan = self.next_scan();
+        let scan = self.next_scan(None);
         Some((0..beam::COUNT).map(|beam| scan.of(beam)).collect())
     }
 }

@@ -77,8 +77,9 @@ impl Laboratory {
         let mut readings = self.readings(drawn.scans.len());
         let mut scan_luck = ScanLuck::default();
         for scan in drawn.scans.clone() {
-            luck.draw(scan, drawn.states(scan), &mut scan_luck);
-            readings.add(self, returns(scan), &scan_luck);
+            let seen = returns(scan);
+            luck.draw(scan, drawn.states(scan), Some(seen), &mut scan_luck);
+            readings.add(self, seen, &scan_luck);
         }
         let frames =
             self.frames_before(number, drawn.scans.start)..self.frames_before(number, drawn.scans.end);
@@ -93,7 +94,7 @@ impl Laboratory {
     pub fn scan_chances(&self, drawn: &Drawn, scan: usize) -> Vec<Chance> {
         let mut scan_luck = ScanLuck::default();
         self.luck(drawn.number)
-            .draw(scan, drawn.states(scan), &mut scan_luck);
+            .draw(scan, drawn.states(scan), None, &mut scan_luck);
         (0..beam::COUNT).map(|beam| scan_luck.of(beam)).collect()
     }
 

@@ -63,7 +63,7 @@ impl Readings {
 impl Recorder<'_> {
     /// Adds a scan from what [`super::Sight::returns`] found for it.
     pub fn add(&mut self, returns: &Returns) {
-        let luck = self.chances.next_scan();
+        let luck = self.chances.next_scan(Some(returns));
         self.readings.add(self.laboratory, returns, luck);
     }
 

@@ -26,6 +26,11 @@ impl Columns {
         Draws::new(seed, purpose, row).rng.fill_bytes(&mut self.bytes);
     }
 
+    /// Forgets the row: there are no columns.
+    pub fn clear(&mut self) {
+        self.bytes.clear();
+    }
+
     /// Number of columns.
     pub fn len(&self) -> usize {
         self.bytes.len() / BLOCK

@@ -27,6 +27,26 @@ pub struct Chance {
     pub detection: [f64; MAX_ECHOES],
 }
 
+/// [`f64::round`] without a call into the system's library.
+fn rounded(x: f64) -> f64 {
+    /// Every number from here on is whole.
+    const WHOLE: f64 = 4_503_599_627_370_496.0;
+    if !(x.abs() < WHOLE) {
+        return x;
+    }
+    // The fraction is cut off, and what was cut off is exact.
+    #[allow(clippy::cast_possible_truncation)]
+    let whole = x as i64 as f64;
+    let rest = x - whole;
+    if rest >= 0.5 {
+        whole + 1.0
+    } else if rest <= -0.5 {
+        whole - 1.0
+    } else {
+        whole
+    }
+}
+
 impl Sensor {
     /// A reading of one scan, in metres: the beam's range with everything by chance, rounded, or a code.
     ///
@@ -81,7 +101,7 @@ impl Sensor {
         let range = white + (chance.warm_up + chance.correlated + chance.interference + chance.element);
         let step = self.errors.quantization_mm * 1e-3;
         let range = if step > 0.0 {
-            (range / step).round() * step
+            rounded(range / step) * step
         } else {
             range
         };
@@ -92,5 +112,30 @@ impl Sensor {
         } else {
             range
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_is_that_of_the_standard_library() {
+        let edges = [
+            0.0,
+            0.49999999999999994,
+            0.5,
+            1.5,
+            2.5,
+            4503599627370495.5,
+            9e15,
+            f64::INFINITY,
+        ];
+        let between = (0..100_000).map(|i| f64::from(i) * 0.0173);
+        for x in edges.into_iter().chain(between) {
+            assert_eq!(rounded(x), x.round(), "{x}");
+            assert_eq!(rounded(-x), (-x).round(), "{}", -x);
+        }
+        assert!(rounded(f64::NAN).is_nan());
     }
 }
