@@ -1,7 +1,10 @@
 //! The way of a ray: from the scanner over mirrors to whatever stops it.
 
+mod clearance;
+mod rig;
 mod setting;
 
+pub use rig::Rig;
 pub use setting::{Mirrors, Role, Setting, Target};
 
 use crate::cast::Hit;

@@ -22,7 +22,7 @@ use crate::color::{self, Paint};
 use crate::error::SimError;
 use crate::mocap::{self, Body};
 use crate::noise::{Draws, Purpose};
-use crate::optics::{Role, Target};
+use crate::optics::{Rig, Role, Target};
 use crate::placement::{self, Planned};
 use crate::reading::{Return, Sensor};
 use crate::scene::{ErrorModel, Scene};
@@ -37,6 +37,7 @@ use catoptric_model::{
 use nalgebra::{Point3, Translation3, UnitQuaternion};
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 /// Neighbouring beams whose spot is measured: the paper's triple beam.
 const SPOT_BEAMS: usize = 3;
@@ -55,6 +56,8 @@ pub struct Laboratory {
     trajectories: Vec<Trajectory>,
     /// What step 1 believes the biases to be.
     believed: RangeBias,
+    /// The ways of all sub-rays over the structure, with its mirrors and without, once they are known.
+    rigs: [OnceLock<Rig>; 2],
 }
 
 /// What a beam met during a scan, free of chance; `None` without an echo.
@@ -102,6 +105,7 @@ impl Laboratory {
             planned,
             boards,
             trajectories,
+            rigs: [OnceLock::new(), OnceLock::new()],
         };
         laboratory.check_markers()?;
         laboratory.check_mishaps()?;
