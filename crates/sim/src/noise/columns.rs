@@ -1,17 +1,13 @@
 //! All columns of a row at once: the numbers that [`Draws`] gives one by one, to the last bit.
 //!
-//! A column's words are one block of ChaCha, so that a row is one run of the stream. Deviates are made many at a time
-//! by the operations of `libm`'s logarithm and cosine in their order, with choices in place of branches, which the
-//! compiler turns into vectors. What is rare is left to `libm` itself.
+//! A column's words are one block of ChaCha, so that a row is one run of the stream.
 
 use super::{Draws, Purpose, WORDS_PER_COLUMN, standard_uniform};
+use crate::lanes::{LANES, cosine, logarithm};
 use rand::rand_core::Rng;
 
 /// Bytes of a column.
 const BLOCK: usize = 4 * WORDS_PER_COLUMN;
-
-/// Deviates that are made together.
-const LANES: usize = 8;
 
 /// The draws of all columns of a row.
 #[derive(Debug, Clone, Default)]
@@ -98,100 +94,6 @@ fn normal(first: &[f64; LANES], second: &[f64; LANES]) -> [f64; LANES] {
         return std::array::from_fn(|lane| scalar(first[lane], second[lane]));
     }
     out
-}
-
-/// `libm::log` of a positive normal number.
-#[inline(always)]
-fn logarithm(x: f64) -> f64 {
-    const LN2_HI: f64 = 6.931_471_803_691_238_164_90e-01;
-    const LN2_LO: f64 = 1.908_214_929_270_587_700_02e-10;
-    const LG: [f64; 7] = [
-        6.666_666_666_666_735_130e-01,
-        3.999_999_999_940_941_908e-01,
-        2.857_142_874_366_239_149e-01,
-        2.222_219_843_214_978_396e-01,
-        1.818_357_216_161_805_012e-01,
-        1.531_383_769_920_937_332e-01,
-        1.479_819_860_511_658_591e-01,
-    ];
-    /// High word of √½.
-    const ROOT_HALF: u64 = 0x3fe6_a09e << 32;
-    const ONE: u64 = 0x3ff0_0000 << 32;
-    let shifted = x.to_bits() + (ONE - ROOT_HALF);
-    let exponent = small(shifted >> 52) - 1023.0;
-    let mantissa = f64::from_bits((shifted & 0x000f_ffff_ffff_ffff) + ROOT_HALF);
-    let f = mantissa - 1.0;
-    let half_square = 0.5 * f * f;
-    let s = f / (2.0 + f);
-    let z = s * s;
-    let w = z * z;
-    let t1 = w * (LG[1] + w * (LG[3] + w * LG[5]));
-    let t2 = z * (LG[0] + w * (LG[2] + w * (LG[4] + w * LG[6])));
-    let r = t2 + t1;
-    s * (half_square + r) + exponent * LN2_LO - half_square + f + exponent * LN2_HI
-}
-
-/// A whole number below 2⁵² as a floating-point number.
-#[inline(always)]
-fn small(number: u64) -> f64 {
-    const UNIT: u64 = 0x4330_0000 << 32;
-    f64::from_bits(number | UNIT) - 4_503_599_627_370_496.0
-}
-
-/// `libm::cos` of a number from 0 to 2π, and whether it is so near a multiple of π/2 that `libm` takes another way.
-#[inline(always)]
-fn cosine(x: f64) -> (f64, bool) {
-    const PIO2_1: f64 = 1.570_796_326_734_125_614_17e+00;
-    const PIO2_1T: f64 = 6.077_100_506_506_192_249_32e-11;
-    /// High words up to which an argument is less than π/4, 3π/4, 5π/4 and 7π/4.
-    const UP_TO: [u64; 4] = [0x3fe9_21fb, 0x4002_d97c, 0x400f_6a7a, 0x4015_fdbc];
-    let beyond = |up_to: u64| f64::from(u8::from(x >= f64::from_bits((up_to + 1) << 32)));
-    let quarter = beyond(UP_TO[0]) + beyond(UP_TO[1]) + beyond(UP_TO[2]) + beyond(UP_TO[3]);
-    let z = x - quarter * PIO2_1;
-    let y0 = z - quarter * PIO2_1T;
-    let y1 = (z - y0) - quarter * PIO2_1T;
-    let along = kernel_cosine(y0, y1);
-    let across = kernel_sine(y0, y1);
-    let odd = (quarter == 1.0) | (quarter == 3.0);
-    let value = if odd { across } else { along };
-    let negative = (quarter == 1.0) | (quarter == 2.0);
-    let value = if negative { -value } else { value };
-    (value, (quarter > 0.0) & (y0.abs() < 1e-5))
-}
-
-#[inline(always)]
-fn kernel_cosine(x: f64, y: f64) -> f64 {
-    const C: [f64; 6] = [
-        4.166_666_666_666_660_190_37e-02,
-        -1.388_888_888_887_410_957_49e-03,
-        2.480_158_728_947_672_941_78e-05,
-        -2.755_731_435_139_066_330_35e-07,
-        2.087_572_321_298_174_827_90e-09,
-        -1.135_964_755_778_819_482_65e-11,
-    ];
-    let z = x * x;
-    let w = z * z;
-    let r = z * (C[0] + z * (C[1] + z * C[2])) + w * w * (C[3] + z * (C[4] + z * C[5]));
-    let half = 0.5 * z;
-    let w = 1.0 - half;
-    w + (((1.0 - w) - half) + (z * r - x * y))
-}
-
-#[inline(always)]
-fn kernel_sine(x: f64, y: f64) -> f64 {
-    const S: [f64; 6] = [
-        -1.666_666_666_666_663_243_48e-01,
-        8.333_333_333_322_489_461_24e-03,
-        -1.984_126_982_985_794_931_34e-04,
-        2.755_731_370_707_006_767_89e-06,
-        -2.505_076_025_340_686_341_95e-08,
-        1.589_690_995_211_550_102_21e-10,
-    ];
-    let z = x * x;
-    let w = z * z;
-    let r = S[1] + z * (S[2] + z * S[3]) + z * w * (S[4] + z * S[5]);
-    let v = z * x;
-    x - ((z * (0.5 * y - v * r) - y) - v * S[0])
 }
 
 #[cfg(test)]
