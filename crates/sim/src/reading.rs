@@ -368,9 +368,16 @@ impl Sensor {
     /// [`Sensor::illuminate`] from where the sub-rays depart from the structure.
     fn illuminate_over(&self, rig: &Rig, setting: &Setting<'_>, beam: usize, parts: &mut Parts) {
         parts.begin();
-        for (sub_ray, departure) in self.sub_rays.iter().zip(rig.departures(beam)) {
+        let departures = rig.departures(beam);
+        let (mut legs, mut met) = (std::mem::take(&mut parts.legs), std::mem::take(&mut parts.met));
+        legs.clear();
+        let leaving = departures.iter().filter(|d| matches!(d.end, End::Escaped));
+        legs.extend(leaving.map(|d| d.last));
+        setting.cast_into_room(&mut legs, &mut met);
+        let mut in_room = met.iter();
+        for (sub_ray, departure) in self.sub_rays.iter().zip(departures) {
             let beyond = match departure.end {
-                End::Escaped => setting.cast_into_room(&departure.last),
+                End::Escaped => in_room.next().copied().flatten(),
                 End::Hit(hit) => Some((hit, hit.normal)),
                 End::Trapped => None,
             };
@@ -408,6 +415,7 @@ impl Sensor {
                 parts.add((arrival.surface, facets), power, share, place, chief);
             }
         }
+        (parts.legs, parts.met) = (legs, met);
         if self.lacks_chief() {
             Self::add_chief(parts, &self.chief_path(setting, beam));
         }

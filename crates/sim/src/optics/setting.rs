@@ -237,14 +237,26 @@ impl<'a> Setting<'a> {
             .all(|e| e.is_beyond(&sensor, distance))
     }
 
-    /// The nearest surface of the room alone along a ray of the sensor frame, and the normal there in that frame.
-    pub(crate) fn cast_into_room(&self, ray: &Ray) -> Option<(Hit, Unit<Vector3<f64>>)> {
-        let room = self.contents.room.as_ref()?;
+    /// The nearest surface of the room alone along every ray of a beam, given in the sensor frame, and the normal there in
+    /// that frame. The rays are left in the frame that the room is kept in.
+    pub(crate) fn cast_into_room(&self, rays: &mut [Ray], hits: &mut Vec<Option<(Hit, Unit<Vector3<f64>>)>>) {
+        hits.clear();
+        let Some(room) = &self.contents.room else {
+            hits.resize(rays.len(), None);
+            return;
+        };
         let moved = self.start_from_sensor.as_ref();
-        let mut hit = room.cast(&moved.map_or(*ray, |pose| placed(ray, pose)), None)?;
-        hit.surface += self.contents.first_of_room;
-        let normal = moved.map_or(hit.normal, |pose| pose.inverse_transform_unit_vector(&hit.normal));
-        Some((hit, normal))
+        if let Some(pose) = moved {
+            for ray in &mut *rays {
+                *ray = placed(ray, pose);
+            }
+        }
+        hits.extend(rays.iter().map(|ray| {
+            let mut hit = room.cast(ray, None)?;
+            hit.surface += self.contents.first_of_room;
+            let normal = moved.map_or(hit.normal, |pose| pose.inverse_transform_unit_vector(&hit.normal));
+            Some((hit, normal))
+        }));
     }
 
     /// Whether a hit is on something that reflects.

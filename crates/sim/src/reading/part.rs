@@ -1,7 +1,10 @@
 //! The light of a beam by the surfaces that it reaches and the ways it goes there.
 
+use crate::cast::Hit;
 use crate::detect::Pulse;
+use crate::footprint::Ray;
 use crate::optics::MAX_BOUNCES;
+use nalgebra::{Unit, Vector3};
 
 /// The sub-rays that went one way to one surface.
 #[derive(Debug, Default)]
@@ -34,6 +37,9 @@ pub(super) struct Place {
 pub struct Parts {
     live: Vec<Part>,
     spare: Vec<Part>,
+    /// The legs that leave the structure, and what they meet.
+    pub(super) legs: Vec<Ray>,
+    pub(super) met: Vec<Option<(Hit, Unit<Vector3<f64>>)>>,
 }
 
 impl Place {
