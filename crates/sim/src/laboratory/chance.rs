@@ -3,9 +3,9 @@
 //! Every draw is a function of (seed, purpose, scan, beam) alone. Correlated noise begins anew with each stretch, so
 //! that scan k of a stretch follows exactly from the innovations of its scans 0 to k and from nothing else.
 
-use super::{Laboratory, Returns};
+use super::Laboratory;
 use crate::noise::{Columns, Draws, Purpose};
-use crate::reading::{Chance, Return};
+use crate::reading::{Chance, MAX_ECHOES};
 use crate::scene::{Correlated, ErrorModel, Scene};
 use catoptric_model::beam;
 use std::sync::Arc;
@@ -32,10 +32,15 @@ pub(super) struct ScanLuck {
     dropout: Vec<f64>,
     correlated: Vec<f64>,
     interference: Vec<f64>,
+    /// Whether echoes are detected, of all beams, or of those that were asked for.
     detection: Columns,
+    asked: Vec<(usize, [f64; MAX_ECHOES])>,
     /// Draws in the making.
     columns: Columns,
 }
+
+/// A beam is drawn by itself where fewer than this part of all is: a jump costs several columns in a row.
+const FEW: usize = 8;
 
 /// The chances of a stretch, from its first scan on.
 pub struct Chances<'a> {
@@ -148,8 +153,8 @@ impl Luck<'_> {
 
     /// Draws a scan; `states` are those of its correlated noise.
     ///
-    /// With `seen`, what its beams met, only what decides of them is drawn.
-    pub(super) fn draw(&self, scan: usize, states: &[f64], seen: Option<&Returns>, into: &mut ScanLuck) {
+    /// With `asked`, only those beams are told whether their echoes are detected.
+    pub(super) fn draw(&self, scan: usize, states: &[f64], asked: Option<&[usize]>, into: &mut ScanLuck) {
         let (errors, row) = (&self.scene.errors, self.row(scan));
         if errors.model != ErrorModel::None {
             let time_s = self.start_s + scan as f64 * self.scene.scanner.limits().scan_period_s();
@@ -179,31 +184,44 @@ impl Luck<'_> {
                 }
             }
         }
-        let sharp = self.scene.detection.noise_over_threshold == 0.0;
-        // All echoes that are sure to be detected, no draw decides.
-        if sharp || seen.is_some_and(|returns| returns.iter().flatten().all(is_sure)) {
-            into.detection.clear();
-        } else {
-            into.detection
-                .draw(beam::COUNT, self.seed, Purpose::Detection, row);
+        into.detection.clear();
+        into.asked.clear();
+        if self.scene.detection.noise_over_threshold > 0.0 {
+            match asked {
+                Some(beams) if beams.len() < beam::COUNT / FEW => {
+                    let mut draws = Draws::new(self.seed, Purpose::Detection, row);
+                    into.asked.extend(beams.iter().map(|beam| {
+                        draws.seek(*beam as u64);
+                        (*beam, std::array::from_fn(|_| draws.uniform()))
+                    }));
+                }
+                _ => into
+                    .detection
+                    .draw(beam::COUNT, self.seed, Purpose::Detection, row),
+            }
         }
     }
-}
-
-/// Whether all echoes of a beam are detected whatever is drawn.
-fn is_sure(found: &Return) -> bool {
-    found.probability >= 1.0 && found.others.iter().all(|other| other.probability >= 1.0)
 }
 
 impl ScanLuck {
     /// What is by chance in a beam's reading.
     pub(super) fn of(&self, beam: usize) -> Chance {
-        let of = |kind: &[f64]| kind.get(beam).copied().unwrap_or_default();
-        let detection = if self.detection.is_empty() {
-            Default::default()
-        } else {
-            std::array::from_fn(|echo| self.detection.uniform(beam, echo))
+        let asked = self.asked.binary_search_by_key(&beam, |(asked, _)| *asked);
+        let detection = match asked {
+            Ok(place) => self.asked[place].1,
+            Err(_) if self.detection.is_empty() => Default::default(),
+            Err(_) => std::array::from_fn(|echo| self.detection.uniform(beam, echo)),
         };
+        Chance {
+            detection,
+            ..self.but_detection(beam)
+        }
+    }
+
+    /// The same without whether its echoes are detected.
+    #[inline]
+    pub(super) fn but_detection(&self, beam: usize) -> Chance {
+        let of = |kind: &[f64]| kind.get(beam).copied().unwrap_or_default();
         Chance {
             drift: self.drift,
             element: of(&self.elements),
@@ -212,7 +230,7 @@ impl ScanLuck {
             interference: of(&self.interference),
             noise: of(&self.noise),
             dropout: of(&self.dropout),
-            detection,
+            detection: Default::default(),
         }
     }
 }
@@ -237,11 +255,11 @@ impl Chances<'_> {
         states
     }
 
-    /// Draws the next scan; `seen` as for [`Luck::draw`].
-    pub(super) fn next_scan(&mut self, seen: Option<&Returns>) -> &ScanLuck {
+    /// Draws the next scan; `asked` as for [`Luck::draw`].
+    pub(super) fn next_scan(&mut self, asked: Option<&[usize]>) -> &ScanLuck {
         let scan = self.done;
         let states = self.step();
-        self.luck.draw(scan, &states, seen, &mut self.scan);
+        self.luck.draw(scan, &states, asked, &mut self.scan);
         &self.scan
     }
 }

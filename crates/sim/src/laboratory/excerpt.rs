@@ -5,6 +5,7 @@
 //! order, which is one multiplication and one addition for a reading.
 
 use super::chance::{Memory, ScanLuck};
+use super::recorder::Digest;
 use super::{Laboratory, Returns};
 use crate::noise::Columns;
 use crate::reading::Chance;
@@ -76,10 +77,13 @@ impl Laboratory {
         let (number, luck) = (drawn.number, self.luck(drawn.number));
         let mut readings = self.readings(drawn.scans.len());
         let mut scan_luck = ScanLuck::default();
+        let mut digest: Option<Digest<'r>> = None;
         for scan in drawn.scans.clone() {
             let seen = returns(scan);
-            luck.draw(scan, drawn.states(scan), Some(seen), &mut scan_luck);
-            readings.add(self, seen, &scan_luck);
+            let known = digest.take().filter(|digest| digest.is_of(seen));
+            let digest = digest.insert(known.unwrap_or_else(|| Digest::of(seen, readings.echoes.is_some())));
+            luck.draw(scan, drawn.states(scan), Some(digest.by_chance()), &mut scan_luck);
+            readings.add(self, digest, &scan_luck);
         }
         let frames =
             self.frames_before(number, drawn.scans.start)..self.frames_before(number, drawn.scans.end);

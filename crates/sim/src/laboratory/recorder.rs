@@ -2,7 +2,9 @@
 
 use super::chance::ScanLuck;
 use super::{Chances, Laboratory, Returns};
+use crate::reading::Return;
 use crate::scene::EchoChoice;
+use catoptric_model::range::NO_RETURN;
 use catoptric_model::{Stretch, beam};
 
 /// A stretch being recorded.
@@ -40,22 +42,72 @@ impl Laboratory {
     }
 }
 
+/// What every beam met, ready to be read scan after scan.
+pub(super) struct Digest<'r> {
+    returns: &'r Returns,
+    beams: Vec<Reported>,
+    /// The beams of [`Reported::ByChance`].
+    by_chance: Vec<usize>,
+}
+
+/// What a beam reports.
+#[derive(Debug, Clone, Copy)]
+enum Reported {
+    /// No echo.
+    Nothing,
+    /// One echo, which is detected whatever is drawn: its range and the standard deviation of its noise, in metres.
+    Surely { range: f64, noise_sd: f64 },
+    /// One of several, or all, or perhaps none.
+    ByChance,
+}
+
+impl<'r> Digest<'r> {
+    /// The digest of a scan; with `all_echoes` none is simple.
+    pub(super) fn of(returns: &'r Returns, all_echoes: bool) -> Self {
+        let reported = |found: &Option<Return>| match found {
+            None => Reported::Nothing,
+            Some(found) if found.probability >= 1.0 && !all_echoes => Reported::Surely {
+                range: found.range(),
+                noise_sd: found.noise_sd,
+            },
+            Some(_) => Reported::ByChance,
+        };
+        let beams: Vec<Reported> = returns.iter().map(reported).collect();
+        let by_chance = beams.iter().enumerate();
+        let by_chance = by_chance.filter(|(_, reported)| matches!(reported, Reported::ByChance));
+        Self {
+            returns,
+            by_chance: by_chance.map(|(beam, _)| beam).collect(),
+            beams,
+        }
+    }
+
+    /// Whether it is the digest of these.
+    pub(super) fn is_of(&self, returns: &Returns) -> bool {
+        std::ptr::eq(self.returns, returns)
+    }
+
+    /// The beams whose detection is by chance.
+    pub(super) fn by_chance(&self) -> &[usize] {
+        &self.by_chance
+    }
+}
+
 impl Readings {
     /// Adds a scan.
-    pub(super) fn add(&mut self, laboratory: &Laboratory, returns: &Returns, luck: &ScanLuck) {
+    pub(super) fn add(&mut self, laboratory: &Laboratory, seen: &Digest<'_>, luck: &ScanLuck) {
         let sensor = &laboratory.sensor;
-        let beams = returns.iter().map(Option::as_ref).enumerate();
-        match &mut self.echoes {
-            None => self
-                .ranges
-                .extend(beams.map(|(beam, found)| sensor.read(found, &luck.of(beam)))),
-            Some(echoes) => {
-                for (beam, found) in beams {
-                    let chance = luck.of(beam);
-                    self.ranges.push(sensor.read(found, &chance));
-                    echoes.push(sensor.read_all(found, &chance));
-                }
+        let beams = seen.beams.iter().enumerate();
+        self.ranges.extend(beams.map(|(beam, reported)| match *reported {
+            Reported::Nothing => NO_RETURN,
+            Reported::Surely { range, noise_sd } => {
+                sensor.read_echo(range, noise_sd, &luck.but_detection(beam))
             }
+            Reported::ByChance => sensor.read(seen.returns[beam].as_ref(), &luck.of(beam)),
+        }));
+        if let Some(echoes) = &mut self.echoes {
+            let beams = seen.returns.iter().enumerate();
+            echoes.extend(beams.map(|(beam, found)| sensor.read_all(found.as_ref(), &luck.of(beam))));
         }
     }
 }
@@ -63,8 +115,9 @@ impl Readings {
 impl Recorder<'_> {
     /// Adds a scan from what [`super::Sight::returns`] found for it.
     pub fn add(&mut self, returns: &Returns) {
-        let luck = self.chances.next_scan(Some(returns));
-        self.readings.add(self.laboratory, returns, luck);
+        let digest = Digest::of(returns, self.readings.echoes.is_some());
+        let luck = self.chances.next_scan(Some(digest.by_chance()));
+        self.readings.add(self.laboratory, &digest, luck);
     }
 
     /// The stretch, with what motion capture saw meanwhile.

@@ -52,13 +52,21 @@ impl Sensor {
     ///
     /// What is no range stays none: noise never touches a code.
     pub fn read(&self, found: Option<&Return>, chance: &Chance) -> f64 {
-        use catoptric_model::range::{INVALID, NO_RETURN};
+        use catoptric_model::range::NO_RETURN;
         let detected = self.detected(found, chance).next();
-        let Some(found) = detected else { return NO_RETURN };
+        detected.map_or(NO_RETURN, |found| {
+            self.read_echo(found.range(), found.noise_sd, chance)
+        })
+    }
+
+    /// The same of an echo that is detected, by its [`Return::range`] and the standard deviation of its noise, in metres.
+    #[inline]
+    pub fn read_echo(&self, range: f64, noise_sd: f64, chance: &Chance) -> f64 {
+        use catoptric_model::range::INVALID;
         if self.errors.model != ErrorModel::None && chance.dropout < self.errors.dropout {
             return INVALID;
         }
-        self.report(found, chance)
+        self.report(range, noise_sd, chance)
     }
 
     /// All echoes of a reading that are reported, in metres, nearest first; a lost reading has none.
@@ -70,7 +78,7 @@ impl Sensor {
         }
         self.detected(found, chance)
             .take(self.limits.echoes as usize)
-            .map(|echo| self.report(echo, chance))
+            .map(|echo| self.report(echo.range(), echo.noise_sd, chance))
             .collect()
     }
 
@@ -88,16 +96,17 @@ impl Sensor {
     }
 
     /// An echo's range as it is reported, in metres, or the code of one that cannot be.
-    fn report(&self, found: &Return, chance: &Chance) -> f64 {
+    #[inline]
+    fn report(&self, range: f64, noise_sd: f64, chance: &Chance) -> f64 {
         use catoptric_model::range::{NO_RETURN, TOO_CLOSE};
         if self.errors.model == ErrorModel::None {
-            return if found.range() < self.limits.range_min_m {
+            return if range < self.limits.range_min_m {
                 TOO_CLOSE
             } else {
-                found.range()
+                range
             };
         }
-        let white = found.range() + chance.drift + found.noise_sd * chance.noise;
+        let white = range + chance.drift + noise_sd * chance.noise;
         let range = white + (chance.warm_up + chance.correlated + chance.interference + chance.element);
         let step = self.errors.quantization_mm * 1e-3;
         let range = if step > 0.0 {
