@@ -5,6 +5,7 @@ mod rig;
 mod setting;
 
 pub use rig::Rig;
+pub(crate) use setting::Met;
 pub use setting::{Mirrors, Role, Setting, Target};
 
 use crate::cast::Hit;

@@ -116,6 +116,9 @@ pub enum Mirrors {
     Removed,
 }
 
+/// What a leg beyond the structure meets, and the normal there in the sensor frame.
+pub(crate) type Met = Option<(Hit, Unit<Vector3<f64>>)>;
+
 /// A painted surface in the sensor frame: a board or a wall.
 pub struct Target {
     /// Its name.
@@ -239,7 +242,7 @@ impl<'a> Setting<'a> {
 
     /// The nearest surface of the room alone along every ray of a beam, given in the sensor frame, and the normal there in
     /// that frame. The rays are left in the frame that the room is kept in.
-    pub(crate) fn cast_into_room(&self, rays: &mut [Ray], hits: &mut Vec<Option<(Hit, Unit<Vector3<f64>>)>>) {
+    pub(crate) fn cast_into_room(&self, rays: &mut [Ray], hits: &mut Vec<Met>) {
         hits.clear();
         let Some(room) = &self.contents.room else {
             hits.resize(rays.len(), None);

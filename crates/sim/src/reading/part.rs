@@ -1,10 +1,8 @@
 //! The light of a beam by the surfaces that it reaches and the ways it goes there.
 
-use crate::cast::Hit;
 use crate::detect::Pulse;
 use crate::footprint::Ray;
-use crate::optics::MAX_BOUNCES;
-use nalgebra::{Unit, Vector3};
+use crate::optics::{MAX_BOUNCES, Met};
 
 /// The sub-rays that went one way to one surface.
 #[derive(Debug, Default)]
@@ -39,7 +37,7 @@ pub struct Parts {
     spare: Vec<Part>,
     /// The legs that leave the structure, and what they meet.
     pub(super) legs: Vec<Ray>,
-    pub(super) met: Vec<Option<(Hit, Unit<Vector3<f64>>)>>,
+    pub(super) met: Vec<Met>,
 }
 
 impl Place {

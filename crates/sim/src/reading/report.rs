@@ -31,7 +31,7 @@ pub struct Chance {
 fn rounded(x: f64) -> f64 {
     /// Every number from here on is whole.
     const WHOLE: f64 = 4_503_599_627_370_496.0;
-    if !(x.abs() < WHOLE) {
+    if x.is_nan() || x.abs() >= WHOLE {
         return x;
     }
     // The fraction is cut off, and what was cut off is exact.
