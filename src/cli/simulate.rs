@@ -220,8 +220,9 @@ pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Fig
         write_time += time;
         progress.advance(scans);
         made = next?;
-        let readings = made.iter().map(|m| m.scans.len()).sum::<usize>() * beam::COUNT;
-        figures.held = figures.held.max(readings);
+        // Those just written were there while these were made.
+        let made_now: usize = made.iter().map(|m| m.scans.len()).sum();
+        figures.held = figures.held.max((scans + made_now) * beam::COUNT);
         for m in &made {
             figures.trace_s += m.trace.as_secs_f64();
             figures.sample_s += m.sample.as_secs_f64();

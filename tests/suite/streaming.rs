@@ -232,10 +232,10 @@ fn ten_times_the_scans_are_no_more_in_memory() {
         let figures = simulate(folder.path(), "data", "static-10000", &more);
         figures["readings_held"].as_u64().unwrap()
     };
-    let few = held(400);
-    // Four excerpts of 64 scans, for two threads.
-    assert_eq!(few, 4 * 64 * 1081);
-    assert_eq!(held(4000), few);
+    let few = held(1000);
+    // Four excerpts of 64 scans that are made by two threads, and four that are written meanwhile.
+    assert_eq!(few, 8 * 64 * 1081);
+    assert_eq!(held(10_000), few);
 }
 
 #[cfg(unix)]

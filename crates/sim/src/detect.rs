@@ -47,7 +47,7 @@ pub fn walk(peak: f64, threshold: f64) -> f64 {
 
 /// Σ over the pulses of what is made of their distance, power and bell exp(−(x − r)²/2σ²), in their order.
 #[inline(always)]
-fn sum(pulses: &[Pulse], sd: f64, at: f64, term: impl Fn(f64, f64, f64) -> f64) -> f64 {
+fn sum(pulses: &[Pulse], sd: f64, at: f64, mut term: impl FnMut(f64, f64, f64) -> f64) -> f64 {
     let mut total = -0.0;
     for group in pulses.chunks(LANES) {
         let mut exponents = [0.0; LANES];

@@ -107,7 +107,7 @@ impl Path {
     }
 
     /// What the ray brought to each of them.
-    pub fn meetings(&self) -> impl Iterator<Item = Meeting> {
+    pub fn meetings(&self) -> impl Iterator<Item = Meeting> + Clone {
         self.meetings.into_iter().flatten()
     }
 

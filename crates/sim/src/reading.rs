@@ -403,16 +403,17 @@ impl Sensor {
                     range: length,
                     mirrors: self.mirrors[departure.silvered] * departure.gain,
                 };
-                let place = Place::new(length, on.cos_incidence, cosines.clone());
+                let place = (length, on.cos_incidence);
                 let (power, share) = (power::received(&self.light, &on), on.share * departure.gain);
-                parts.add((hit.surface, facets), power, share, place, chief);
+                parts.add((hit.surface, facets), power, share, place, cosines.clone(), chief);
             }
             for arrival in self.on_mirrors(setting, sub_ray, meetings.iter().copied()) {
                 let on = &arrival.on;
-                let place = Place::new(on.range, on.cos_incidence, cosines.clone().take(arrival.bounces));
+                let place = (on.range, on.cos_incidence);
+                let cosines = cosines.clone().take(arrival.bounces);
                 let (power, share) = (power::received(&self.light, on), on.share * arrival.gain);
                 let facets = &facets[..arrival.bounces];
-                parts.add((arrival.surface, facets), power, share, place, chief);
+                parts.add((arrival.surface, facets), power, share, place, cosines, chief);
             }
         }
         (parts.legs, parts.met) = (legs, met);
@@ -431,9 +432,9 @@ impl Sensor {
     fn add(&self, parts: &mut Parts, path: &Path, arrival: &Arrival, chief: bool) {
         let (on, facets) = (&arrival.on, &path.facets()[..arrival.bounces]);
         let cosines = path.meetings().take(arrival.bounces).map(|m| m.cos_incidence);
-        let place = Place::new(on.range, on.cos_incidence, cosines);
+        let place = (on.range, on.cos_incidence);
         let (power, share) = (power::received(&self.light, on), on.share * arrival.gain);
-        parts.add((arrival.surface, facets), power, share, place, chief);
+        parts.add((arrival.surface, facets), power, share, place, cosines, chief);
     }
 
     /// Lends the chief ray's range to the part it falls on, where the bundle itself holds no chief ray.

@@ -77,6 +77,22 @@ fn rounding(pulses: &[Pulse]) -> f64 {
     (16.0 + 2.0 * pulses.len() as f64) * f64::EPSILON
 }
 
+/// Height, slope, the slope's own slope by 1/σ² less the height, and the slope of all light on one side: of one reading of
+/// the sum, and not in the order of [`slope`].
+fn local(pulses: &[Pulse], sd: f64, at: f64) -> [f64; 4] {
+    let per_variance = 1.0 / (sd * sd);
+    let mut sums = [0.0; 4];
+    sum(pulses, sd, at, |distance, power, bell| {
+        let light = power * bell;
+        sums[0] += light;
+        sums[1] += distance * light;
+        sums[2] += (distance * distance * per_variance - 1.0) * light;
+        sums[3] += distance.abs() * light;
+        0.0
+    });
+    sums
+}
+
 fn cross(pulses: &[Pulse], sd: f64, (below, above): (f64, f64), level: f64) -> Option<Root> {
     let (power, moment) = pulses.iter().fold((0.0, 0.0), |(p, m), pulse| {
         (p + pulse.power, m + pulse.power * pulse.range)
@@ -84,8 +100,8 @@ fn cross(pulses: &[Pulse], sd: f64, (below, above): (f64, f64), level: f64) -> O
     let closed = moment / power - sd * super::walk(power, level);
     let mut at = closed.clamp(below, above);
     for _ in 0..STEPS {
-        let (w, dw) = (height(pulses, sd, at), slope(pulses, sd, at));
-        if !(w > 0.0 && dw > 0.0) {
+        let [w, dw, ..] = local(pulses, sd, at);
+        if w <= 0.0 || dw <= 0.0 {
             return None;
         }
         let (lift, rate) = (libm::log(w / level), dw / w);
@@ -129,14 +145,7 @@ fn turn(pulses: &[Pulse], sd: f64, (from, to): (f64, f64)) -> Option<Root> {
         0.5 * (from + to)
     };
     for _ in 0..STEPS {
-        let first = slope(pulses, sd, at);
-        // d/dx of the same; by 1/σ² less the height.
-        let second = sum(pulses, sd, at, |distance, power, bell| {
-            (distance * distance / (sd * sd) - 1.0) * power * bell
-        });
-        let size = sum(pulses, sd, at, |distance, power, bell| {
-            distance.abs() * power * bell
-        });
+        let [_, first, second, size] = local(pulses, sd, at);
         let step = -first / second;
         at += step;
         if !(from..=to).contains(&at) {

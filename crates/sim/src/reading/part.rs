@@ -26,8 +26,6 @@ pub(super) struct Place {
     pub(super) cos_incidence: f64,
     /// Cosine of the incidence on each of the facets before.
     pub(super) facets: [f64; MAX_BOUNCES],
-    /// How many these are.
-    count: usize,
 }
 
 /// The parts of one beam after another; what one needed in memory the next one uses.
@@ -50,16 +48,14 @@ impl Place {
         };
         for (own, cos) in place.facets.iter_mut().zip(cosines) {
             *own = cos;
-            place.count += 1;
         }
         place
     }
 
     /// Adds another with a weight.
-    fn add(&mut self, weight: f64, other: &Self) {
-        self.range += weight * other.range;
-        self.cos_incidence += weight * other.cos_incidence;
-        let cosines = other.facets[..other.count].iter();
+    fn add(&mut self, weight: f64, range: f64, cos_incidence: f64, cosines: impl Iterator<Item = f64>) {
+        self.range += weight * range;
+        self.cos_incidence += weight * cos_incidence;
         for (sum, cos) in self.facets.iter_mut().zip(cosines) {
             *sum += weight * cos;
         }
@@ -116,13 +112,15 @@ impl Parts {
         self.live.iter_mut().find(|p| p.went(surface, facets))
     }
 
-    /// Adds light that reaches a surface; `share` is that of the beam's energy.
+    /// Adds light that reaches a surface at a range under an incidence, after incidences on facets; `share` is that of the
+    /// beam's energy.
     pub(super) fn add(
         &mut self,
         (surface, facets): (usize, &[usize]),
         power: f64,
         share: f64,
-        place: Place,
+        (range, cos_incidence): (f64, f64),
+        cosines: impl Iterator<Item = f64> + Clone,
         chief: bool,
     ) {
         let known = self.live.iter().position(|p| p.went(surface, facets));
@@ -133,13 +131,12 @@ impl Parts {
             self.live.len() - 1
         });
         let part = &mut self.live[index];
-        let range = place.range;
         part.pulses.push(Pulse { range, power });
         part.share += share;
         part.power += power;
-        part.mean.add(power, &place);
+        part.mean.add(power, range, cos_incidence, cosines.clone());
         if chief {
-            part.chief = Some(place);
+            part.chief = Some(Place::new(range, cos_incidence, cosines));
         }
     }
 
