@@ -1,12 +1,20 @@
-//! How long each stage of the main job takes: tracing a pose, drawing its scans, calibrating.
+//! How long each stage of the main job takes: compiling a rig, tracing, detecting, drawing, writing, calibrating.
 //!
 //! Compare two versions with criterion's `--save-baseline` and `--baseline`; absolute times depend on the machine.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use catoptric::calib::{self, Method, Options};
+use catoptric::io::RecordingWriter;
 use catoptric::model::beam;
+use catoptric::sim::detect::{self, Pulse};
+use catoptric::sim::noise::{Columns, Purpose};
+use catoptric::sim::optics::{Mirrors, Setting};
+use catoptric::sim::reading::Sensor;
+use catoptric::sim::structure::Structure;
 use catoptric::sim::{Laboratory, Scene};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use std::hint::black_box;
+use std::path::Path;
 
 fn prototype() -> Scene {
     toml::from_str(include_str!("../scenes/prototype.toml")).unwrap()
@@ -31,6 +39,107 @@ fn simulate(c: &mut Criterion) {
     group.finish();
 }
 
+/// The structure's part in all ways, once for a laboratory.
+fn compile(c: &mut Criterion) {
+    let scene = prototype();
+    let sensor = Sensor::new(&scene).unwrap();
+    let structure = Structure::as_built(&scene, 1).unwrap();
+    let bare = Setting::new(&scene, &structure, Mirrors::Attached, Vec::new()).unwrap();
+    let mut group = c.benchmark_group("compile");
+    group.throughput(Throughput::Elements((beam::COUNT * sensor.sub_rays()) as u64));
+    group.bench_function("rig of the prototype, sub-rays", |b| {
+        b.iter(|| sensor.compile(&bare))
+    });
+    group.finish();
+}
+
+/// A scan in flight: every beam from another place, nothing kept but the rig.
+fn fly(c: &mut Criterion) {
+    let mut scene = prototype();
+    scene.flight.push(toml::from_str(FLIGHT).unwrap());
+    let laboratory = Laboratory::new(&scene, 1).unwrap();
+    let sight = laboratory.sight(laboratory.stretches() - 1).unwrap();
+    let mut group = c.benchmark_group("fly");
+    group.throughput(Throughput::Elements((beam::COUNT * laboratory.sub_rays()) as u64));
+    group.bench_function("trace and detect a scan, sub-rays", |b| {
+        b.iter(|| sight.returns(20))
+    });
+    group.finish();
+}
+
+const FLIGHT: &str = r#"
+name = "bench"
+waypoint = [
+    { time_s = 0, position_m = [0, 0, 1.6] },
+    { time_s = 1, position_m = [0.5, 0.3, 1.7], yaw_deg = 15, roll_deg = 5 },
+]
+"#;
+
+/// A beam on one slanted plane, and one that an edge cuts.
+fn detection(c: &mut Criterion) {
+    let beam = |apart: f64| -> Vec<Pulse> {
+        let range = |i: u32| 2.0 + 0.001 * f64::from(i) + if i > 9 { apart } else { 0.0 };
+        (0..19)
+            .map(|i| Pulse {
+                range: range(i),
+                power: 1.0,
+            })
+            .collect()
+    };
+    let mut group = c.benchmark_group("detect");
+    group.throughput(Throughput::Elements(1));
+    for (name, apart) in [
+        ("one plane, beams", 0.0),
+        ("mixed, beams", 0.2),
+        ("two echoes, beams", 1.5),
+    ] {
+        let pulses = beam(apart);
+        group.bench_function(name, |b| {
+            b.iter(|| detect::leading_edge(black_box(&pulses), 0.25, 2.0))
+        });
+    }
+    group.finish();
+}
+
+fn noise(c: &mut Criterion) {
+    let mut columns = Columns::default();
+    let mut normals = Vec::new();
+    let mut group = c.benchmark_group("noise");
+    group.throughput(Throughput::Elements(beam::COUNT as u64));
+    group.bench_function("normal deviates of a scan", |b| {
+        b.iter(|| {
+            columns.draw(beam::COUNT, 1, Purpose::Reading, black_box(7));
+            columns.normals(0, &mut normals);
+        });
+    });
+    let laboratory = Laboratory::new(&prototype(), 1).unwrap();
+    let returns = laboratory.returns(FACET_STRETCH).unwrap();
+    let first_seen = laboratory.first_seen(FACET_STRETCH);
+    let drawn = laboratory.draw(FACET_STRETCH, 0..64);
+    group.throughput(Throughput::Elements(64 * beam::COUNT as u64));
+    group.bench_function("readings of 64 scans", |b| {
+        b.iter(|| laboratory.excerpt(&drawn, &first_seen, |_| &returns));
+    });
+    group.finish();
+}
+
+/// Into memory: encoding on one thread, chunks compressed on all.
+fn write(c: &mut Criterion) {
+    let laboratory = Laboratory::new(&prototype(), 1).unwrap();
+    let session = laboratory.session().unwrap();
+    let stretch = laboratory.stretch(FACET_STRETCH).unwrap();
+    let mut group = c.benchmark_group("write");
+    group.throughput(Throughput::Elements(stretch.ranges.len() as u64));
+    group.bench_function("a stretch, readings", |b| {
+        b.iter(|| {
+            let mut writer = RecordingWriter::create(Vec::new(), Path::new("bench.mcap"), &session).unwrap();
+            writer.write_stretch(&stretch).unwrap();
+            writer.finish().unwrap()
+        });
+    });
+    group.finish();
+}
+
 fn calibrate(c: &mut Criterion) {
     let dataset = Laboratory::new(&prototype(), 1).unwrap().dataset().unwrap();
     let mut group = c.benchmark_group("calibrate");
@@ -45,5 +154,5 @@ fn calibrate(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(stages, simulate, calibrate);
+criterion_group!(stages, compile, simulate, fly, detection, noise, write, calibrate);
 criterion_main!(stages);

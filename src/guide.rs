@@ -14,6 +14,7 @@
 //! 12. [`layouts`]: what a mirror layout sees, loses and allows, and files for making it
 //! 14. [`gallery`]: four layouts to start from, what they show and how well they calibrate
 //! 15. [`tolerances`]: what manufacturing errors do, and what a calibration leaves of them
+//! 16. [`performance`]: what a simulation costs, what it grows with, where the time goes
 //!
 //! The chapters are Markdown files in `docs/guide/`; their Rust examples are run by the tests.
 
@@ -67,3 +68,6 @@ pub mod gallery {}
 
 #[doc = include_str!("../docs/guide/15-tolerances.md")]
 pub mod tolerances {}
+
+#[doc = include_str!("../docs/guide/16-performance.md")]
+pub mod performance {}

@@ -22,6 +22,7 @@ mod report;
 mod schema;
 mod score;
 mod simulate;
+mod stream;
 mod study;
 mod sub_rays;
 mod tolerance;

@@ -5,22 +5,18 @@ use super::error::CliError;
 use super::interrupt;
 use super::output::{counted, print, quoted};
 use super::progress::Progress;
+use super::stream::{Made, Stream, Table};
 use super::sub_rays;
-use super::truth_tables::{READINGS_HEADER, RETURNS_HEADER, Rows, reading_rows, return_rows, sub_ray_rows};
+use super::truth_tables::{READINGS_HEADER, RETURNS_HEADER};
+use catoptric::io::folder::StagedFile;
 use catoptric::io::{self, DatasetWriter, IoError, Provenance, dataset, scene};
-use catoptric::model::{Stretch, beam};
-use catoptric::sim::laboratory::{Returns, Sight};
-use catoptric::sim::{Laboratory, Scene, SimError, noise};
+use catoptric::model::beam;
+use catoptric::sim::{Laboratory, Scene, noise};
 use clap::Args;
-use rayon::prelude::*;
 use serde::Serialize;
-use std::borrow::Cow;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-
-/// Stretches in flight for every thread: enough that none waits for the writer, few enough to stay in memory.
-const WINDOW_PER_THREAD: usize = 2;
 
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]
@@ -68,7 +64,11 @@ pub(crate) struct Figures {
     /// Summed over threads, as is `sample_s`.
     pub(crate) trace_s: f64,
     pub(crate) sample_s: f64,
+    /// Encoding, summed over threads, and writing.
     pub(crate) write_s: f64,
+    /// Most readings in memory at a time, on their way from the sensor to the file.
+    #[serde(rename = "readings_held")]
+    pub(crate) held: usize,
     pub(crate) bytes: u64,
     pub(crate) threads: usize,
 }
@@ -150,7 +150,7 @@ fn command_line(arguments: &Arguments, seed: u64) -> String {
     line
 }
 
-/// Simulates an experiment and writes its dataset: stretches are computed in parallel and written in order.
+/// Simulates an experiment and writes its dataset: excerpts are made in parallel and written in order.
 pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Figures, CliError> {
     let begin = Instant::now();
     let laboratory = Laboratory::new(recording.scene, recording.scene.seed)?;
@@ -164,12 +164,6 @@ pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Fig
         ..Figures::default()
     };
     let mut write_time = Duration::ZERO;
-    let mut timed = |work: &mut dyn FnMut() -> Result<(), CliError>| {
-        let begin = Instant::now();
-        let result = work();
-        write_time += begin.elapsed();
-        result
-    };
     let mut writer = DatasetWriter::create(recording.out, recording.replace, &session)?;
     if !recording.blind {
         let (kept, meshes) = scene::kept(recording.scene);
@@ -182,24 +176,24 @@ pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Fig
         writer.write_truth(&truth)?;
     }
     let mut tables = Vec::new();
-    for (wanted, name, header, rows) in [
+    for (wanted, name, header, kind) in [
         (
             recording.returns,
             dataset::RETURNS,
             RETURNS_HEADER,
-            return_rows as Rows,
+            Table::Returns,
         ),
         (
             recording.readings,
             dataset::READINGS,
             READINGS_HEADER,
-            reading_rows,
+            Table::Readings,
         ),
         (
             recording.sub_rays,
             dataset::SUB_RAYS,
             sub_rays::HEADER,
-            sub_ray_rows,
+            Table::SubRays,
         ),
     ] {
         if wanted {
@@ -207,33 +201,37 @@ pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Fig
             let path = recording.out.join(name);
             file.write_all(header.as_bytes())
                 .map_err(|e| IoError::write(&path, e))?;
-            tables.push((file, path, rows));
+            tables.push((file, path, kind));
         }
     }
-    let mut progress = Progress::new(context, "simulating", laboratory.stretches());
-    let all: Vec<usize> = (0..laboratory.stretches()).collect();
-    for window in all.chunks(WINDOW_PER_THREAD * figures.threads) {
+    let wanted: Vec<Table> = tables.iter().map(|(_, _, kind)| *kind).collect();
+    let encoder = writer.encoder();
+    let mut stream = Stream::new(&laboratory, &encoder, wanted);
+    let mut progress = Progress::new(context, "simulating", figures.scans);
+    let mut made: Vec<Made<'_>> = Vec::new();
+    loop {
         interrupt::check()?;
-        let recorded: Vec<Recorded<'_>> = window
-            .par_iter()
-            .map(|number| Recorded::of(&laboratory, *number))
-            .collect::<Result<_, SimError>>()?;
-        for (number, recorded) in window.iter().zip(&recorded) {
-            figures.trace_s += recorded.trace.as_secs_f64();
-            figures.sample_s += recorded.sample.as_secs_f64();
-            figures.segments += figures.sub_rays * recorded.segments;
-            timed(&mut || {
-                writer.write_stretch(&recorded.stretch)?;
-                for (file, path, rows) in &mut tables {
-                    rows(&laboratory, *number, recorded, &mut |text| {
-                        file.write_all(text.as_bytes())
-                            .map_err(|e| IoError::write(path.as_path(), e).into())
-                    })?;
-                }
-                Ok(())
-            })?;
+        // What was made is written while the next is made.
+        let (written, next) = rayon::join(
+            || write(&mut writer, &mut tables, &laboratory, made),
+            || stream.next(figures.threads),
+        );
+        let (scans, time) = written?;
+        write_time += time;
+        progress.advance(scans);
+        made = next?;
+        // Those just written were there while these were made.
+        let made_now: usize = made.iter().map(|m| m.scans.len()).sum();
+        figures.held = figures.held.max((scans + made_now) * beam::COUNT);
+        for m in &made {
+            figures.trace_s += m.trace.as_secs_f64();
+            figures.sample_s += m.sample.as_secs_f64();
+            write_time += m.encode;
+            figures.segments += figures.sub_rays * m.segments;
         }
-        progress.advance(window.len());
+        if made.is_empty() {
+            break;
+        }
     }
     drop(progress);
     interrupt::check()?;
@@ -260,61 +258,34 @@ pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Fig
     Ok(figures)
 }
 
-/// A stretch, what it was made from, and how long that took.
-pub(super) struct Recorded<'a> {
-    pub(super) sight: Sight<'a>,
-    /// What every beam met; of a flight, during its first scan: all of it would not fit into memory.
-    pub(super) first: Returns,
-    pub(super) stretch: Stretch,
-    segments: usize,
-    trace: Duration,
-    sample: Duration,
-}
+/// A table of the truth that is written row by row: the file, its name in errors, and what it lists.
+type TableFile = (StagedFile, PathBuf, Table);
 
-impl<'a> Recorded<'a> {
-    fn of(laboratory: &'a Laboratory, number: usize) -> Result<Self, SimError> {
-        let begin = Instant::now();
-        let sight = laboratory.sight(number)?;
-        let first = sight.returns(0);
-        let mut trace = begin.elapsed();
-        let mut segments = segments_of(&first);
-        let mut recorder = laboratory.recorder(number);
-        recorder.add(&first);
-        // What is seen once something has moved.
-        let mut latest = None;
-        for scan in 1..laboratory.scans_of(number) {
-            if sight.changes_at(scan) {
-                let begin = Instant::now();
-                latest = Some(sight.returns(scan));
-                trace += begin.elapsed();
-                segments += latest.as_ref().map_or(0, segments_of);
+/// Writes what was made, in order; how many scans these were, and how long it took.
+fn write(
+    writer: &mut DatasetWriter,
+    tables: &mut [TableFile],
+    laboratory: &Laboratory,
+    made: Vec<Made<'_>>,
+) -> Result<(usize, Duration), CliError> {
+    let begin = Instant::now();
+    let scans = made.iter().map(|m| m.scans.len()).sum();
+    for m in &made {
+        let mut texts = m.texts.iter();
+        for (file, path, kind) in &mut *tables {
+            let mut tell = |text: &str| {
+                let written = file.write_all(text.as_bytes());
+                written.map_err(|e| IoError::write(path.as_path(), e).into())
+            };
+            match kind {
+                // Too large to be kept: made where it is written.
+                Table::SubRays => {
+                    sub_rays::rows(laboratory, m.number, m.scans.clone(), m.sight(), &mut tell)?
+                }
+                _ => texts.next().map_or(Ok(()), |text| tell(text))?,
             }
-            recorder.add(latest.as_ref().unwrap_or(&first));
-        }
-        Ok(Self {
-            sight,
-            first,
-            stretch: recorder.finish(),
-            segments,
-            trace,
-            sample: begin.elapsed() - trace,
-        })
-    }
-
-    /// What every beam met during a scan; those of a flight are traced again.
-    pub(super) fn returns(&self, scan: usize) -> Cow<'_, Returns> {
-        if self.sight.moves() && scan > 0 {
-            Cow::Owned(self.sight.returns(scan))
-        } else {
-            Cow::Borrowed(&self.first)
         }
     }
-}
-
-fn segments_of(returns: &Returns) -> usize {
-    let pieces = |r: &Option<_>| {
-        r.as_ref()
-            .map_or(1, |r: &catoptric::sim::reading::Return| r.facets.len() + 1)
-    };
-    returns.iter().map(pieces).sum()
+    writer.append(made.into_iter().map(|m| m.encoded).collect())?;
+    Ok((scans, begin.elapsed()))
 }

@@ -8,6 +8,7 @@ use catoptric::sim::laboratory::Sight;
 use catoptric::sim::optics::Setting;
 use catoptric::sim::reading::{Stop, SubRayEnd, SubRayLight};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// First line of the table. `scan` is empty where a row holds for every scan of its pose; `weight` is the sub-ray's, over
 /// rows of `light` "beam" it sums to one; power is received from `name`, the point is in the sensor frame.
@@ -17,18 +18,21 @@ pub(crate) const HEADER: &str = "pose,scan,beam,sub_ray,wide,narrow,weight,light
 /// Beams whose rows are in memory at a time.
 const BEAMS_AT_ONCE: usize = 64;
 
-/// Tells the rows of a stretch, of a flight scan by scan.
+/// Tells the rows of some scans of a stretch; where nothing moves, those of the first are the rows of all.
 pub(crate) fn rows(
     laboratory: &Laboratory,
     pose: usize,
+    mut scans: Range<usize>,
     sight: &Sight<'_>,
     tell: Tell<'_>,
 ) -> Result<(), CliError> {
     if !sight.moves() {
-        return rows_of_scan(laboratory, pose, sight, None, tell);
+        return match scans.start {
+            0 => rows_of_scan(laboratory, pose, sight, None, tell),
+            _ => Ok(()),
+        };
     }
-    (0..laboratory.scans_of(pose))
-        .try_for_each(|scan| rows_of_scan(laboratory, pose, sight, Some(scan), tell))
+    scans.try_for_each(|scan| rows_of_scan(laboratory, pose, sight, Some(scan), tell))
 }
 
 /// Tells the rows of a scan, or of a stretch whose scans are all alike.

@@ -1,17 +1,12 @@
 //! The tables of the truth: what every beam met, and every error of every reading.
 
 use super::error::CliError;
-use super::simulate::Recorded;
-use super::sub_rays;
-use catoptric::model::beam;
 use catoptric::sim::laboratory::Returns;
 use catoptric::sim::optics::Role;
-use catoptric::sim::reading::Return;
+use catoptric::sim::reading::{Chance, Return};
 use catoptric::sim::scene::ErrorModel;
 use catoptric::sim::{Laboratory, Scene};
-
-/// Tells the rows of one stretch in a table of the truth, as many at a time as fit in memory well.
-pub(super) type Rows = fn(&Laboratory, usize, &Recorded<'_>, Tell<'_>) -> Result<(), CliError>;
+use std::fmt::Write as _;
 
 /// Takes rows on.
 pub(crate) type Tell<'a> = &'a mut dyn FnMut(&str) -> Result<(), CliError>;
@@ -52,23 +47,8 @@ pub(crate) fn way(names: &[&str], facets: &[usize]) -> String {
     field(&facets.join(">"))
 }
 
-pub(super) fn return_rows(
-    laboratory: &Laboratory,
-    pose: usize,
-    recorded: &Recorded<'_>,
-    tell: Tell<'_>,
-) -> Result<(), CliError> {
-    if !recorded.sight.moves() {
-        return tell(&rows_of_returns(laboratory, pose, &recorded.first, ""));
-    }
-    for scan in 0..laboratory.scans_of(pose) {
-        let returns = recorded.returns(scan);
-        tell(&rows_of_returns(laboratory, pose, &returns, &scan.to_string()))?;
-    }
-    Ok(())
-}
-
-fn rows_of_returns(laboratory: &Laboratory, pose: usize, returns: &Returns, scan: &str) -> String {
+/// The rows of what every beam met; `scan` is empty where they hold for every scan.
+pub(super) fn rows_of_returns(laboratory: &Laboratory, pose: usize, returns: &Returns, scan: &str) -> String {
     let names = mirror_names(laboratory.scene());
     let mut text = String::new();
     let echoes = returns.iter().enumerate().flat_map(|(beam, found)| {
@@ -102,44 +82,34 @@ fn rows_of_returns(laboratory: &Laboratory, pose: usize, returns: &Returns, scan
 pub(super) const READINGS_HEADER: &str =
     "pose,scan,beam,echo,lost,drift_m,warm_up_m,noise_m,correlated_m,interference_m,reading_m,element_m\n";
 
-pub(super) fn reading_rows(
+/// The rows of a scan from what it saw, what was by chance in it, and what was read.
+pub(super) fn rows_of_readings(
     laboratory: &Laboratory,
-    pose: usize,
-    recorded: &Recorded<'_>,
-    tell: Tell<'_>,
-) -> Result<(), CliError> {
+    (pose, scan): (usize, usize),
+    returns: &Returns,
+    chances: &[Chance],
+    readings: &[f64],
+) -> String {
     let errors = &laboratory.scene().errors;
     let dropout = match errors.model {
         ErrorModel::None => 0.0,
         _ => errors.dropout,
     };
-    let scans = recorded.stretch.ranges.chunks(beam::COUNT);
-    for (scan, (readings, chances)) in scans.zip(laboratory.chances(pose)).enumerate() {
-        let returns = recorded.returns(scan);
-        let mut text = String::new();
-        let beams = returns.iter().zip(&chances).zip(readings).enumerate();
-        for (beam, ((found, chance), reading)) in beams {
-            let mut echoes = found.iter().flat_map(Return::echoes).zip(chance.detection);
-            let detected = echoes.position(|(echo, chance)| chance < echo.probability);
-            let noise_sd = found.as_ref().zip(detected).and_then(|(r, k)| r.echoes().nth(k));
-            let noise = noise_sd.map_or(0.0, |echo| echo.noise_sd * chance.noise);
-            let echo = detected.map_or(String::new(), |k| k.to_string());
-            let lost = u8::from(detected.is_some() && chance.dropout < dropout);
-            text.push_str(&format!(
-                "{pose},{scan},{beam},{echo},{lost},{},{},{noise},{},{},{reading},{}\n",
-                chance.drift, chance.warm_up, chance.correlated, chance.interference, chance.element,
-            ));
-        }
-        tell(&text)?;
+    let mut text = String::new();
+    let beams = returns.iter().zip(chances).zip(readings).enumerate();
+    for (beam, ((found, chance), reading)) in beams {
+        let mut echoes = found.iter().flat_map(Return::echoes).zip(chance.detection);
+        let detected = echoes.position(|(echo, chance)| chance < echo.probability);
+        let noise_sd = found.as_ref().zip(detected).and_then(|(r, k)| r.echoes().nth(k));
+        let noise = noise_sd.map_or(0.0, |echo| echo.noise_sd * chance.noise);
+        let echo = detected.map_or(String::new(), |k| k.to_string());
+        let lost = u8::from(detected.is_some() && chance.dropout < dropout);
+        // Writing to a string never fails.
+        let _ = writeln!(
+            text,
+            "{pose},{scan},{beam},{echo},{lost},{},{},{noise},{},{},{reading},{}",
+            chance.drift, chance.warm_up, chance.correlated, chance.interference, chance.element,
+        );
     }
-    Ok(())
-}
-
-pub(super) fn sub_ray_rows(
-    laboratory: &Laboratory,
-    pose: usize,
-    recorded: &Recorded<'_>,
-    tell: Tell<'_>,
-) -> Result<(), CliError> {
-    sub_rays::rows(laboratory, pose, &recorded.sight, tell)
+    text
 }

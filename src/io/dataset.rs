@@ -15,13 +15,14 @@ use super::file::{sha256, sha256_file, to_json};
 use super::folder::{Occupant, StagedFile, StagedFolder, list};
 use super::manifest::{Manifest, Provenance};
 use super::playback::parse_recording;
-use super::recording::RecordingWriter;
+use super::recording::{Encoded, RecordingEncoder, RecordingWriter};
 use catoptric_model::{Dataset, Session, Stretch, session};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Name of the manifest in a dataset.
 pub const MANIFEST: &str = "manifest.json";
@@ -72,6 +73,19 @@ impl DatasetWriter {
     /// [`IoError`] as [`RecordingWriter::write_stretch`].
     pub fn write_stretch(&mut self, stretch: &Stretch) -> Result<(), IoError> {
         self.recording.write_stretch(stretch)
+    }
+
+    /// What turns stretches into messages for [`append`](Self::append), on any thread.
+    pub fn encoder(&self) -> Arc<RecordingEncoder> {
+        self.recording.encoder()
+    }
+
+    /// Appends what was encoded, in order.
+    ///
+    /// # Errors
+    /// [`IoError`] as [`RecordingWriter::append`].
+    pub fn append(&mut self, encoded: Vec<Encoded>) -> Result<(), IoError> {
+        self.recording.append(encoded)
     }
 
     /// Writes the resolved scene.

@@ -20,6 +20,9 @@ pub const NS_PER_S: u64 = 1_000_000_000;
 /// A marker that is identified by name and by index (`USE_BOTH`).
 const NAME_AND_INDEX: i8 = 2;
 
+/// Where the number of the frame stands in a message of markers.
+pub(super) const FRAME_NUMBER: std::ops::Range<usize> = 24..28;
+
 /// The data type of a `PointField` of 32-bit numbers (`FLOAT32`).
 const FLOAT32: u8 = 7;
 
@@ -130,10 +133,7 @@ fn write_scan_sheet(cdr: &mut CdrWriter, stamp: u64, scanner: &ScannerSheet, per
 }
 
 fn write_singles(cdr: &mut CdrWriter, values: &[f64]) {
-    cdr.length(values.len());
-    for v in values {
-        cdr.f32(single(*v));
-    }
+    cdr.f32_sequence(values.iter().map(|v| single(*v)));
 }
 
 /// A `sensor_msgs/msg/LaserScan`.

@@ -5,6 +5,7 @@
 //! at all ([`file`](mod@file), [`folder`]); whatever goes wrong names the file ([`error`]).
 
 mod bodies;
+mod container;
 pub mod error;
 pub mod file;
 pub mod folder;

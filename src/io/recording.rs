@@ -17,47 +17,72 @@
 //! `/session/pose` has no schema: rosbags refuses a recording with one that is not ROS, and Foxglove needs none.
 
 use super::bodies::{Bodies, MARKERS_TOPIC};
+use super::container::Container;
 use super::definitions::{self, Definition};
 use super::error::IoError;
 use super::messages::{self, FrameTransform, LASER_FRAME, LabelledMarker, ROOM_FRAME};
 pub use super::schedule::EPOCH_NS;
-use super::schedule::{Event, Simultaneous, nanoseconds, schedule, simultaneous_frames};
-use catoptric_model::dataset::RIG_SUBJECT;
+use super::schedule::{Event, Simultaneous, schedule, simultaneous_frames};
+use catoptric_model::dataset::{RIG_SUBJECT, nanoseconds};
 use catoptric_model::frame::Pose;
 use catoptric_model::session::ScannerSheet;
-use catoptric_model::{Session, Stretch};
-use mcap::records::MessageHeader;
-use mcap::write::NoSeek;
+use catoptric_model::{Excerpt, Session, Stretch};
 use std::collections::BTreeMap;
 use std::io::Write;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Longest recording, in seconds: times must stay inside the 32 bits of a stamp (January 2038).
 const LONGEST_S: f64 = 6e8;
 
-/// A recording being written, one stretch at a time.
+/// A recording being written, stretch by stretch or excerpt by excerpt.
 ///
 /// Dropped before [`finish`](Self::finish) it leaves a file without its end, which no reader takes for whole.
 pub struct RecordingWriter<W: Write> {
-    mcap: Option<mcap::Writer<NoSeek<W>>>,
+    container: Container<W>,
+    encoder: Arc<RecordingEncoder>,
+    /// Whether the channel of the echoes is there: recordings without any need no such topic.
+    has_echoes: bool,
+    sequences: BTreeMap<u16, u32>,
+    frame_number: u32,
+    /// The stretch that has begun, how many scans of it there are, and how many there should be.
+    current: Option<(usize, usize, usize)>,
+}
+
+/// Turns stretches into messages, on any thread.
+#[derive(Debug)]
+pub struct RecordingEncoder {
     path: PathBuf,
     scanner: ScannerSheet,
     bodies: Bodies,
     channels: Channels,
-    sequences: BTreeMap<u16, u32>,
-    frame_number: u32,
+}
+
+/// The messages of an excerpt or of a stretch as bytes, in the order in which they are written.
+#[derive(Debug)]
+pub struct Encoded {
+    pose: usize,
+    /// Which scans these are.
+    scans: Range<usize>,
+    /// Scans of the whole stretch.
+    expected: usize,
+    bytes: Vec<u8>,
+    /// Channel, time, and where in `bytes`.
+    messages: Vec<(u16, u64, Range<usize>)>,
 }
 
 /// The channels of a recording.
+#[derive(Debug)]
 struct Channels {
     label: u16,
     transforms: u16,
     points: u16,
     scan: u16,
-    /// Added with the first stretch that has echoes: other recordings need no such topic.
-    echoes: Option<u16>,
     poses: Vec<u16>,
     markers: u16,
+    /// Added with the first message.
+    echoes: u16,
 }
 
 impl<W: Write> RecordingWriter<W> {
@@ -66,34 +91,24 @@ impl<W: Write> RecordingWriter<W> {
     /// # Errors
     /// [`IoError`] if the session's names cannot be topics, or writing fails.
     pub fn create(writer: W, path: &Path, session: &Session) -> Result<Self, IoError> {
-        let fail = |e| mcap_error(path, e);
         let bodies = Bodies::of(session, path)?;
-        let mut mcap = mcap::WriteOptions::new()
-            .profile("ros2")
-            .library(concat!("catoptric ", env!("CARGO_PKG_VERSION")))
-            .compression(Some(mcap::Compression::Lz4))
-            // Chunks are made in memory: a full disk is then met only where it is reported as one.
-            .disable_seeking(true)
-            .create(NoSeek::new(writer))
-            .map_err(fail)?;
-        let mut add = |topic: &str, definition: Definition| add_channel(&mut mcap, topic, definition);
-        let static_transforms = add("/tf_static", definitions::TF_MESSAGE).map_err(fail)?;
-        let transforms = add("/tf", definitions::TF_MESSAGE).map_err(fail)?;
-        let points = add("/points", definitions::POINT_CLOUD).map_err(fail)?;
-        let scan = add("/scan", definitions::LASER_SCAN).map_err(fail)?;
+        let library = concat!("catoptric ", env!("CARGO_PKG_VERSION"));
+        let mut container =
+            Container::create(writer, "ros2", library).map_err(|e| IoError::write(path, e))?;
+        let mut add = |topic: &str, definition: Definition| add_channel(&mut container, topic, definition);
+        let static_transforms = add("/tf_static", definitions::TF_MESSAGE);
+        let transforms = add("/tf", definitions::TF_MESSAGE);
+        let points = add("/points", definitions::POINT_CLOUD);
+        let scan = add("/scan", definitions::LASER_SCAN);
         let topic = |name: &str| format!("/mocap/{name}");
         let poses = bodies
             .all
             .iter()
             .map(|b| add(&topic(&b.subject), definitions::POSE_STAMPED))
-            .collect::<Result<_, _>>()
-            .map_err(fail)?;
-        let markers = add(&topic(MARKERS_TOPIC), definitions::MARKERS).map_err(fail)?;
-        let label = mcap
-            .add_channel(0, "/session/pose", "json", &BTreeMap::new())
-            .map_err(fail)?;
-        let mut recording = Self {
-            mcap: Some(mcap),
+            .collect();
+        let markers = add(&topic(MARKERS_TOPIC), definitions::MARKERS);
+        let label = container.add_channel(0, "/session/pose", "json");
+        let encoder = RecordingEncoder {
             path: path.to_owned(),
             scanner: session.scanner.clone(),
             bodies,
@@ -102,12 +117,18 @@ impl<W: Write> RecordingWriter<W> {
                 transforms,
                 points,
                 scan,
-                echoes: None,
                 poses,
                 markers,
+                echoes: label + 1,
             },
+        };
+        let mut recording = Self {
+            container,
+            encoder: Arc::new(encoder),
+            has_echoes: false,
             sequences: BTreeMap::new(),
             frame_number: 0,
+            current: None,
         };
         let mount = FrameTransform {
             parent: RIG_SUBJECT,
@@ -115,8 +136,13 @@ impl<W: Write> RecordingWriter<W> {
             pose: Pose::from(&session.nominal_rig_from_sensor),
         };
         let message = messages::encode_transforms(EPOCH_NS, &[mount]);
-        recording.put(static_transforms, EPOCH_NS, &message)?;
+        recording.put(static_transforms, EPOCH_NS, &message);
         Ok(recording)
+    }
+
+    /// What turns stretches into the messages of this recording.
+    pub fn encoder(&self) -> Arc<RecordingEncoder> {
+        Arc::clone(&self.encoder)
     }
 
     /// Appends a stretch.
@@ -125,120 +151,212 @@ impl<W: Write> RecordingWriter<W> {
     /// [`IoError::Content`] if its numbers do not fit each other or the session, otherwise what went wrong in
     /// writing.
     pub fn write_stretch(&mut self, stretch: &Stretch) -> Result<(), IoError> {
-        self.check(stretch)
-            .map_err(|what| IoError::content(&self.path, format!("pose {}: {what}", stretch.label.pose)))?;
-        let start = EPOCH_NS + nanoseconds(stretch.start_s);
-        let frames = simultaneous_frames(stretch);
-        for (time, event) in schedule(stretch, start, &frames) {
-            let (channel, message) = match event {
-                Event::Label => (self.channels.label, self.encode_label(stretch)?),
-                Event::Transforms => {
-                    let transforms: Vec<_> = first_seen(stretch).collect();
-                    (
-                        self.channels.transforms,
-                        messages::encode_transforms(time, &transforms),
-                    )
-                }
-                Event::Moved { track, frame } => {
-                    let track = &stretch.tracks[track];
-                    let Some(pose) = track.frames[frame].pose else {
-                        continue;
-                    };
-                    let transform = FrameTransform {
-                        parent: ROOM_FRAME,
-                        child: &track.subject,
-                        pose,
-                    };
-                    (
-                        self.channels.transforms,
-                        messages::encode_transforms(time, &[transform]),
-                    )
-                }
-                Event::Points => {
-                    let first = &stretch.ranges[..stretch.beams];
-                    (
-                        self.channels.points,
-                        messages::encode_points(time, &self.scanner, first),
-                    )
-                }
-                Event::Scan(k) => {
-                    let ranges = &stretch.ranges[k * stretch.beams..(k + 1) * stretch.beams];
-                    let period = stretch.scan_period_s;
-                    (
-                        self.channels.scan,
-                        messages::encode_scan(time, &self.scanner, period, ranges),
-                    )
-                }
-                Event::Echoes(k) => {
-                    let Some(echoes) = &stretch.echoes else { continue };
-                    let echoes = &echoes[k * stretch.beams..(k + 1) * stretch.beams];
-                    let period = stretch.scan_period_s;
-                    (
-                        self.echo_channel()?,
-                        messages::encode_echoes(time, &self.scanner, period, echoes),
-                    )
-                }
-                Event::Pose { track, frame } => {
-                    let track = &stretch.tracks[track];
-                    let body = self.bodies.position(&track.subject);
-                    let Some((body, pose)) = body.zip(track.frames[frame].pose) else {
-                        continue;
-                    };
-                    (self.channels.poses[body], messages::encode_pose(time, &pose))
-                }
-                Event::Markers => {
-                    let seen = self.seen_markers(stretch, &frames[&time]);
-                    let message = messages::encode_markers(time, self.frame_number, &seen);
+        let encoded = self.encoder.encode_stretch(stretch)?;
+        self.append(vec![encoded])
+    }
+
+    /// Appends what was encoded, in order. What fills a chunk is compressed, chunk by chunk side by side, and written;
+    /// less than a chunk waits for more.
+    ///
+    /// # Errors
+    /// [`IoError::Content`] if scans of a stretch are missing, otherwise what went wrong in writing.
+    pub fn append(&mut self, encoded: Vec<Encoded>) -> Result<(), IoError> {
+        for mut next in encoded {
+            self.follow(&next)?;
+            for (channel, time, range) in next.messages {
+                let channels = &self.encoder.channels;
+                let message = &mut next.bytes[range];
+                if channel == channels.markers {
+                    message[messages::FRAME_NUMBER].copy_from_slice(&self.frame_number.to_le_bytes());
                     self.frame_number = self.frame_number.wrapping_add(1);
-                    (self.channels.markers, message)
+                } else if channel == channels.echoes && !self.has_echoes {
+                    self.has_echoes = true;
+                    let added = add_channel(&mut self.container, "/echoes", definitions::MULTI_ECHO_SCAN);
+                    assert_eq!(added, channel, "it is the only channel that is added later");
                 }
-            };
-            self.put(channel, time, &message)?;
+                self.put(channel, time, message);
+            }
         }
-        Ok(())
+        let written = self.container.write_full();
+        written.map_err(|e| IoError::write(&self.encoder.path, e))
     }
 
     /// Ends the recording and hands the writer back, flushed.
     ///
     /// # Errors
-    /// [`IoError`] if writing fails.
-    pub fn finish(mut self) -> Result<W, IoError> {
-        let mut mcap = self.mcap.take().expect("taken only here and on drop");
-        mcap.finish().map_err(|e| mcap_error(&self.path, e))?;
-        let mut writer = mcap.into_inner().into_inner();
-        writer.flush().map_err(|e| IoError::write(&self.path, e))?;
-        Ok(writer)
-    }
-
-    /// The channel of the echoes, made when it is first needed.
-    fn echo_channel(&mut self) -> Result<u16, IoError> {
-        if let Some(channel) = self.channels.echoes {
-            return Ok(channel);
-        }
-        let mcap = self.mcap.as_mut().expect("taken only at the end");
-        let channel = add_channel(mcap, "/echoes", definitions::MULTI_ECHO_SCAN)
-            .map_err(|e| mcap_error(&self.path, e))?;
-        self.channels.echoes = Some(channel);
-        Ok(channel)
+    /// [`IoError`] if scans of a stretch are missing or writing fails.
+    pub fn finish(self) -> Result<W, IoError> {
+        self.check_current()?;
+        let path = &self.encoder.path;
+        self.container.finish().map_err(|e| IoError::write(path, e))
     }
 
     /// Writes one message.
-    fn put(&mut self, channel: u16, time: u64, message: &[u8]) -> Result<(), IoError> {
+    fn put(&mut self, channel: u16, time: u64, message: &[u8]) {
         let next = self.sequences.entry(channel).or_default();
-        let header = MessageHeader {
-            channel_id: channel,
-            sequence: *next,
-            log_time: time,
-            publish_time: time,
-        };
+        self.container.put(channel, *next, time, message);
         *next = next.wrapping_add(1);
-        let mcap = self.mcap.as_mut().expect("taken only at the end");
-        mcap.write_to_known_channel(&header, message)
-            .map_err(|e| mcap_error(&self.path, e))
     }
 
-    fn encode_label(&self, stretch: &Stretch) -> Result<Vec<u8>, IoError> {
-        serde_json::to_vec(&stretch.label).map_err(|e| IoError::json(&self.path, &e))
+    /// Whether these scans are the next.
+    fn follow(&mut self, next: &Encoded) -> Result<(), IoError> {
+        let due = match self.current {
+            Some((pose, done, _)) if next.scans.start > 0 => (pose, done),
+            _ => {
+                self.check_current()?;
+                (next.pose, 0)
+            }
+        };
+        if due != (next.pose, next.scans.start) {
+            let (pose, scan) = (next.pose, next.scans.start);
+            let what = format!(
+                "pose {pose}: scan {scan} follows scan {} of pose {}",
+                due.1, due.0
+            );
+            return Err(IoError::content(&self.encoder.path, what));
+        }
+        self.current = Some((next.pose, next.scans.end, next.expected));
+        Ok(())
+    }
+
+    /// Whether the stretch that has begun is whole.
+    fn check_current(&self) -> Result<(), IoError> {
+        match self.current {
+            Some((pose, done, expected)) if done != expected => Err(IoError::content(
+                &self.encoder.path,
+                format!("pose {pose}: {done} scans, its label says {expected}"),
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl RecordingEncoder {
+    /// A whole stretch.
+    ///
+    /// # Errors
+    /// [`IoError::Content`] if its numbers do not fit each other or the session.
+    pub fn encode_stretch(&self, stretch: &Stretch) -> Result<Encoded, IoError> {
+        self.encode(stretch, 0..stretch.label.scans, &stretch.first_seen())
+    }
+
+    /// An excerpt of a stretch.
+    ///
+    /// # Errors
+    /// [`IoError::Content`] if its numbers do not fit each other or the session.
+    pub fn encode_excerpt(&self, excerpt: &Excerpt) -> Result<Encoded, IoError> {
+        let scans = excerpt.part.ranges.len() / excerpt.part.beams.max(1);
+        let scans = excerpt.first_scan..excerpt.first_scan + scans;
+        self.encode(&excerpt.part, scans, &excerpt.first_seen)
+    }
+
+    fn encode(
+        &self,
+        part: &Stretch,
+        scans: Range<usize>,
+        first_seen: &[Option<(f64, Pose)>],
+    ) -> Result<Encoded, IoError> {
+        self.check(part, &scans).map_err(|what| {
+            let pose = part.label.pose;
+            IoError::content(&self.path, format!("pose {pose}: {what}"))
+        })?;
+        let mut encoded = Encoded {
+            pose: part.label.pose,
+            scans: scans.clone(),
+            expected: part.label.scans,
+            bytes: Vec::with_capacity(part.ranges.len() * size_of::<f32>() * 9 / 8),
+            messages: Vec::new(),
+        };
+        let start = EPOCH_NS + nanoseconds(part.start_s);
+        let frames = simultaneous_frames(part);
+        for (time, event) in schedule(part, &scans, first_seen, start, &frames) {
+            let Some((channel, message)) = self.message(part, &scans, first_seen, &frames, time, event)?
+            else {
+                continue;
+            };
+            let begin = encoded.bytes.len();
+            encoded.bytes.extend(message);
+            encoded.messages.push((channel, time, begin..encoded.bytes.len()));
+        }
+        Ok(encoded)
+    }
+
+    /// One message with its channel; `None` of what has none.
+    fn message(
+        &self,
+        part: &Stretch,
+        scans: &Range<usize>,
+        first_seen: &[Option<(f64, Pose)>],
+        frames: &BTreeMap<u64, Simultaneous>,
+        time: u64,
+        event: Event,
+    ) -> Result<Option<(u16, Vec<u8>)>, IoError> {
+        let (channels, period) = (&self.channels, part.scan_period_s);
+        let readings = |scan: usize| (scan - scans.start) * part.beams..(scan - scans.start + 1) * part.beams;
+        Ok(Some(match event {
+            Event::Label => {
+                let label = serde_json::to_vec(&part.label).map_err(|e| IoError::json(&self.path, &e))?;
+                (channels.label, label)
+            }
+            Event::Transforms => {
+                let seen = part.tracks.iter().zip(first_seen);
+                let transforms: Vec<_> = seen
+                    .filter_map(|(track, seen)| Some(in_room(&track.subject, seen.as_ref()?.1)))
+                    .collect();
+                (
+                    channels.transforms,
+                    messages::encode_transforms(time, &transforms),
+                )
+            }
+            Event::Moved { track, frame } => {
+                let track = &part.tracks[track];
+                let Some(pose) = track.frames[frame].pose else {
+                    return Ok(None);
+                };
+                let transform = in_room(&track.subject, pose);
+                (
+                    channels.transforms,
+                    messages::encode_transforms(time, &[transform]),
+                )
+            }
+            Event::Points => {
+                let first = &part.ranges[readings(0)];
+                (
+                    channels.points,
+                    messages::encode_points(time, &self.scanner, first),
+                )
+            }
+            Event::Scan(k) => {
+                let ranges = &part.ranges[readings(k)];
+                (
+                    channels.scan,
+                    messages::encode_scan(time, &self.scanner, period, ranges),
+                )
+            }
+            Event::Echoes(k) => {
+                let Some(echoes) = &part.echoes else {
+                    return Ok(None);
+                };
+                let echoes = &echoes[readings(k)];
+                (
+                    channels.echoes,
+                    messages::encode_echoes(time, &self.scanner, period, echoes),
+                )
+            }
+            Event::Pose { track, frame } => {
+                let track = &part.tracks[track];
+                let body = self.bodies.position(&track.subject);
+                let Some((body, pose)) = body.zip(track.frames[frame].pose) else {
+                    return Ok(None);
+                };
+                (channels.poses[body], messages::encode_pose(time, &pose))
+            }
+            Event::Markers => {
+                // The frames are numbered where they are put in order.
+                let seen = self.seen_markers(part, &frames[&time]);
+                (channels.markers, messages::encode_markers(time, 0, &seen))
+            }
+        }))
     }
 
     /// The markers that were seen at one time.
@@ -259,13 +377,20 @@ impl<W: Write> RecordingWriter<W> {
     }
 
     /// What of a stretch does not fit.
-    fn check(&self, stretch: &Stretch) -> Result<(), String> {
+    fn check(&self, stretch: &Stretch, scans: &Range<usize>) -> Result<(), String> {
         let time_fits = |t: f64| (0.0..=LONGEST_S).contains(&t);
         let beams = self.scanner.beams;
         if stretch.beams != beams || beams == 0 {
             return Err(format!("{} beams, the scanner has {beams}", stretch.beams));
         }
-        let expected = stretch.label.scans.saturating_mul(beams);
+        if scans.end > stretch.label.scans {
+            return Err(format!(
+                "scan {}, its label says {}",
+                scans.end - 1,
+                stretch.label.scans
+            ));
+        }
+        let expected = scans.len().saturating_mul(beams);
         if stretch.ranges.len() != expected {
             return Err(format!("{} readings, {expected} expected", stretch.ranges.len()));
         }
@@ -297,41 +422,16 @@ impl<W: Write> RecordingWriter<W> {
     }
 }
 
-impl<W: Write> Drop for RecordingWriter<W> {
-    fn drop(&mut self) {
-        // An `mcap::Writer` that is dropped ends its file properly; one taken apart does not.
-        if let Some(mcap) = self.mcap.take() {
-            drop(mcap.into_inner());
-        }
-    }
+fn add_channel<W: Write>(container: &mut Container<W>, topic: &str, definition: Definition) -> u16 {
+    let schema = container.add_schema(definition.name, "ros2msg", &definition.text());
+    container.add_channel(schema, topic, "cdr")
 }
 
-fn add_channel<W: Write>(
-    mcap: &mut mcap::Writer<NoSeek<W>>,
-    topic: &str,
-    definition: Definition,
-) -> mcap::McapResult<u16> {
-    let text = definition.text();
-    let schema = mcap.add_schema(definition.name, "ros2msg", text.as_bytes())?;
-    mcap.add_channel(schema, topic, "cdr", &BTreeMap::new())
-}
-
-/// Where each body was when it was first solved.
-fn first_seen(stretch: &Stretch) -> impl Iterator<Item = FrameTransform<'_>> {
-    stretch.tracks.iter().filter_map(|track| {
-        let pose = track.frames.iter().find_map(|f| f.pose)?;
-        Some(FrameTransform {
-            parent: ROOM_FRAME,
-            child: &track.subject,
-            pose,
-        })
-    })
-}
-
-/// What went wrong in writing.
-fn mcap_error(path: &Path, error: mcap::McapError) -> IoError {
-    match error {
-        mcap::McapError::Io(source) => IoError::write(path, source),
-        other => IoError::write(path, std::io::Error::other(other)),
+/// Where a body stands in the room.
+fn in_room(subject: &str, pose: Pose) -> FrameTransform<'_> {
+    FrameTransform {
+        parent: ROOM_FRAME,
+        child: subject,
+        pose,
     }
 }

@@ -1,8 +1,10 @@
 //! In which order the messages of a stretch are written: by time, and at one time by kind.
 
 use super::messages::NS_PER_S;
-use catoptric_model::{PoseKind, Stretch};
-use std::collections::{BTreeMap, BTreeSet};
+use catoptric_model::dataset::nanoseconds;
+use catoptric_model::{Pose, PoseKind, Stretch};
+use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// When every recording begins, in nanoseconds since 1970: fixed, so that equal experiments are equal files.
 pub const EPOCH_NS: u64 = 1_518_000_000 * NS_PER_S;
@@ -23,13 +25,6 @@ pub(super) enum Event {
 /// The frames of the tracks that are of one time, as (track, frame).
 pub(super) type Simultaneous = Vec<(usize, usize)>;
 
-/// Whole nanoseconds of a time that was checked to be finite and not negative.
-pub(super) fn nanoseconds(seconds: f64) -> u64 {
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
-    let ns = (seconds * NS_PER_S as f64).round() as u64;
-    ns
-}
-
 /// The frames of all bodies by time.
 pub(super) fn simultaneous_frames(stretch: &Stretch) -> BTreeMap<u64, Simultaneous> {
     let mut by_time: BTreeMap<u64, Simultaneous> = BTreeMap::new();
@@ -42,34 +37,39 @@ pub(super) fn simultaneous_frames(stretch: &Stretch) -> BTreeMap<u64, Simultaneo
     by_time
 }
 
-/// Every message of a stretch in the order it is written.
+/// Every message of some scans of a stretch, and of the frames that go with them, in the order it is written.
 pub(super) fn schedule(
-    stretch: &Stretch,
+    part: &Stretch,
+    scans: &Range<usize>,
+    first_seen: &[Option<(f64, Pose)>],
     start: u64,
     frames: &BTreeMap<u64, Simultaneous>,
 ) -> Vec<(u64, Event)> {
-    let first = frames.keys().next().map_or(start, |t| start.min(*t));
-    let mut events = vec![(first, Event::Label), (start, Event::Transforms)];
-    if stretch.label.scans > 0 {
-        events.push((start, Event::Points));
+    let mut events = Vec::new();
+    if scans.start == 0 {
+        let first = frames.keys().next().map_or(start, |t| start.min(*t));
+        events.extend([(first, Event::Label), (start, Event::Transforms)]);
+        if !scans.is_empty() {
+            events.push((start, Event::Points));
+        }
     }
-    for k in 0..stretch.label.scans {
-        let time = start + nanoseconds(k as f64 * stretch.scan_period_s);
+    for k in scans.clone() {
+        let time = start + nanoseconds(k as f64 * part.scan_period_s);
         events.push((time, Event::Scan(k)));
-        if stretch.echoes.is_some() {
+        if part.echoes.is_some() {
             events.push((time, Event::Echoes(k)));
         }
     }
-    let mut first_seen = BTreeSet::new();
     for (time, members) in frames {
         let mut with_markers = false;
         for &(track, frame) in members {
-            let seen = &stretch.tracks[track].frames[frame];
+            let seen = &part.tracks[track].frames[frame];
             with_markers |= !seen.markers.is_empty();
             if seen.pose.is_some() {
                 events.push((*time, Event::Pose { track, frame }));
                 // Where a body was first seen, the transforms at the start of the stretch say.
-                if stretch.label.kind == PoseKind::Flight && !first_seen.insert(track) {
+                let first = first_seen[track].is_some_and(|(time_s, _)| time_s == seen.time_s);
+                if part.label.kind == PoseKind::Flight && !first {
                     events.push((*time, Event::Moved { track, frame }));
                 }
             }

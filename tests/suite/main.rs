@@ -29,6 +29,7 @@ mod pipeline;
 mod plan;
 mod properties;
 mod scenes;
+mod streaming;
 mod study;
 mod sub_rays;
 mod tiers;

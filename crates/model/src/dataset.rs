@@ -128,6 +128,17 @@ pub struct PoseLabel {
 /// Name of the rig as a motion-capture subject.
 pub const RIG_SUBJECT: &str = "rig";
 
+/// Whole nanoseconds of a time in seconds that is finite and not negative: the resolution of a recording.
+pub fn nanoseconds(seconds: f64) -> u64 {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "as is said"
+    )]
+    let ns = (seconds * 1e9).round() as u64;
+    ns
+}
+
 /// One motion-capture frame of one body, in the room frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackedFrame {
@@ -165,6 +176,20 @@ pub struct Stretch {
     pub echoes: Option<Vec<Vec<f64>>>,
     /// The tracked bodies, the rig first.
     pub tracks: Vec<Track>,
+}
+
+/// Scans of a stretch in a row, with what motion capture saw from the first of them until the one after the last.
+///
+/// The first excerpt of a stretch also has the frames before its first scan, the last those after its last. A stretch of
+/// any length can be recorded excerpt by excerpt.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Excerpt {
+    /// The scans and the frames. All else is that of the whole stretch: the label, and the time of its first scan.
+    pub part: Stretch,
+    /// Number of the first of its scans in the whole stretch.
+    pub first_scan: usize,
+    /// When and where each tracked body was solved for the first time in the whole stretch; `None` if it never was.
+    pub first_seen: Vec<Option<(f64, Pose)>>,
 }
 
 /// One stretch of scans, and where motion capture saw rig and board.
@@ -220,6 +245,12 @@ impl Track {
 }
 
 impl Stretch {
+    /// When and where each tracked body was solved for the first time.
+    pub fn first_seen(&self) -> Vec<Option<(f64, Pose)>> {
+        let first = |track: &Track| track.frames.iter().find_map(|f| Some((f.time_s, f.pose?)));
+        self.tracks.iter().map(first).collect()
+    }
+
     /// What a calibration needs of the stretch.
     ///
     /// # Errors

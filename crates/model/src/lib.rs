@@ -52,7 +52,8 @@ pub use board::{BoardPlane, Rectangle};
 pub use calibration::{BeamEstimate, Calibration, Status};
 pub use characterization::Characterization;
 pub use dataset::{
-    Dataset, PoseKind, PoseLabel, PoseRecord, SpotNote, Stretch, TestKind, TestNote, Track, TrackedFrame,
+    Dataset, Excerpt, PoseKind, PoseLabel, PoseRecord, SpotNote, Stretch, TestKind, TestNote, Track,
+    TrackedFrame,
 };
 pub use error::ModelError;
 pub use frame::{Pose, PoseData};

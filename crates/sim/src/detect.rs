@@ -5,6 +5,10 @@
 //! A. Surfaces closer than the pulse is long merge into one echo, others follow one another. Other detectors and the
 //! echoes after the first are in [`echo`](crate::echo).
 
+pub(crate) mod root;
+
+use crate::lanes::{LANES, exponential};
+
 /// The light of one sub-ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pulse {
@@ -41,31 +45,59 @@ pub fn walk(peak: f64, threshold: f64) -> f64 {
     (2.0 * libm::log(peak / threshold)).max(0.0).sqrt()
 }
 
+/// Σ over the pulses of what is made of their distance, power and bell exp(−(x − r)²/2σ²), in their order.
+#[inline(always)]
+fn sum(pulses: &[Pulse], sd: f64, at: f64, mut term: impl FnMut(f64, f64, f64) -> f64) -> f64 {
+    let mut total = -0.0;
+    for group in pulses.chunks(LANES) {
+        let mut exponents = [0.0; LANES];
+        for (exponent, pulse) in exponents.iter_mut().zip(group) {
+            let x = (at - pulse.range) / sd;
+            *exponent = -0.5 * x * x;
+        }
+        let (mut bells, mut rare) = ([0.0; LANES], false);
+        for (bell, exponent) in bells.iter_mut().zip(exponents) {
+            let (value, left) = exponential(exponent);
+            *bell = value;
+            rare |= left;
+        }
+        if rare {
+            bells = exponents.map(libm::exp);
+        }
+        for (pulse, bell) in group.iter().zip(bells) {
+            total += term(pulse.range - at, pulse.power, bell);
+        }
+    }
+    total
+}
+
 /// The echo at a range, in watts.
 pub(crate) fn height(pulses: &[Pulse], sd: f64, at: f64) -> f64 {
-    pulses
-        .iter()
-        .map(|p| {
-            let x = (at - p.range) / sd;
-            p.power * libm::exp(-0.5 * x * x)
-        })
-        .sum()
+    sum(pulses, sd, at, |_, power, bell| power * bell)
 }
 
 /// Slope of the echo, up to the positive factor 1/σ².
 pub(crate) fn slope(pulses: &[Pulse], sd: f64, at: f64) -> f64 {
-    pulses
-        .iter()
-        .map(|p| {
-            let x = (at - p.range) / sd;
-            (p.range - at) * p.power * libm::exp(-0.5 * x * x)
-        })
-        .sum()
+    sum(pulses, sd, at, |distance, power, bell| distance * power * bell)
 }
 
 /// Whether a sum of pulses reaches the threshold anywhere: whether there is a [`leading_edge`].
 pub fn is_seen(pulses: &[Pulse], sd: f64, threshold: f64) -> bool {
-    bracket(pulses, sd, threshold).is_some()
+    is_surely_seen(pulses, sd, threshold) || bracket(pulses, sd, threshold).is_some()
+}
+
+/// Whether a bound tells that the threshold is reached: at the nearest pulse all of them stand at least at
+/// exp(−δ²/2) ≥ 1 − δ²/2 of their height, with δ the distance of the farthest over σ.
+fn is_surely_seen(pulses: &[Pulse], sd: f64, threshold: f64) -> bool {
+    /// Far above what sums are off by rounding.
+    const ROUNDING: f64 = 1e-9;
+    let Span {
+        total,
+        nearest,
+        farthest,
+    } = Span::of(pulses);
+    let spread = (farthest - nearest) / sd;
+    total * (1.0 - 0.5 * spread * spread) > threshold * (1.0 + ROUNDING)
 }
 
 /// The leading edge of the first echo; `None` if the threshold is never reached.
@@ -73,28 +105,42 @@ pub fn is_seen(pulses: &[Pulse], sd: f64, threshold: f64) -> bool {
 /// Exact to 1e-13 m for one pulse and for any sum.
 pub fn leading_edge(pulses: &[Pulse], sd: f64, threshold: f64) -> Option<Edge> {
     let (below, above) = bracket(pulses, sd, threshold)?;
-    let crossing = bisect(below, above, |x| height(pulses, sd, x) >= threshold);
-    let mut rising = crossing;
-    let mut falling = crossing + 0.25 * sd;
-    while slope(pulses, sd, falling) > 0.0 {
-        rising = falling;
-        falling += 0.25 * sd;
-    }
-    let top = bisect(rising, falling, |x| slope(pulses, sd, x) <= 0.0);
+    let crossing = root::crossing(pulses, sd, (below, above), threshold);
+    let top = root::first_top(pulses, sd, crossing);
     Some(Edge {
         crossing,
         peak: height(pulses, sd, top),
     })
 }
 
+/// All light of some pulses, in watts, and how near and far they are, in metres.
+struct Span {
+    total: f64,
+    nearest: f64,
+    farthest: f64,
+}
+
+impl Span {
+    fn of(pulses: &[Pulse]) -> Self {
+        let ranges = pulses.iter().map(|p| p.range);
+        Self {
+            total: pulses.iter().map(|p| p.power).sum(),
+            nearest: ranges.clone().fold(f64::INFINITY, f64::min),
+            farthest: ranges.fold(0.0, f64::max),
+        }
+    }
+}
+
 /// Places between which the sum first reaches the threshold: still below it, and at or above it.
 fn bracket(pulses: &[Pulse], sd: f64, threshold: f64) -> Option<(f64, f64)> {
-    let total: f64 = pulses.iter().map(|p| p.power).sum();
+    let Span {
+        total,
+        nearest,
+        farthest,
+    } = Span::of(pulses);
     if total < threshold || pulses.is_empty() {
         return None;
     }
-    let nearest = pulses.iter().map(|p| p.range).fold(f64::INFINITY, f64::min);
-    let farthest = pulses.iter().map(|p| p.range).fold(0.0, f64::max);
     // Before this place even all pulses together at the nearest range stay below the threshold.
     let mut below = nearest - sd * walk(total, threshold) - 1e-12;
     // Up to the nearest pulse the echo only rises; from there on a peak is never narrower than a quarter of σ.
@@ -107,17 +153,6 @@ fn bracket(pulses: &[Pulse], sd: f64, threshold: f64) -> Option<(f64, f64)> {
         above += 0.25 * sd;
     }
     Some((below, above))
-}
-
-/// The place between `no` and `yes` where a condition begins to hold.
-pub(crate) fn bisect(mut no: f64, mut yes: f64, holds: impl Fn(f64) -> bool) -> f64 {
-    loop {
-        let middle = 0.5 * (no + yes);
-        if middle <= no || middle >= yes || yes - no < 1e-14 {
-            return yes;
-        }
-        if holds(middle) { yes = middle } else { no = middle }
-    }
 }
 
 impl Edge {

@@ -12,7 +12,8 @@
 //! | `peak` | w is highest, or the middle of the clipped top | 0 | 0, but a skewed echo shifts |
 //! | `centroid` | ∫x·w/∫w over the echo | 0 | 0, but a skewed echo shifts |
 
-use crate::detect::{self, Pulse, bisect, height, slope, walk};
+use crate::detect::root::{bisect, crossing, turning};
+use crate::detect::{self, Pulse, height, slope, walk};
 use crate::scene::Detector;
 
 /// What turns a waveform into ranges.
@@ -111,10 +112,10 @@ impl Receiver {
         while at <= farthest + step {
             let next = at + step;
             if rising && !rises(next) {
-                top = Some(bisect(at, next, |x| !rises(x)));
+                top = Some(turning(pulses, self.sd, (at, next), true));
                 rising = false;
             } else if !rising && rises(next) {
-                let valley = bisect(at, next, rises);
+                let valley = turning(pulses, self.sd, (at, next), false);
                 hills.extend(top.take().map(|t| self.hill(pulses, start, valley, t)));
                 (start, rising) = (valley, true);
             }
@@ -171,7 +172,7 @@ impl Receiver {
         while below < hill.top {
             let next = (below + STEP * self.sd).min(hill.top);
             if reaches(next) {
-                return bisect(below, next, reaches);
+                return crossing(pulses, self.sd, (below, next), level);
             }
             below = next;
         }

@@ -9,6 +9,7 @@ pub mod error;
 pub mod footprint;
 pub mod glass;
 pub mod laboratory;
+mod lanes;
 pub mod layout;
 pub mod mesh;
 pub mod mocap;

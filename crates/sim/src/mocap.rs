@@ -6,6 +6,7 @@ use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::tracking::solve_pose;
 use catoptric_model::{Pose, Track, TrackedFrame};
 use nalgebra::{Point3, Vector3};
+use std::ops::Range;
 
 /// Errors of a marker, 1σ along the room's x, y and z, in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,14 +61,15 @@ pub struct Body<'a> {
 /// Largest number of markers of one body.
 pub const MAX_MARKERS: usize = 64;
 
-/// Tracks a body for a number of frames from `start_s` on. `first_frame` numbers the frames of the whole recording.
+/// Tracks a body for some of its frames, of which frame 0 is at `start_s`. `first_frame` numbers the frames of the whole
+/// recording.
 pub fn track(
     mocap: &Mocap,
     seed: u64,
     body: &Body<'_>,
     start_s: f64,
     first_frame: u64,
-    frames: u64,
+    frames: Range<u64>,
 ) -> Track {
     let errors = if mocap.rig_exact && body.subject == RIG_SUBJECT {
         MarkerErrors {
@@ -85,7 +87,7 @@ pub fn track(
             constant.normal3().component_mul(&errors.constant)
         })
         .collect();
-    let frames = (0..frames)
+    let frames = frames
         .map(|frame| {
             let mut jitter = Draws::new(seed, Purpose::MarkerJitter, first_frame + frame);
             let elapsed_s = frame as f64 / mocap.frame_rate_hz;
@@ -143,7 +145,7 @@ mod tests {
             placement,
         };
         let first_marker = |placement, frame| {
-            let track = track(&mocap, 1, &body(placement), 0.0, frame, 1);
+            let track = track(&mocap, 1, &body(placement), 0.0, frame, 0..1);
             track.frames[0].markers[0].expect("nothing drops out")
         };
         assert!((first_marker(0, 0) - first_marker(0, 1)).norm() < 3e-4 * 0.5);

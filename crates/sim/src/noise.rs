@@ -5,6 +5,10 @@
 //! numbers, and no two rows or purposes share any. Normal deviates use the Box–Muller transform because it always
 //! takes two words, where faster methods take a varying number.
 
+mod columns;
+
+pub use columns::Columns;
+
 use rand::SeedableRng;
 use rand::rand_core::Rng;
 use rand::rngs::ChaCha8Rng;
@@ -58,7 +62,7 @@ pub struct Draws {
 }
 
 /// 32-bit words of the stream that belong to one column: eight uniform draws or four normal ones.
-const WORDS_PER_COLUMN: u128 = 16;
+const WORDS_PER_COLUMN: usize = 16;
 
 impl Draws {
     /// The draws for a purpose and row, at column 0.
@@ -75,10 +79,11 @@ impl Draws {
 
     /// Goes to the first draw of a column.
     pub fn seek(&mut self, column: u64) {
-        let word = u128::from(column) * WORDS_PER_COLUMN;
+        const WORDS: u128 = WORDS_PER_COLUMN as u128;
+        let word = u128::from(column) * WORDS;
         match word.checked_sub(self.rng.get_word_pos()) {
             // The next column in turn: its words are most likely computed already, and to jump would compute them anew.
-            Some(ahead) if ahead <= WORDS_PER_COLUMN => {
+            Some(ahead) if ahead <= WORDS => {
                 for _ in 0..ahead {
                     self.rng.next_u32();
                 }
@@ -89,7 +94,7 @@ impl Draws {
 
     /// The next draw, uniform on the open interval (0, 1).
     pub fn uniform(&mut self) -> f64 {
-        ((self.rng.next_u64() >> 11) as f64 + 0.5) * (1.0 / (1_u64 << 53) as f64)
+        standard_uniform(self.rng.next_u64())
     }
 
     /// The next draw, uniform within ±`limit`.
@@ -99,14 +104,19 @@ impl Draws {
 
     /// The next draw, standard normal.
     pub fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * libm::log(self.uniform())).sqrt();
-        radius * libm::cos(std::f64::consts::TAU * self.uniform())
+        let (first, second) = (self.uniform(), self.uniform());
+        columns::scalar(first, second)
     }
 
     /// Three standard normal draws.
     pub fn normal3(&mut self) -> nalgebra::Vector3<f64> {
         nalgebra::Vector3::from_fn(|_, _| self.normal())
     }
+}
+
+/// A number from the open interval (0, 1) from 64 random bits.
+fn standard_uniform(bits: u64) -> f64 {
+    ((bits >> 11) as f64 + 0.5) * (1.0 / (1_u64 << 53) as f64)
 }
 
 #[cfg(test)]

@@ -1,7 +1,11 @@
 //! The way of a ray: from the scanner over mirrors to whatever stops it.
 
+mod clearance;
+mod rig;
 mod setting;
 
+pub use rig::Rig;
+pub(crate) use setting::Met;
 pub use setting::{Mirrors, Role, Setting, Target};
 
 use crate::cast::Hit;
@@ -103,7 +107,7 @@ impl Path {
     }
 
     /// What the ray brought to each of them.
-    pub fn meetings(&self) -> impl Iterator<Item = Meeting> {
+    pub fn meetings(&self) -> impl Iterator<Item = Meeting> + Clone {
         self.meetings.into_iter().flatten()
     }
 

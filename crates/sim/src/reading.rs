@@ -2,23 +2,26 @@
 //!
 //! Everything but `report` is free of chance; it is the same for every scan of a stretch.
 
+mod part;
 mod receive;
 mod report;
 mod sub_ray;
 
+pub use part::Parts;
 pub use report::{Chance, MAX_ECHOES};
 pub use sub_ray::{Light as SubRayLight, Stop, SubRayEnd};
 
 use crate::color;
-use crate::detect::{self, Pulse};
+use crate::detect;
 use crate::echo::Receiver;
 use crate::error::SimError;
 use crate::footprint::{self, SubRay};
-use crate::optics::{End, MAX_BOUNCES, Path, Role, Setting};
+use crate::optics::{End, MAX_BOUNCES, Path, Rig, Role, Setting};
 use crate::power::{self, Illumination};
 use crate::scene::{BeamShape, Detection, EchoChoice, ErrorModel, Errors, Light, Limits, Principle, Scene};
 use crate::truth::BeamClass;
 use catoptric_model::{BiasTerms, RangeBias, beam};
+use part::{Part, Place};
 use receive::Seen;
 use sub_ray::Arrival;
 
@@ -27,7 +30,8 @@ pub struct Sensor {
     shape: BeamShape,
     sub_rays: Vec<SubRay>,
     light: Light,
-    mirror_reflectivity: f64,
+    /// What is left of light after so many reflections by silver.
+    mirrors: [f64; MAX_BOUNCES + 1],
     limits: Limits,
     detection: Detection,
     receiver: Receiver,
@@ -94,60 +98,6 @@ pub struct Share {
     pub power: f64,
 }
 
-/// The sub-rays that went one way to one surface.
-struct Part {
-    surface: usize,
-    facets: [usize; MAX_BOUNCES],
-    count: usize,
-    pulses: Vec<Pulse>,
-    share: f64,
-    power: f64,
-    /// Where the chief ray meets it.
-    chief: Option<Place>,
-    /// Where its light does on the average.
-    mean: Place,
-}
-
-/// Where light meets a surface.
-#[derive(Debug, Clone, Copy, Default)]
-struct Place {
-    range: f64,
-    cos_incidence: f64,
-    /// Cosine of the incidence on each of the facets before.
-    facets: [f64; MAX_BOUNCES],
-}
-
-impl Place {
-    fn new(path: &Path, bounces: usize, range: f64, cos_incidence: f64) -> Self {
-        let mut facets = [0.0; MAX_BOUNCES];
-        for (cos, meeting) in facets.iter_mut().zip(path.meetings().take(bounces)) {
-            *cos = meeting.cos_incidence;
-        }
-        Self {
-            range,
-            cos_incidence,
-            facets,
-        }
-    }
-
-    /// Adds another with a weight.
-    fn add(&mut self, weight: f64, other: &Self) {
-        self.range += weight * other.range;
-        self.cos_incidence += weight * other.cos_incidence;
-        for (sum, cos) in self.facets.iter_mut().zip(other.facets) {
-            *sum += weight * cos;
-        }
-    }
-
-    fn divide(&mut self, by: f64) {
-        self.range /= by;
-        self.cos_incidence /= by;
-        for cos in &mut self.facets {
-            *cos /= by;
-        }
-    }
-}
-
 impl Sensor {
     /// Resolves a scene's scanner.
     ///
@@ -187,7 +137,9 @@ impl Sensor {
             shape: scene.scanner.beam_shape(),
             sub_rays: footprint::sub_rays(scene.scanner.sub_rays as usize),
             light: scene.light.clone(),
-            mirror_reflectivity: scene.superstructure.mirror.reflectivity,
+            mirrors: std::array::from_fn(|count| {
+                libm::pow(scene.superstructure.mirror.reflectivity, count as f64)
+            }),
             limits: scene.scanner.limits(),
             detection: scene.detection.clone(),
             receiver,
@@ -256,14 +208,45 @@ impl Sensor {
         class(&chief, paths.iter().map(|(sub_ray, path)| (*sub_ray, path)))
     }
 
+    /// The structure's part in the ways of all sub-rays, for [`Sensor::observe_over`]; `bare` holds nothing else.
+    pub fn compile(&self, bare: &Setting<'_>) -> Rig {
+        let beams = 0..beam::COUNT;
+        let rays = beams.flat_map(|beam| {
+            let azimuth = beam::azimuth(beam);
+            self.sub_rays
+                .iter()
+                .map(move |s| footprint::ray(&self.shape, azimuth, s))
+        });
+        Rig::compile(bare, self.sub_rays.len(), rays)
+    }
+
     /// What a beam brings home; `None` if no echo reaches the threshold.
     pub fn observe(&self, setting: &Setting<'_>, beam: usize) -> Option<Return> {
-        let parts = self.illuminate(setting, beam);
+        let mut parts = Parts::default();
+        self.illuminate(setting, beam, &mut parts);
+        self.receive(setting, parts.as_slice())
+    }
+
+    /// The same to the last bit, with the structure's part already followed; `rig` must [hold](Rig::holds_in) in the
+    /// setting.
+    pub fn observe_over(
+        &self,
+        rig: &Rig,
+        setting: &Setting<'_>,
+        beam: usize,
+        parts: &mut Parts,
+    ) -> Option<Return> {
+        self.illuminate_over(rig, setting, beam, parts);
+        self.receive(setting, parts.as_slice())
+    }
+
+    /// What the detector makes of a beam's light.
+    fn receive(&self, setting: &Setting<'_>, parts: &[Part]) -> Option<Return> {
         let physical = matches!(self.errors.model, ErrorModel::Physical | ErrorModel::Both);
         if !self.takes_one_edge() {
             let seen = match self.detection.principle {
-                Principle::Pulsed => self.receive_pulses(&parts, physical),
-                Principle::Phase => self.receive_phase(&parts, physical),
+                Principle::Pulsed => self.receive_pulses(parts, physical),
+                Principle::Phase => self.receive_phase(parts, physical),
             };
             let mut found = seen.iter().filter_map(|seen| self.returned(setting, seen));
             let mut first = found.next()?;
@@ -273,7 +256,7 @@ impl Sensor {
             }
             return Some(first);
         }
-        let (part, mixed, detection) = match parts.as_slice() {
+        let (part, mixed, detection) = match parts {
             [] => return None,
             // One surface reads its own range, wherever on its edge that is.
             [only] if !physical => {
@@ -282,7 +265,7 @@ impl Sensor {
                 }
                 (only, 0.0, 0.0)
             }
-            _ => self.detect(&parts, physical)?,
+            _ => self.detect(parts, physical)?,
         };
         self.returned(
             setting,
@@ -303,10 +286,10 @@ impl Sensor {
         let paint = setting.paint(part.surface);
         let found = Return {
             role: setting.role(part.surface),
-            facets: part.facets[..part.count].to_vec(),
+            facets: part.facets().to_vec(),
             geometric,
             cos_incidence,
-            facet_cos_incidence: place.facets[..part.count].to_vec(),
+            facet_cos_incidence: place.facets[..part.facets().len()].to_vec(),
             power: part.power,
             share: part.share,
             mixed: seen.mixed,
@@ -321,12 +304,14 @@ impl Sensor {
 
     /// Where a beam's energy goes: what each way and surface gets, and what reaches none.
     pub fn shares(&self, setting: &Setting<'_>, beam: usize) -> Vec<Share> {
-        let mut shares: Vec<Share> = self
-            .illuminate(setting, beam)
+        let mut parts = Parts::default();
+        self.illuminate(setting, beam, &mut parts);
+        let mut shares: Vec<Share> = parts
+            .as_slice()
             .iter()
             .map(|part| Share {
                 role: Some(setting.role(part.surface)),
-                facets: part.facets[..part.count].to_vec(),
+                facets: part.facets().to_vec(),
                 energy: part.share,
                 power: part.power,
             })
@@ -350,69 +335,116 @@ impl Sensor {
     }
 
     /// The surfaces that a beam's light reaches, each with its pulses.
-    fn illuminate(&self, setting: &Setting<'_>, beam: usize) -> Vec<Part> {
-        let mut parts: Vec<Part> = Vec::new();
+    fn illuminate(&self, setting: &Setting<'_>, beam: usize, parts: &mut Parts) {
+        parts.begin();
         let azimuth = beam::azimuth(beam);
         for sub_ray in &self.sub_rays {
-            let ray = footprint::ray(&self.shape, azimuth, sub_ray);
-            let path = setting.trace(&ray);
-            let chief = sub_ray.wide == 0.0 && sub_ray.narrow == 0.0;
-            if let Some(arrival) = self.at_end(setting, sub_ray, &path) {
-                self.add(&mut parts, &path, &arrival, chief);
-            }
-            for ghost in setting.ghosts(&ray, &path) {
-                if let Some(arrival) = self.at_end(setting, sub_ray, &ghost) {
-                    self.add(&mut parts, &ghost, &arrival, false);
-                }
-            }
-            for arrival in self.on_mirrors(setting, sub_ray, &path) {
-                self.add(&mut parts, &path, &arrival, chief);
+            self.illuminate_by(setting, azimuth, sub_ray, parts);
+        }
+        if self.lacks_chief() {
+            Self::add_chief(parts, &self.chief_path(setting, beam));
+        }
+        parts.end();
+    }
+
+    /// What one sub-ray's light reaches.
+    fn illuminate_by(&self, setting: &Setting<'_>, azimuth: f64, sub_ray: &SubRay, parts: &mut Parts) {
+        let ray = footprint::ray(&self.shape, azimuth, sub_ray);
+        let path = setting.trace(&ray);
+        let chief = is_chief(sub_ray);
+        if let Some(arrival) = self.at_end(setting, sub_ray, &path) {
+            self.add(parts, &path, &arrival, chief);
+        }
+        for ghost in setting.ghosts(&ray, &path) {
+            if let Some(arrival) = self.at_end(setting, sub_ray, &ghost) {
+                self.add(parts, &ghost, &arrival, false);
             }
         }
-        if self.sub_rays.iter().all(|s| s.wide != 0.0 || s.narrow != 0.0) {
-            Self::add_chief(&mut parts, &self.chief_path(setting, beam));
+        for arrival in self.on_mirrors(setting, sub_ray, path.meetings()) {
+            self.add(parts, &path, &arrival, chief);
         }
-        for part in parts.iter_mut().filter(|p| p.power > 0.0) {
-            part.mean.divide(part.power);
+    }
+
+    /// [`Sensor::illuminate`] from where the sub-rays depart from the structure.
+    fn illuminate_over(&self, rig: &Rig, setting: &Setting<'_>, beam: usize, parts: &mut Parts) {
+        parts.begin();
+        let departures = rig.departures(beam);
+        let (mut legs, mut met) = (std::mem::take(&mut parts.legs), std::mem::take(&mut parts.met));
+        legs.clear();
+        let leaving = departures.iter().filter(|d| matches!(d.end, End::Escaped));
+        legs.extend(leaving.map(|d| d.last));
+        setting.cast_into_room(&mut legs, &mut met);
+        let mut in_room = met.iter();
+        for (sub_ray, departure) in self.sub_rays.iter().zip(departures) {
+            let beyond = match departure.end {
+                End::Escaped => in_room.next().copied().flatten(),
+                End::Hit(hit) => Some((hit, hit.normal)),
+                End::Trapped => None,
+            };
+            // A mirror of the room: its light may come back to the structure.
+            if matches!(departure.end, End::Escaped)
+                && beyond.is_some_and(|(hit, _)| setting.is_reflected(&hit))
+            {
+                self.illuminate_by(setting, beam::azimuth(beam), sub_ray, parts);
+                continue;
+            }
+            let (facets, meetings) = (rig.facets(departure), rig.meetings(departure));
+            let cosines = meetings.iter().map(|m| m.cos_incidence);
+            let chief = is_chief(sub_ray);
+            if let Some((hit, normal)) = beyond {
+                let length = match departure.end {
+                    End::Escaped => departure.length + hit.distance,
+                    _ => departure.length,
+                };
+                let on = Illumination {
+                    reflectivity: setting.paint(hit.surface).reflectivity,
+                    cos_incidence: normal.dot(&departure.last.direction).abs(),
+                    share: sub_ray.weight,
+                    range: length,
+                    mirrors: self.mirrors[departure.silvered] * departure.gain,
+                };
+                let place = (length, on.cos_incidence);
+                let (power, share) = (power::received(&self.light, &on), on.share * departure.gain);
+                parts.add((hit.surface, facets), power, share, place, cosines.clone(), chief);
+            }
+            for arrival in self.on_mirrors(setting, sub_ray, meetings.iter().copied()) {
+                let on = &arrival.on;
+                let place = (on.range, on.cos_incidence);
+                let cosines = cosines.clone().take(arrival.bounces);
+                let (power, share) = (power::received(&self.light, on), on.share * arrival.gain);
+                let facets = &facets[..arrival.bounces];
+                parts.add((arrival.surface, facets), power, share, place, cosines, chief);
+            }
         }
-        parts
+        (parts.legs, parts.met) = (legs, met);
+        if self.lacks_chief() {
+            Self::add_chief(parts, &self.chief_path(setting, beam));
+        }
+        parts.end();
+    }
+
+    /// Whether no sub-ray is the chief ray.
+    fn lacks_chief(&self) -> bool {
+        !self.sub_rays.iter().any(is_chief)
     }
 
     /// Adds the light of a sub-ray that reaches a surface to the part of that surface and the facets on the way.
-    fn add(&self, parts: &mut Vec<Part>, path: &Path, arrival: &Arrival, chief: bool) {
+    fn add(&self, parts: &mut Parts, path: &Path, arrival: &Arrival, chief: bool) {
         let (on, facets) = (&arrival.on, &path.facets()[..arrival.bounces]);
-        let power = power::received(&self.light, on);
-        let same_way = |p: &Part| p.surface == arrival.surface && p.facets[..p.count] == *facets;
-        let index = match parts.iter().position(same_way) {
-            Some(index) => index,
-            None => {
-                parts.push(Part::new(arrival.surface, facets));
-                parts.len() - 1
-            }
-        };
-        let part = &mut parts[index];
-        part.pulses.push(Pulse {
-            range: on.range,
-            power,
-        });
-        part.share += on.share * arrival.gain;
-        part.power += power;
-        let place = Place::new(path, arrival.bounces, on.range, on.cos_incidence);
-        part.mean.add(power, &place);
-        if chief {
-            part.chief = Some(place);
-        }
+        let cosines = path.meetings().take(arrival.bounces).map(|m| m.cos_incidence);
+        let place = (on.range, on.cos_incidence);
+        let (power, share) = (power::received(&self.light, on), on.share * arrival.gain);
+        parts.add((arrival.surface, facets), power, share, place, cosines, chief);
     }
 
     /// Lends the chief ray's range to the part it falls on, where the bundle itself holds no chief ray.
-    fn add_chief(parts: &mut [Part], path: &Path) {
+    fn add_chief(parts: &mut Parts, path: &Path) {
         if let End::Hit(hit) = path.end
-            && let Some(part) = parts
-                .iter_mut()
-                .find(|p| p.surface == hit.surface && p.facets[..p.count] == *path.facets())
+            && let Some(part) = parts.find(hit.surface, path.facets())
         {
             let cos_incidence = hit.normal.dot(&path.last.direction).abs();
-            part.chief = Some(Place::new(path, part.count, path.length, cos_incidence));
+            let cosines = path.meetings().take(part.facets().len()).map(|m| m.cos_incidence);
+            part.chief = Some(Place::new(path.length, cos_incidence, cosines));
         }
     }
 
@@ -421,7 +453,7 @@ impl Sensor {
     /// Where the detector is not to show itself, both edges have their walk undone, so that a single surface reads its
     /// own range and only the mixture shifts it.
     fn detect<'a>(&self, parts: &'a [Part], physical: bool) -> Option<(&'a Part, f64, f64)> {
-        let all: Vec<Pulse> = parts.iter().flat_map(|p| p.pulses.iter().copied()).collect();
+        let all = Parts::pulses(parts);
         let edge = detect::leading_edge(&all, self.receiver.sd, self.receiver.threshold)?;
         let first = edge.compensated(self.receiver.sd, self.receiver.threshold);
         let pulse_length = detect::pulse_length(self.receiver.sd);
@@ -444,6 +476,11 @@ impl Sensor {
         let detection = if physical { alone - geometric } else { 0.0 };
         Some((part, read(&edge) - alone, detection))
     }
+}
+
+/// Whether a sub-ray is the chief ray.
+fn is_chief(sub_ray: &SubRay) -> bool {
+    sub_ray.wide == 0.0 && sub_ray.narrow == 0.0
 }
 
 /// What the structure does to a beam, from the ways of its chief ray and of its sub-rays past it, and the share of its
@@ -471,26 +508,4 @@ pub fn class<'p>(chief: &Path, paths: impl IntoIterator<Item = (&'p SubRay, &'p 
         }
     }
     (if whole { of(chief) } else { BeamClass::Split }, share)
-}
-
-impl Part {
-    /// Where the chief ray meets it, or where its light does on the average if that goes elsewhere.
-    fn place(&self) -> Place {
-        self.chief.unwrap_or(self.mean)
-    }
-
-    fn new(surface: usize, facets: &[usize]) -> Self {
-        let mut own = [0; MAX_BOUNCES];
-        own[..facets.len()].copy_from_slice(facets);
-        Self {
-            surface,
-            facets: own,
-            count: facets.len(),
-            pulses: Vec::new(),
-            share: 0.0,
-            power: 0.0,
-            chief: None,
-            mean: Place::default(),
-        }
-    }
 }

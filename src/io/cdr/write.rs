@@ -78,6 +78,18 @@ impl CdrWriter {
         self.u32(u32::try_from(length).expect("a sequence has fewer than 2³² elements"));
     }
 
+    /// Appends a sequence of 32-bit numbers.
+    pub fn f32_sequence(&mut self, values: impl ExactSizeIterator<Item = f32>) {
+        // The length is aligned as they are.
+        self.length(values.len());
+        let begin = self.bytes.len();
+        self.bytes.resize(begin + values.len() * size_of::<f32>(), 0);
+        let places = self.bytes[begin..].chunks_exact_mut(size_of::<f32>());
+        for (place, value) in places.zip(values) {
+            place.copy_from_slice(&value.to_le_bytes());
+        }
+    }
+
     /// Appends a string.
     pub fn string(&mut self, value: &str) {
         self.length(value.len() + 1);

@@ -7,6 +7,7 @@ mod files;
 mod geometry;
 mod light;
 mod receiver;
+mod waveform;
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;

@@ -55,7 +55,7 @@ impl Triangles {
     }
 
     /// The vertices, in metres.
-    pub(super) fn vertices(&self) -> &[Point3<f64>] {
+    pub(crate) fn vertices(&self) -> &[Point3<f64>] {
         &self.vertices
     }
 

@@ -3,6 +3,7 @@
 //! Every stretch is a pure function of (scene, seed, number), so that they can be computed in any order.
 
 mod chance;
+mod excerpt;
 mod knowledge;
 mod mishap;
 mod recorder;
@@ -10,7 +11,8 @@ mod room;
 mod sight;
 mod truth;
 
-pub use chance::Chances;
+pub use chance::{Chances, Memory};
+pub use excerpt::Drawn;
 pub use recorder::Recorder;
 pub use room::board_markers;
 pub use sight::Sight;
@@ -20,7 +22,7 @@ use crate::color::{self, Paint};
 use crate::error::SimError;
 use crate::mocap::{self, Body};
 use crate::noise::{Draws, Purpose};
-use crate::optics::{Role, Target};
+use crate::optics::{Rig, Role, Target};
 use crate::placement::{self, Planned};
 use crate::reading::{Return, Sensor};
 use crate::scene::{ErrorModel, Scene};
@@ -34,6 +36,8 @@ use catoptric_model::{
 };
 use nalgebra::{Point3, Translation3, UnitQuaternion};
 use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::OnceLock;
 
 /// Neighbouring beams whose spot is measured: the paper's triple beam.
 const SPOT_BEAMS: usize = 3;
@@ -52,6 +56,8 @@ pub struct Laboratory {
     trajectories: Vec<Trajectory>,
     /// What step 1 believes the biases to be.
     believed: RangeBias,
+    /// The ways of all sub-rays over the structure, with its mirrors and without, once they are known.
+    rigs: [OnceLock<Rig>; 2],
 }
 
 /// What a beam met during a scan, free of chance; `None` without an echo.
@@ -99,6 +105,7 @@ impl Laboratory {
             planned,
             boards,
             trajectories,
+            rigs: [OnceLock::new(), OnceLock::new()],
         };
         laboratory.check_markers()?;
         laboratory.check_mishaps()?;
@@ -283,16 +290,23 @@ impl Laboratory {
         })
     }
 
-    /// The rig, and the stretch's board.
-    fn tracks(&self, number: usize, start_s: f64, duration_s: f64) -> Vec<catoptric_model::Track> {
-        let mocap = &self.scene.mocap;
+    /// Frames of motion capture during a stretch.
+    fn frames_of(&self, number: usize) -> u64 {
+        let duration_s = self.planned[number].scans as f64 * self.scene.scanner.limits().scan_period_s();
         // Frame numbers and counts of a recording of hours stay far below 2³².
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let (first_frame, frames) = (
-            (start_s * mocap.frame_rate_hz).round() as u64,
-            ((duration_s * mocap.frame_rate_hz).floor() as u64).max(1),
-        );
-        let track = |body: &Body<'_>| mocap::track(mocap, self.seed, body, start_s, first_frame, frames);
+        let frames = (duration_s * self.scene.mocap.frame_rate_hz).floor() as u64;
+        frames.max(1)
+    }
+
+    /// The rig, and the stretch's board, during some of its frames.
+    fn tracks(&self, number: usize, frames: Range<u64>) -> Vec<catoptric_model::Track> {
+        let mocap = &self.scene.mocap;
+        let start_s = self.start_s(number);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let first_frame = (start_s * mocap.frame_rate_hz).round() as u64;
+        let track =
+            |body: &Body<'_>| mocap::track(mocap, self.seed, body, start_s, first_frame, frames.clone());
         let rig = room::points(&self.scene.superstructure.marker);
         let at_rest = placement::room_from_rig(&self.scene.room);
         let trajectory = self.planned[number].flight.map(|f| &self.trajectories[f]);

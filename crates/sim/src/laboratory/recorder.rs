@@ -1,7 +1,10 @@
 //! A stretch in the making: chance is added scan by scan to what the sensor sees.
 
+use super::chance::ScanLuck;
 use super::{Chances, Laboratory, Returns};
+use crate::reading::Return;
 use crate::scene::EchoChoice;
+use catoptric_model::range::NO_RETURN;
 use catoptric_model::{Stretch, beam};
 
 /// A stretch being recorded.
@@ -9,20 +12,102 @@ pub struct Recorder<'a> {
     laboratory: &'a Laboratory,
     number: usize,
     chances: Chances<'a>,
-    ranges: Vec<f64>,
-    echoes: Option<Vec<Vec<f64>>>,
+    readings: Readings,
+}
+
+/// The readings of scans in a row.
+pub(super) struct Readings {
+    pub(super) ranges: Vec<f64>,
+    pub(super) echoes: Option<Vec<Vec<f64>>>,
 }
 
 impl Laboratory {
     /// Begins to record a stretch; scan after scan is added, as many as [`Laboratory::scans_of`] says.
     pub fn recorder(&self, number: usize) -> Recorder<'_> {
-        let all_echoes = self.scene.detection.echo == EchoChoice::All;
         Recorder {
             laboratory: self,
             number,
             chances: self.chances(number),
-            ranges: Vec::with_capacity(self.planned[number].scans * beam::COUNT),
+            readings: self.readings(self.planned[number].scans),
+        }
+    }
+
+    /// Room for the readings of so many scans.
+    pub(super) fn readings(&self, scans: usize) -> Readings {
+        let all_echoes = self.scene.detection.echo == EchoChoice::All;
+        Readings {
+            ranges: Vec::with_capacity(scans * beam::COUNT),
             echoes: all_echoes.then(Vec::new),
+        }
+    }
+}
+
+/// What every beam met, ready to be read scan after scan.
+pub(super) struct Digest<'r> {
+    returns: &'r Returns,
+    beams: Vec<Reported>,
+    /// The beams of [`Reported::ByChance`].
+    by_chance: Vec<usize>,
+}
+
+/// What a beam reports.
+#[derive(Debug, Clone, Copy)]
+enum Reported {
+    /// No echo.
+    Nothing,
+    /// One echo, which is detected whatever is drawn: its range and the standard deviation of its noise, in metres.
+    Surely { range: f64, noise_sd: f64 },
+    /// One of several, or all, or perhaps none.
+    ByChance,
+}
+
+impl<'r> Digest<'r> {
+    /// The digest of a scan; with `all_echoes` none is simple.
+    pub(super) fn of(returns: &'r Returns, all_echoes: bool) -> Self {
+        let reported = |found: &Option<Return>| match found {
+            None => Reported::Nothing,
+            Some(found) if found.probability >= 1.0 && !all_echoes => Reported::Surely {
+                range: found.range(),
+                noise_sd: found.noise_sd,
+            },
+            Some(_) => Reported::ByChance,
+        };
+        let beams: Vec<Reported> = returns.iter().map(reported).collect();
+        let by_chance = beams.iter().enumerate();
+        let by_chance = by_chance.filter(|(_, reported)| matches!(reported, Reported::ByChance));
+        Self {
+            returns,
+            by_chance: by_chance.map(|(beam, _)| beam).collect(),
+            beams,
+        }
+    }
+
+    /// Whether it is the digest of these.
+    pub(super) fn is_of(&self, returns: &Returns) -> bool {
+        std::ptr::eq(self.returns, returns)
+    }
+
+    /// The beams whose detection is by chance.
+    pub(super) fn by_chance(&self) -> &[usize] {
+        &self.by_chance
+    }
+}
+
+impl Readings {
+    /// Adds a scan.
+    pub(super) fn add(&mut self, laboratory: &Laboratory, seen: &Digest<'_>, luck: &ScanLuck) {
+        let sensor = &laboratory.sensor;
+        let beams = seen.beams.iter().enumerate();
+        self.ranges.extend(beams.map(|(beam, reported)| match *reported {
+            Reported::Nothing => NO_RETURN,
+            Reported::Surely { range, noise_sd } => {
+                sensor.read_echo(range, noise_sd, &luck.but_detection(beam))
+            }
+            Reported::ByChance => sensor.read(seen.returns[beam].as_ref(), &luck.of(beam)),
+        }));
+        if let Some(echoes) = &mut self.echoes {
+            let beams = seen.returns.iter().enumerate();
+            echoes.extend(beams.map(|(beam, found)| sensor.read_all(found.as_ref(), &luck.of(beam))));
         }
     }
 }
@@ -30,31 +115,34 @@ impl Laboratory {
 impl Recorder<'_> {
     /// Adds a scan from what [`super::Sight::returns`] found for it.
     pub fn add(&mut self, returns: &Returns) {
-        let sensor = &self.laboratory.sensor;
-        // They never end.
-        let chances = self.chances.next().unwrap_or_default();
-        let readings = returns.iter().map(Option::as_ref).zip(&chances);
-        self.ranges
-            .extend(readings.clone().map(|(found, chance)| sensor.read(found, chance)));
-        if let Some(echoes) = &mut self.echoes {
-            echoes.extend(readings.map(|(found, chance)| sensor.read_all(found, chance)));
-        }
+        let digest = Digest::of(returns, self.readings.echoes.is_some());
+        let luck = self.chances.next_scan(Some(digest.by_chance()));
+        self.readings.add(self.laboratory, &digest, luck);
     }
 
     /// The stretch, with what motion capture saw meanwhile.
     pub fn finish(self) -> Stretch {
-        let (laboratory, number) = (self.laboratory, self.number);
-        let scan_period_s = laboratory.scene.scanner.limits().scan_period_s();
-        let start_s = laboratory.start_s(number);
-        let duration_s = laboratory.planned[number].scans as f64 * scan_period_s;
+        let frames = 0..self.laboratory.frames_of(self.number);
+        self.laboratory.stretch_of(self.number, self.readings, frames)
+    }
+}
+
+impl Laboratory {
+    /// Readings with frames and all that is noted of the stretch.
+    pub(super) fn stretch_of(
+        &self,
+        number: usize,
+        readings: Readings,
+        frames: std::ops::Range<u64>,
+    ) -> Stretch {
         Stretch {
-            label: laboratory.label(number),
-            start_s,
-            scan_period_s,
+            label: self.label(number),
+            start_s: self.start_s(number),
+            scan_period_s: self.scene.scanner.limits().scan_period_s(),
             beams: beam::COUNT,
-            ranges: self.ranges,
-            echoes: self.echoes,
-            tracks: laboratory.tracks(number, start_s, duration_s),
+            ranges: readings.ranges,
+            echoes: readings.echoes,
+            tracks: self.tracks(number, frames),
         }
     }
 }

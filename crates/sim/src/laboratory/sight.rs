@@ -6,8 +6,8 @@
 use super::{Laboratory, Returns, wall_targets};
 use crate::color;
 use crate::error::SimError;
-use crate::optics::{Mirrors, Setting};
-use crate::reading::SubRayEnd;
+use crate::optics::{Mirrors, Rig, Setting};
+use crate::reading::{Parts, SubRayEnd};
 use crate::stage::Stage;
 use crate::trajectory::Trajectory;
 use catoptric_model::{Pose, PoseKind, beam};
@@ -20,7 +20,12 @@ pub struct Sight<'a> {
     /// What it is like from a scan on, after the board has moved.
     after: Option<(usize, Setting<'a>)>,
     trajectory: Option<&'a Trajectory>,
+    /// The structure's part in all of it.
+    rig: &'a Rig,
 }
+
+/// Fewest beams of a scan that are worth another thread.
+const BEAMS_AT_ONCE: usize = 64;
 
 impl Laboratory {
     /// What the sensor sees during a stretch.
@@ -54,7 +59,12 @@ impl Laboratory {
             }
             None => None,
         };
+        let mirrors = match planned.kind {
+            PoseKind::Bare => Mirrors::Removed,
+            _ => Mirrors::Attached,
+        };
         Ok(Sight {
+            rig: self.rig(mirrors)?,
             after,
             laboratory: self,
             setting,
@@ -72,6 +82,19 @@ impl Laboratory {
         Setting::in_room(&self.scene, &self.structure, mirrors, Some(&self.stage), targets)
     }
 
+    /// The structure's part in what the sensor sees, with or without its mirrors; compiled when it is first asked for.
+    fn rig(&self, mirrors: Mirrors) -> Result<&Rig, SimError> {
+        let kept = match mirrors {
+            Mirrors::Attached => &self.rigs[0],
+            Mirrors::Removed => &self.rigs[1],
+        };
+        if let Some(rig) = kept.get() {
+            return Ok(rig);
+        }
+        let bare = Setting::new(&self.scene, &self.structure, mirrors, Vec::new())?;
+        Ok(kept.get_or_init(|| self.sensor.compile(&bare)))
+    }
+
     /// Time at which a beam of a scan is read, in seconds since its stretch began.
     pub(super) fn elapsed_s(&self, scan: usize, beam: usize) -> f64 {
         let limits = self.scene.scanner.limits();
@@ -83,6 +106,11 @@ impl Sight<'_> {
     /// Whether something moves, so that not all scans are alike.
     pub fn moves(&self) -> bool {
         self.trajectory.is_some() || self.after.is_some()
+    }
+
+    /// Whether the sensor itself moves, so that no two scans are alike.
+    pub fn flies(&self) -> bool {
+        self.trajectory.is_some()
     }
 
     /// Whether a scan may see something else than the one before it; the first has none.
@@ -97,9 +125,16 @@ impl Sight<'_> {
 
     /// What every beam of a scan meets; the same as for the scan before unless [`Sight::changes_at`] says otherwise.
     pub fn returns(&self, scan: usize) -> Returns {
-        let beams = (0..beam::COUNT).into_par_iter();
+        let sensor = &self.laboratory.sensor;
+        let beams = (0..beam::COUNT).into_par_iter().with_min_len(BEAMS_AT_ONCE);
+        let observe = |parts: &mut Parts, setting: &Setting<'_>, b| match self.rig {
+            rig if rig.holds_in(setting) => sensor.observe_over(rig, setting, b, parts),
+            _ => sensor.observe(setting, b),
+        };
         beams
-            .map(|b| self.seen_by(scan, b, |setting| self.laboratory.sensor.observe(setting, b)))
+            .map_init(Parts::default, |parts, b| {
+                self.seen_by(scan, b, |setting| observe(parts, setting, b))
+            })
             .collect()
     }
 

@@ -1,10 +1,11 @@
 //! Everything that light can meet, and how it is listed.
 //!
-//! Rays are cast in the sensor frame. While nothing moves, all surfaces are in it. In a flight the structure is, which
-//! moves with the sensor, and the room is in the sensor frame of the flight's start: every leg is cast into both, each
-//! time from where the sensor is then, and the nearer surface counts.
+//! Rays are cast in the sensor frame. The structure is in it, and while nothing moves so is the room. In a flight the
+//! room is in the sensor frame of the flight's start. Every leg is cast into both, each time from where the sensor is
+//! then, and the nearer surface counts.
 
 use super::MAX_BOUNCES;
+use super::clearance::Extent;
 use crate::cast::{Hit, Shape, World};
 use crate::color::{self, Paint};
 use crate::error::SimError;
@@ -13,9 +14,9 @@ use crate::scene::Scene;
 use crate::stage::Stage;
 use crate::structure::{Back, BuiltFacet, Part, Structure};
 use catoptric_model::Pose;
-use nalgebra::{Unit, Vector3};
+use nalgebra::{Point3, Unit, Vector3};
 use std::borrow::Cow;
-use std::sync::Arc;
+use std::ops::Deref;
 
 /// What a surface is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -34,17 +35,40 @@ pub enum Role {
 
 /// Everything that light can meet during one stretch, as the sensor sees it from where it is.
 pub struct Setting<'a> {
-    pub(super) contents: Arc<Contents<'a>>,
+    pub(super) contents: Held<'a>,
     /// Where the sensor is in the frame that the room is kept in; `None` where it started.
     start_from_sensor: Option<Pose>,
 }
 
+/// The contents of a setting, or those of another one that is seen from elsewhere.
+pub(super) enum Held<'a> {
+    Own(Box<Contents<'a>>),
+    Lent(&'a Contents<'a>),
+}
+
+impl<'a> Deref for Held<'a> {
+    type Target = Contents<'a>;
+
+    fn deref(&self) -> &Contents<'a> {
+        match self {
+            Self::Own(contents) => contents,
+            Self::Lent(contents) => contents,
+        }
+    }
+}
+
 /// What a setting holds, wherever the sensor is.
 pub(super) struct Contents<'a> {
-    /// What moves with the sensor, in its frame; all there is while nothing moves.
+    /// The structure, which moves with the sensor, in its frame.
     world: World,
-    /// What the sensor moves past.
+    /// What the sensor stands in or moves past, if anything.
     room: Option<World>,
+    /// Where that is.
+    extents: Vec<Extent>,
+    /// Radius of a ball around the sensor that holds the structure, in metres.
+    pub(super) span: f64,
+    /// Whether the sensor can move.
+    flies: bool,
     surfaces: Vec<Surface>,
     /// Index of the first surface of the room.
     first_of_room: usize,
@@ -91,6 +115,9 @@ pub enum Mirrors {
     /// Step 3: the bare structure behind them is seen.
     Removed,
 }
+
+/// What a leg beyond the structure meets, and the normal there in the sensor frame.
+pub(crate) type Met = Option<(Hit, Unit<Vector3<f64>>)>;
 
 /// A painted surface in the sensor frame: a board or a wall.
 pub struct Target {
@@ -140,13 +167,7 @@ impl<'a> Setting<'a> {
             mirrors.iter().map(Cow::Borrowed),
             parts,
         )?;
-        Ok(Self::of(
-            scene,
-            (list.shapes, None),
-            list.surfaces,
-            first_of_room,
-            facets,
-        ))
+        Ok(Self::of(scene, list, first_of_room, facets, false))
     }
 
     /// The structure with its mirrors, flying past the targets and what stands in the room, all of it in the sensor
@@ -164,46 +185,86 @@ impl<'a> Setting<'a> {
         let first_of_room = list.shapes.len();
         let mirrors = stage.mirrors.into_iter().map(Cow::Owned);
         list.room(scene, &mut facets, targets, mirrors, &stage.surfaces)?;
-        let room = list.shapes.split_off(first_of_room);
-        Ok(Self::of(
-            scene,
-            (list.shapes, Some(room)),
-            list.surfaces,
-            first_of_room,
-            facets,
-        ))
+        Ok(Self::of(scene, list, first_of_room, facets, true))
     }
 
     fn of(
         scene: &Scene,
-        (shapes, room): (Vec<Shape>, Option<Vec<Shape>>),
-        surfaces: Vec<Surface>,
+        mut list: List,
         first_of_room: usize,
         facets: Vec<Cow<'a, BuiltFacet>>,
+        flies: bool,
     ) -> Self {
+        let room = list.shapes.split_off(first_of_room);
+        let corners = list.shapes.iter().flat_map(|shape| match shape {
+            Shape::Mesh(mesh) => mesh.vertices().to_vec(),
+            _ => shape.triangles().into_iter().flatten().collect(),
+        });
         let contents = Contents {
-            world: World::new(shapes),
-            room: room.map(World::new),
-            surfaces,
+            // Cylinders are drawn with flat faces.
+            span: 1.01 * corners.map(|c| c.coords.norm()).fold(0.0, f64::max),
+            world: World::new(list.shapes),
+            extents: room.iter().map(Extent::of).collect(),
+            room: (!room.is_empty()).then(|| World::new(room)),
+            surfaces: list.surfaces,
             first_of_room,
+            flies,
             facets,
             max_bounces: (scene.superstructure.max_bounces as usize).min(MAX_BOUNCES),
             diffuse_reflectivity: scene.superstructure.mirror.diffuse_reflectivity,
         };
         Self {
-            contents: Arc::new(contents),
+            contents: Held::Own(Box::new(contents)),
             start_from_sensor: None,
         }
     }
 
     /// The same from another place of the sensor; exactly the same where it has not moved, and where nothing can.
     #[must_use]
-    pub fn seen_from(&self, start_from_sensor: &Pose) -> Self {
-        let moved = self.contents.room.is_some() && *start_from_sensor != Pose::identity();
-        Self {
-            contents: Arc::clone(&self.contents),
+    pub fn seen_from(&self, start_from_sensor: &Pose) -> Setting<'_> {
+        let moved = self.contents.flies && *start_from_sensor != Pose::identity();
+        Setting {
+            contents: Held::Lent(&self.contents),
             start_from_sensor: moved.then_some(*start_from_sensor),
         }
+    }
+
+    /// Whether nothing of the room is within a distance of the sensor, in metres.
+    pub(super) fn is_clear(&self, distance: f64) -> bool {
+        let sensor = self
+            .start_from_sensor
+            .map_or_else(Point3::origin, |pose| Point3::from(pose.translation.vector));
+        self.contents
+            .extents
+            .iter()
+            .all(|e| e.is_beyond(&sensor, distance))
+    }
+
+    /// The nearest surface of the room alone along every ray of a beam, given in the sensor frame, and the normal there in
+    /// that frame. The rays are left in the frame that the room is kept in.
+    pub(crate) fn cast_into_room(&self, rays: &mut [Ray], hits: &mut Vec<Met>) {
+        hits.clear();
+        let Some(room) = &self.contents.room else {
+            hits.resize(rays.len(), None);
+            return;
+        };
+        let moved = self.start_from_sensor.as_ref();
+        if let Some(pose) = moved {
+            for ray in &mut *rays {
+                *ray = placed(ray, pose);
+            }
+        }
+        hits.extend(rays.iter().map(|ray| {
+            let mut hit = room.cast(ray, None)?;
+            hit.surface += self.contents.first_of_room;
+            let normal = moved.map_or(hit.normal, |pose| pose.inverse_transform_unit_vector(&hit.normal));
+            Some((hit, normal))
+        }));
+    }
+
+    /// Whether a hit is on something that reflects.
+    pub(crate) fn is_reflected(&self, hit: &Hit) -> bool {
+        self.reflecting(hit).is_some()
     }
 
     /// What a surface is.

@@ -1,7 +1,7 @@
 //! Which echoes a beam's light makes, and what the detector reads in each of them.
 
-use super::{Part, Sensor};
-use crate::detect::Pulse;
+use super::Sensor;
+use super::part::{Part, Parts};
 use crate::echo::Echo;
 use crate::phase;
 use crate::scene::{Detector, EchoChoice, Principle};
@@ -45,7 +45,7 @@ impl Sensor {
 
     /// The echoes of pulsed light in the order of `detection.echo`.
     pub(super) fn receive_pulses<'a>(&self, parts: &'a [Part], physical: bool) -> Vec<Seen<'a>> {
-        let all: Vec<Pulse> = parts.iter().flat_map(|p| p.pulses.iter().copied()).collect();
+        let all = Parts::pulses(parts);
         let mut echoes = self.receiver.echoes(&all, self.faintest());
         match self.detection.echo {
             EchoChoice::First | EchoChoice::All => {}
@@ -84,7 +84,7 @@ impl Sensor {
     /// The one range of modulated light.
     pub(super) fn receive_phase<'a>(&self, parts: &'a [Part], physical: bool) -> Vec<Seen<'a>> {
         let ambiguity = phase::ambiguity(self.detection.modulation_hz);
-        let all: Vec<Pulse> = parts.iter().flat_map(|p| p.pulses.iter().copied()).collect();
+        let all = Parts::pulses(parts);
         let strongest = parts.iter().max_by(|a, b| a.power.total_cmp(&b.power));
         let Some((part, whole)) = strongest.zip(phase::sum(&all, ambiguity)) else {
             return Vec::new();

@@ -27,18 +27,46 @@ pub struct Chance {
     pub detection: [f64; MAX_ECHOES],
 }
 
+/// [`f64::round`] without a call into the system's library.
+fn rounded(x: f64) -> f64 {
+    /// Every number from here on is whole.
+    const WHOLE: f64 = 4_503_599_627_370_496.0;
+    if x.is_nan() || x.abs() >= WHOLE {
+        return x;
+    }
+    // The fraction is cut off, and what was cut off is exact.
+    #[allow(clippy::cast_possible_truncation)]
+    let whole = x as i64 as f64;
+    let rest = x - whole;
+    if rest >= 0.5 {
+        whole + 1.0
+    } else if rest <= -0.5 {
+        whole - 1.0
+    } else {
+        whole
+    }
+}
+
 impl Sensor {
     /// A reading of one scan, in metres: the beam's range with everything by chance, rounded, or a code.
     ///
     /// What is no range stays none: noise never touches a code.
     pub fn read(&self, found: Option<&Return>, chance: &Chance) -> f64 {
-        use catoptric_model::range::{INVALID, NO_RETURN};
+        use catoptric_model::range::NO_RETURN;
         let detected = self.detected(found, chance).next();
-        let Some(found) = detected else { return NO_RETURN };
+        detected.map_or(NO_RETURN, |found| {
+            self.read_echo(found.range(), found.noise_sd, chance)
+        })
+    }
+
+    /// The same of an echo that is detected, by its [`Return::range`] and the standard deviation of its noise, in metres.
+    #[inline]
+    pub fn read_echo(&self, range: f64, noise_sd: f64, chance: &Chance) -> f64 {
+        use catoptric_model::range::INVALID;
         if self.errors.model != ErrorModel::None && chance.dropout < self.errors.dropout {
             return INVALID;
         }
-        self.report(found, chance)
+        self.report(range, noise_sd, chance)
     }
 
     /// All echoes of a reading that are reported, in metres, nearest first; a lost reading has none.
@@ -50,7 +78,7 @@ impl Sensor {
         }
         self.detected(found, chance)
             .take(self.limits.echoes as usize)
-            .map(|echo| self.report(echo, chance))
+            .map(|echo| self.report(echo.range(), echo.noise_sd, chance))
             .collect()
     }
 
@@ -68,20 +96,21 @@ impl Sensor {
     }
 
     /// An echo's range as it is reported, in metres, or the code of one that cannot be.
-    fn report(&self, found: &Return, chance: &Chance) -> f64 {
+    #[inline]
+    fn report(&self, range: f64, noise_sd: f64, chance: &Chance) -> f64 {
         use catoptric_model::range::{NO_RETURN, TOO_CLOSE};
         if self.errors.model == ErrorModel::None {
-            return if found.range() < self.limits.range_min_m {
+            return if range < self.limits.range_min_m {
                 TOO_CLOSE
             } else {
-                found.range()
+                range
             };
         }
-        let white = found.range() + chance.drift + found.noise_sd * chance.noise;
+        let white = range + chance.drift + noise_sd * chance.noise;
         let range = white + (chance.warm_up + chance.correlated + chance.interference + chance.element);
         let step = self.errors.quantization_mm * 1e-3;
         let range = if step > 0.0 {
-            (range / step).round() * step
+            rounded(range / step) * step
         } else {
             range
         };
@@ -92,5 +121,30 @@ impl Sensor {
         } else {
             range
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_is_that_of_the_standard_library() {
+        let edges = [
+            0.0,
+            0.49999999999999994,
+            0.5,
+            1.5,
+            2.5,
+            4503599627370495.5,
+            9e15,
+            f64::INFINITY,
+        ];
+        let between = (0..100_000).map(|i| f64::from(i) * 0.0173);
+        for x in edges.into_iter().chain(between) {
+            assert_eq!(rounded(x), x.round(), "{x}");
+            assert_eq!(rounded(-x), (-x).round(), "{}", -x);
+        }
+        assert!(rounded(f64::NAN).is_nan());
     }
 }

@@ -4,7 +4,7 @@
 
 use super::Sensor;
 use crate::footprint::{self, SubRay};
-use crate::optics::{End, Path, Setting};
+use crate::optics::{End, Meeting, Path, Setting};
 use crate::power::{self, Illumination};
 use nalgebra::Point3;
 
@@ -86,7 +86,7 @@ impl Sensor {
             };
             ends.push(end(Light::Beam, &path));
             ends.extend(setting.ghosts(&ray, &path).map(|ghost| end(Light::Ghost, &ghost)));
-            for arrival in self.on_mirrors(setting, sub_ray, &path) {
+            for arrival in self.on_mirrors(setting, sub_ray, path.meetings()) {
                 ends.push(SubRayEnd {
                     number,
                     sub_ray: *sub_ray,
@@ -129,7 +129,7 @@ impl Sensor {
                 cos_incidence: hit.normal.dot(&path.last.direction).abs(),
                 share: sub_ray.weight,
                 range: path.length,
-                mirrors: libm::pow(self.mirror_reflectivity, path.silvered as f64) * path.gain,
+                mirrors: self.mirrors[path.silvered] * path.gain,
             },
             gain: path.gain,
         })
@@ -140,10 +140,10 @@ impl Sensor {
         &self,
         setting: &Setting<'_>,
         sub_ray: &SubRay,
-        path: &Path,
+        meetings: impl Iterator<Item = Meeting>,
     ) -> impl Iterator<Item = Arrival> {
         let reflectivity = setting.diffuse_reflectivity();
-        let meetings = path.meetings().enumerate().filter(move |_| reflectivity > 0.0);
+        let meetings = meetings.enumerate().filter(move |_| reflectivity > 0.0);
         meetings.map(move |(bounces, meeting)| Arrival {
             surface: meeting.surface,
             bounces,
@@ -152,7 +152,7 @@ impl Sensor {
                 cos_incidence: meeting.cos_incidence.max(0.0),
                 share: sub_ray.weight,
                 range: meeting.length,
-                mirrors: libm::pow(self.mirror_reflectivity, meeting.silvered as f64) * meeting.gain,
+                mirrors: self.mirrors[meeting.silvered] * meeting.gain,
             },
             gain: reflectivity * meeting.gain,
         })

@@ -1,0 +1,160 @@
+//! All columns of a row at once: the numbers that [`Draws`] gives one by one, to the last bit.
+//!
+//! A column's words are one block of ChaCha, so that a row is one run of the stream.
+
+use super::{Draws, Purpose, WORDS_PER_COLUMN, standard_uniform};
+use crate::lanes::{LANES, cosine, logarithm};
+use rand::rand_core::Rng;
+
+/// Bytes of a column.
+const BLOCK: usize = 4 * WORDS_PER_COLUMN;
+
+/// The draws of all columns of a row.
+#[derive(Debug, Clone, Default)]
+pub struct Columns {
+    bytes: Vec<u8>,
+}
+
+impl Columns {
+    /// Draws a row of so many columns in place of what was here.
+    pub fn draw(&mut self, columns: usize, seed: u64, purpose: Purpose, row: u64) {
+        self.bytes.resize(columns * BLOCK, 0);
+        Draws::new(seed, purpose, row).rng.fill_bytes(&mut self.bytes);
+    }
+
+    /// Forgets the row: there are no columns.
+    pub fn clear(&mut self) {
+        self.bytes.clear();
+    }
+
+    /// Number of columns.
+    pub fn len(&self) -> usize {
+        self.bytes.len() / BLOCK
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.bytes.is_empty()
+    }
+
+    /// What [`Draws::uniform`] is after so many uniform draws of a column; a normal draw counts as two.
+    pub fn uniform(&self, column: usize, after: usize) -> f64 {
+        standard_uniform(word(&self.bytes[column * BLOCK..], after))
+    }
+
+    /// [`Columns::uniform`] of every column.
+    pub fn uniforms(&self, after: usize, out: &mut Vec<f64>) {
+        let blocks = self.bytes.chunks_exact(BLOCK);
+        out.clear();
+        out.extend(blocks.map(|block| standard_uniform(word(block, after))));
+    }
+
+    /// What [`Draws::normal`] is in every column after so many uniform draws.
+    pub fn normals(&self, after: usize, out: &mut Vec<f64>) {
+        out.clear();
+        out.reserve(self.len());
+        let mut groups = self.bytes.chunks_exact(BLOCK * LANES);
+        for group in &mut groups {
+            let uniform = |after: usize| -> [f64; LANES] {
+                std::array::from_fn(|lane| standard_uniform(word(&group[lane * BLOCK..], after)))
+            };
+            out.extend(normal(&uniform(after), &uniform(after + 1)));
+        }
+        for block in groups.remainder().chunks_exact(BLOCK) {
+            let uniform = |after| standard_uniform(word(block, after));
+            out.push(scalar(uniform(after), uniform(after + 1)));
+        }
+    }
+}
+
+/// A word of 64 bits of a block.
+fn word(block: &[u8], index: usize) -> u64 {
+    let mut bytes = [0; 8];
+    bytes.copy_from_slice(&block[8 * index..8 * index + 8]);
+    u64::from_le_bytes(bytes)
+}
+
+/// Box and Muller's transform as [`Draws::normal`] has it.
+pub(super) fn scalar(first: f64, second: f64) -> f64 {
+    let radius = (-2.0 * libm::log(first)).sqrt();
+    radius * libm::cos(std::f64::consts::TAU * second)
+}
+
+/// The same of several pairs of numbers from (0, 1].
+fn normal(first: &[f64; LANES], second: &[f64; LANES]) -> [f64; LANES] {
+    let mut out = [0.0; LANES];
+    let mut rare = false;
+    for lane in 0..LANES {
+        let turn = std::f64::consts::TAU * second[lane];
+        let (cosine, near_root) = cosine(turn);
+        rare |= near_root;
+        out[lane] = (-2.0 * logarithm(first[lane])).sqrt() * cosine;
+    }
+    if rare {
+        return std::array::from_fn(|lane| scalar(first[lane], second[lane]));
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_are_the_draws_one_by_one() {
+        let mut columns = Columns::default();
+        let (mut normals, mut later, mut uniforms) = (Vec::new(), Vec::new(), Vec::new());
+        for (row, count) in [(0, 1081), (1, 8), (7, 5), (9, 40_000)] {
+            columns.draw(count, 3, Purpose::Reading, row);
+            columns.normals(0, &mut normals);
+            columns.uniforms(2, &mut uniforms);
+            columns.normals(3, &mut later);
+            assert_eq!(
+                (columns.len(), normals.len(), uniforms.len()),
+                (count, count, count)
+            );
+            let mut draws = Draws::new(3, Purpose::Reading, row);
+            for column in 0..count {
+                draws.seek(column as u64);
+                assert_eq!(draws.normal().to_bits(), normals[column].to_bits());
+                let uniform = draws.uniform();
+                assert_eq!(uniform, uniforms[column]);
+                assert_eq!(uniform, columns.uniform(column, 2));
+                assert_eq!(draws.normal().to_bits(), later[column].to_bits());
+            }
+        }
+    }
+
+    /// Near the places where `libm` changes its way, and at the ends.
+    #[test]
+    fn deviates_are_those_of_libm_where_it_changes_its_way() {
+        let mut edges = vec![f64::EPSILON / 4.0, 0.5, 1.0, 2e-17, 1e-9, 3e-9, 0.999_999_999];
+        for k in 1..16 {
+            let place = f64::from(k) / 16.0;
+            for step in -400..=400 {
+                edges.push(place + f64::from(step) * 1e-17);
+                edges.push(place + f64::from(step) * 1e-8);
+            }
+        }
+        // √½ and √2, where the logarithm's argument is halved.
+        for step in -400..=400 {
+            edges.push(std::f64::consts::FRAC_1_SQRT_2 + f64::from(step) * 1e-9);
+        }
+        for pair in edges.chunks_exact(LANES) {
+            let second: [f64; LANES] = std::array::from_fn(|lane| pair[lane]);
+            for first in [[0.3; LANES], second] {
+                let made = normal(&first, &second);
+                for lane in 0..LANES {
+                    let exact = scalar(first[lane], second[lane]);
+                    assert_eq!(
+                        made[lane].to_bits(),
+                        exact.to_bits(),
+                        "{} {}",
+                        first[lane],
+                        second[lane]
+                    );
+                }
+            }
+        }
+    }
+}

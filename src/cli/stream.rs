@@ -1,0 +1,230 @@
+//! A recording in the making: excerpts of its stretches, so many at a time that every thread has work and no more.
+//!
+//! A stretch is opened once: what its sensor sees while nothing moves is traced then. Its excerpts are drawn and recorded
+//! side by side, linked in order between the two, and encoded on the thread that recorded them.
+
+use super::error::CliError;
+use super::truth_tables::{rows_of_readings, rows_of_returns};
+use catoptric::io::recording::{Encoded, RecordingEncoder};
+use catoptric::model::{Pose, beam};
+use catoptric::sim::laboratory::{Drawn, Memory, Returns, Sight};
+use catoptric::sim::reading::Return;
+use catoptric::sim::{Laboratory, SimError};
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Scans of an excerpt: as many as make half a megabyte of readings.
+const SCANS: usize = 64;
+
+/// Excerpts that are made at a time for every thread.
+const PER_THREAD: usize = 2;
+
+/// A table of the truth that is written row by row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Table {
+    Returns,
+    Readings,
+    SubRays,
+}
+
+/// The excerpts of a recording, in order.
+pub(super) struct Stream<'a> {
+    laboratory: &'a Laboratory,
+    encoder: &'a RecordingEncoder,
+    tables: Vec<Table>,
+    /// The next excerpt: stretch and scan.
+    next: (usize, usize),
+    /// The stretch that the last excerpt was of.
+    open: Option<Arc<Open<'a>>>,
+    memory: Memory,
+}
+
+/// A stretch of which excerpts are made.
+struct Open<'a> {
+    sight: Sight<'a>,
+    first_seen: Vec<Option<(f64, Pose)>>,
+    /// What is seen from which scan on; empty of a flight, whose every scan sees something else.
+    seen: Vec<(usize, Returns)>,
+    trace: Duration,
+}
+
+/// An excerpt as it is to be written.
+pub(super) struct Made<'a> {
+    open: Arc<Open<'a>>,
+    pub(super) number: usize,
+    pub(super) scans: Range<usize>,
+    pub(super) encoded: Encoded,
+    /// Rows of the tables that are wanted, but those of sub-rays.
+    pub(super) texts: Vec<String>,
+    /// Straight pieces of the beams that were traced for it.
+    pub(super) segments: usize,
+    pub(super) trace: Duration,
+    pub(super) sample: Duration,
+    pub(super) encode: Duration,
+}
+
+impl<'a> Stream<'a> {
+    /// The excerpts of a recording with the rows of some tables.
+    pub(super) fn new(laboratory: &'a Laboratory, encoder: &'a RecordingEncoder, tables: Vec<Table>) -> Self {
+        Self {
+            laboratory,
+            encoder,
+            tables,
+            next: (0, 0),
+            open: None,
+            memory: Memory::default(),
+        }
+    }
+
+    /// The next excerpts, as many as keep so many threads at work; none after the last.
+    pub(super) fn next(&mut self, threads: usize) -> Result<Vec<Made<'a>>, CliError> {
+        let laboratory = self.laboratory;
+        let excerpts: Vec<_> = std::iter::from_fn(|| self.step())
+            .take(PER_THREAD * threads)
+            .collect();
+        let begun: Vec<usize> = excerpts
+            .iter()
+            .filter(|(_, scans)| scans.start == 0)
+            .map(|(number, _)| *number)
+            .collect();
+        let opened: Vec<Arc<Open<'a>>> = begun
+            .par_iter()
+            .map(|number| Open::of(laboratory, *number).map(Arc::new))
+            .collect::<Result<_, SimError>>()?;
+        let mut opened = opened.into_iter();
+        let mut drawn: Vec<(Drawn, Duration)> = excerpts
+            .par_iter()
+            .map(|(number, scans)| {
+                let begin = Instant::now();
+                let drawn = laboratory.draw(*number, scans.clone());
+                (drawn, begin.elapsed())
+            })
+            .collect();
+        let mut work = Vec::with_capacity(drawn.len());
+        for (drawn, time) in &mut drawn {
+            let begin = Instant::now();
+            laboratory.link(drawn, &mut self.memory);
+            if drawn.scans().start == 0 {
+                self.open = opened.next();
+            }
+            *time += begin.elapsed();
+            work.extend(self.open.clone());
+        }
+        let work: Vec<_> = work.into_iter().zip(drawn).collect();
+        let made = work.into_par_iter().map(|(open, (drawn, time))| {
+            let mut made = self.make(open, &drawn)?;
+            made.sample += time;
+            Ok(made)
+        });
+        made.collect()
+    }
+
+    /// Stretch and scans of the next excerpt.
+    fn step(&mut self) -> Option<(usize, Range<usize>)> {
+        let (number, scan) = self.next;
+        if number == self.laboratory.stretches() {
+            return None;
+        }
+        let all = self.laboratory.scans_of(number);
+        let end = all.min(scan + SCANS);
+        self.next = if end == all {
+            (number + 1, 0)
+        } else {
+            (number, end)
+        };
+        Some((number, scan..end))
+    }
+
+    fn make(&self, open: Arc<Open<'a>>, drawn: &Drawn) -> Result<Made<'a>, CliError> {
+        let (laboratory, number, scans) = (self.laboratory, drawn.number(), drawn.scans());
+        let begin = Instant::now();
+        let flown: Vec<Returns> = if open.seen.is_empty() {
+            scans.clone().map(|scan| open.sight.returns(scan)).collect()
+        } else {
+            Vec::new()
+        };
+        let mut trace = begin.elapsed();
+        let mut segments = flown.iter().map(segments_of).sum();
+        if scans.start == 0 {
+            trace += open.trace;
+            segments += open.seen.iter().map(|(_, seen)| segments_of(seen)).sum::<usize>();
+        }
+        let begin = Instant::now();
+        let returns = |scan: usize| match open.seen.iter().rfind(|(from, _)| *from <= scan) {
+            Some((_, seen)) => seen,
+            None => &flown[scan - scans.start],
+        };
+        let excerpt = laboratory.excerpt(drawn, &open.first_seen, returns);
+        let sample = begin.elapsed();
+        let begin = Instant::now();
+        let encoded = self.encoder.encode_excerpt(&excerpt)?;
+        let mut texts = Vec::new();
+        for table in &self.tables {
+            texts.extend(match table {
+                Table::Returns if open.sight.moves() => Some(
+                    scans
+                        .clone()
+                        .map(|scan| rows_of_returns(laboratory, number, returns(scan), &scan.to_string()))
+                        .collect(),
+                ),
+                Table::Returns if scans.start > 0 => Some(String::new()),
+                Table::Returns => Some(rows_of_returns(laboratory, number, returns(0), "")),
+                Table::Readings => {
+                    let readings = excerpt.part.ranges.chunks(beam::COUNT);
+                    let rows = scans.clone().zip(readings).map(|(scan, readings)| {
+                        let chances = laboratory.scan_chances(drawn, scan);
+                        rows_of_readings(laboratory, (number, scan), returns(scan), &chances, readings)
+                    });
+                    Some(rows.collect())
+                }
+                Table::SubRays => None,
+            });
+        }
+        Ok(Made {
+            open,
+            number,
+            scans,
+            encoded,
+            texts,
+            segments,
+            trace,
+            sample,
+            encode: begin.elapsed(),
+        })
+    }
+}
+
+impl<'a> Open<'a> {
+    fn of(laboratory: &'a Laboratory, number: usize) -> Result<Self, SimError> {
+        let begin = Instant::now();
+        let sight = laboratory.sight(number)?;
+        let mut seen = Vec::new();
+        if !sight.flies() {
+            seen.push((0, sight.returns(0)));
+            let scans = 1..laboratory.scans_of(number);
+            let changes = scans.filter(|scan| sight.changes_at(*scan));
+            seen.extend(changes.map(|scan| (scan, sight.returns(scan))));
+        }
+        let trace = begin.elapsed();
+        Ok(Self {
+            first_seen: laboratory.first_seen(number),
+            sight,
+            seen,
+            trace,
+        })
+    }
+}
+
+impl<'a> Made<'a> {
+    /// What the sensor sees during the stretch.
+    pub(super) fn sight(&self) -> &Sight<'a> {
+        &self.open.sight
+    }
+}
+
+fn segments_of(returns: &Returns) -> usize {
+    let pieces = |r: &Option<Return>| r.as_ref().map_or(1, |r| r.facets.len() + 1);
+    returns.iter().map(pieces).sum()
+}

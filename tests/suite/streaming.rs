@@ -1,0 +1,326 @@
+//! Recording as a stream: excerpts are the stretch, nothing depends on threads, memory does not grow with the scans, and a
+//! stopped run leaves nothing; and the structure's part in the beams' ways, compiled, is what tracing all of it finds.
+//!
+//! Memory is counted in the readings that are on their way, as the program reports them. What the allocator makes of it is
+//! not measured here.
+
+use crate::common::{catoptric, run, stderr, stdout};
+use crate::scenes::{PROTOTYPE, TWO_MIRROR, scene};
+use catoptric::io::scene::load;
+use catoptric::io::{DatasetWriter, Provenance};
+use catoptric::model::{Excerpt, Pose, beam};
+use catoptric::sim::laboratory::Memory;
+use catoptric::sim::optics::{Mirrors, Setting};
+use catoptric::sim::scene::{Correlated, EchoChoice, Interference};
+use catoptric::sim::structure::Structure;
+use catoptric::sim::{Laboratory, Scene};
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+fn file(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"))
+}
+
+/// Few scans of the two-mirror layout with every error by chance.
+fn noisy() -> Scene {
+    let mut scene = scene(TWO_MIRROR);
+    scene.scanner.sub_rays = 5;
+    scene.experiment.scans_per_pose = 7;
+    scene.experiment.room_scans = 3;
+    scene.experiment.bare_scans = 1;
+    scene.detection.noise_over_threshold = 0.1;
+    scene.detection.echo = EchoChoice::All;
+    scene.errors.element_sd_mm = 0.5;
+    scene.errors.dropout = 0.05;
+    scene.errors.correlated = Some(Correlated {
+        sd_mm: 1.0,
+        time_constant_s: 0.1,
+    });
+    scene.errors.interference = Some(Interference {
+        step_mm: 100.0,
+        probability: 0.05,
+    });
+    scene
+}
+
+/// A stretch excerpt by excerpt, drawn in the wrong order and linked in the right one.
+fn excerpts(laboratory: &Laboratory, number: usize, scans: usize) -> Vec<Excerpt> {
+    let all = laboratory.scans_of(number);
+    let starts: Vec<usize> = (0..all).step_by(scans).collect();
+    let mut drawn: Vec<_> = starts
+        .iter()
+        .rev()
+        .map(|from| laboratory.draw(number, *from..all.min(from + scans)))
+        .collect();
+    drawn.reverse();
+    let mut memory = Memory::default();
+    for drawn in &mut drawn {
+        laboratory.link(drawn, &mut memory);
+    }
+    let sight = laboratory.sight(number).unwrap();
+    let seen: Vec<_> = (0..all).map(|scan| sight.returns(scan)).collect();
+    let first_seen = laboratory.first_seen(number);
+    drawn
+        .iter()
+        .map(|drawn| laboratory.excerpt(drawn, &first_seen, |scan| &seen[scan]))
+        .collect()
+}
+
+#[test]
+fn excerpts_are_the_stretch_whatever_their_length() {
+    for frame_rate_hz in [100.0, 40.0, 37.0, 333.0] {
+        let mut scene = noisy();
+        scene.mocap.frame_rate_hz = frame_rate_hz;
+        scene.mocap.dropout = 0.3;
+        let laboratory = Laboratory::new(&scene, 5).unwrap();
+        for number in [0, 1, 4] {
+            let whole = laboratory.stretch(number).unwrap();
+            for scans in [1, 2, 3, 7] {
+                let mut joined = whole.clone();
+                joined.ranges.clear();
+                joined.echoes.iter_mut().for_each(Vec::clear);
+                joined.tracks.iter_mut().for_each(|t| t.frames.clear());
+                for excerpt in excerpts(&laboratory, number, scans) {
+                    assert_eq!(excerpt.first_scan * beam::COUNT, joined.ranges.len());
+                    assert_eq!(excerpt.first_seen, whole.first_seen());
+                    joined.ranges.extend(excerpt.part.ranges);
+                    joined
+                        .echoes
+                        .as_mut()
+                        .unwrap()
+                        .extend(excerpt.part.echoes.unwrap());
+                    for (track, part) in joined.tracks.iter_mut().zip(excerpt.part.tracks) {
+                        track.frames.extend(part.frames);
+                    }
+                }
+                // Lost readings are no numbers.
+                let bits = |ranges: &[f64]| ranges.iter().map(|r| r.to_bits()).collect::<Vec<_>>();
+                assert_eq!(bits(&joined.ranges), bits(&whole.ranges));
+                assert_eq!(format!("{:?}", joined.echoes), format!("{:?}", whole.echoes));
+                assert_eq!(joined.tracks, whole.tracks);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_recording_of_excerpts_is_that_of_the_stretches_byte_by_byte() {
+    let laboratory = Laboratory::new(&noisy(), 5).unwrap();
+    let session = laboratory.session().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let provenance = || Provenance {
+        seed: 5,
+        command_line: String::new(),
+        rng_rule: String::new(),
+    };
+    let mut hashes = Vec::new();
+    for scans in [0, 1, 3] {
+        let out = folder.path().join(scans.to_string());
+        let mut writer = DatasetWriter::create(&out, false, &session).unwrap();
+        let encoder = writer.encoder();
+        for number in 0..laboratory.stretches() {
+            if scans == 0 {
+                writer
+                    .write_stretch(&laboratory.stretch(number).unwrap())
+                    .unwrap();
+                continue;
+            }
+            let encoded = excerpts(&laboratory, number, scans)
+                .iter()
+                .map(|excerpt| encoder.encode_excerpt(excerpt).unwrap())
+                .collect();
+            writer.append(encoded).unwrap();
+        }
+        hashes.push(writer.finish(provenance()).unwrap().files);
+    }
+    assert_eq!(hashes[0], hashes[1]);
+    assert_eq!(hashes[0], hashes[2]);
+}
+
+#[test]
+fn excerpts_that_are_missing_or_out_of_order_are_refused() {
+    let laboratory = Laboratory::new(&noisy(), 5).unwrap();
+    let session = laboratory.session().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let excerpts = excerpts(&laboratory, 4, 3);
+    for (order, said) in [
+        (&[1][..], "pose 4: scan 3 follows"),
+        (&[0, 2], "pose 4: scan 6 follows scan 3 of pose 4"),
+        (&[0, 0], "pose 4: 3 scans, its label says 7"),
+        (&[0, 1], "pose 4: 6 scans, its label says 7"),
+    ] {
+        let out = folder.path().join("out");
+        let mut writer = DatasetWriter::create(&out, false, &session).unwrap();
+        let encoder = writer.encoder();
+        let encode = |i: &usize| encoder.encode_excerpt(&excerpts[*i]).unwrap();
+        let result = writer.append(order.iter().map(encode).collect());
+        let finished = result.and_then(|()| {
+            let provenance = Provenance {
+                seed: 5,
+                command_line: String::new(),
+                rng_rule: String::new(),
+            };
+            writer.finish(provenance).map(|_| ())
+        });
+        let error = finished.unwrap_err().to_string();
+        assert!(error.contains(said), "{order:?}: {error}");
+        assert!(!out.exists());
+    }
+}
+
+fn simulate(folder: &Path, out: &str, scene: &str, more: &[&str]) -> serde_json::Value {
+    let scene = file(scene);
+    let arguments = [
+        &["simulate", scene.to_str().unwrap(), "--out", out, "--json"],
+        more,
+    ]
+    .concat();
+    let output = run(folder, &arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    serde_json::from_str(&stdout(&output)).unwrap()
+}
+
+/// A stretch of many excerpts with correlated noise, a flight, and every table of the truth.
+#[test]
+fn threads_change_no_file_of_long_stretches_and_flights() {
+    let folder = tempfile::tempdir().unwrap();
+    let manifest = |out: &str| std::fs::read(folder.path().join(out).join("manifest.json")).unwrap();
+    for (scene, set) in [
+        (
+            "static-10000",
+            ["experiment.scans_per_pose=300", "scanner.sub_rays=3"],
+        ),
+        ("flight", ["experiment.scans_per_pose=2", "scanner.sub_rays=1"]),
+    ] {
+        let tables = match scene {
+            "flight" => ["--returns", "--sub-rays"],
+            _ => ["--returns", "--readings"],
+        };
+        for threads in ["1", "2", "7"] {
+            let out = format!("{scene}-{threads}");
+            let set = ["--set", set[0], "--set", set[1]];
+            simulate(
+                folder.path(),
+                &out,
+                scene,
+                &[&set[..], &tables, &["--threads", threads]].concat(),
+            );
+            assert_eq!(
+                manifest(&out),
+                manifest(&format!("{scene}-1")),
+                "{threads} threads"
+            );
+        }
+    }
+}
+
+#[test]
+fn ten_times_the_scans_are_no_more_in_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let held = |scans: usize| {
+        let scans = format!("experiment.scans_per_pose={scans}");
+        let more = [
+            "--set",
+            &scans,
+            "--set",
+            "scanner.sub_rays=1",
+            "--threads",
+            "2",
+            "--replace",
+        ];
+        let figures = simulate(folder.path(), "data", "static-10000", &more);
+        figures["readings_held"].as_u64().unwrap()
+    };
+    let few = held(1000);
+    // Four excerpts of 64 scans that are made by two threads, and four that are written meanwhile.
+    assert_eq!(few, 8 * 64 * 1081);
+    assert_eq!(held(10_000), few);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_run_stopped_within_a_stretch_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = file("static-10000");
+    let mut child = catoptric()
+        .args(["simulate", scene.to_str().unwrap(), "--out", "data", "--readings"])
+        .args(["--set", "experiment.scans_per_pose=1000000"])
+        .current_dir(folder.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Until a chunk of the recording is there.
+    let begin = Instant::now();
+    let written = || {
+        let staged = std::fs::read_dir(folder.path()).unwrap().flatten();
+        let recording = |e: std::fs::DirEntry| e.path().join("new/observations.mcap");
+        let size = |path: PathBuf| std::fs::metadata(path).map_or(0, |m| m.len());
+        staged.map(recording).map(size).sum::<u64>()
+    };
+    while written() < 1 << 20 {
+        assert!(begin.elapsed() < Duration::from_secs(120) && child.try_wait().unwrap().is_none());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let pid = child.id().to_string();
+    let sent = std::process::Command::new("kill").args(["-INT", &pid]).status();
+    assert!(sent.unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+/// What every beam of a stretch brings home, once over the compiled rig and once traced as a whole.
+fn same_over_the_rig(laboratory: &Laboratory, number: usize) {
+    let sight = laboratory.sight(number).unwrap();
+    let returns = sight.returns(0);
+    let sensor = laboratory.sensor();
+    for (beam, found) in returns.iter().enumerate() {
+        let traced = sensor.observe(sight.setting(), beam);
+        assert_eq!(*found, traced, "stretch {number}, beam {beam}");
+    }
+}
+
+#[test]
+fn the_compiled_rig_changes_no_bit() {
+    let mut glass = scene(TWO_MIRROR);
+    glass.superstructure.mirror.diffuse_reflectivity = 0.01;
+    let mirrors = load(&file("traps/both-outputs"), &[]).unwrap();
+    for mut scene in [scene(PROTOTYPE), glass, mirrors] {
+        scene.scanner.sub_rays = scene.scanner.sub_rays.min(6);
+        let laboratory = Laboratory::new(&scene, 3).unwrap();
+        for number in [0, 1, laboratory.stretches() - 1] {
+            same_over_the_rig(&laboratory, number);
+        }
+    }
+}
+
+/// A box of the room that stands between the sensor and a mirror: the compiled ways do not hold, and are not taken.
+#[test]
+fn what_reaches_into_the_structure_is_seen() {
+    let mut scene = scene(TWO_MIRROR);
+    scene.scanner.sub_rays = 3;
+    let intruder = r#"
+name = "intruder"
+shape.box = { size_m = [0.01, 0.01, 0.05] }
+position_m = [0, 0.05, 1.76]
+"#;
+    scene.room.surface.push(toml::from_str(intruder).unwrap());
+    let laboratory = Laboratory::new(&scene, 3).unwrap();
+    let structure = Structure::as_built(&scene, 3).unwrap();
+    let bare = Setting::new(&scene, &structure, Mirrors::Attached, Vec::new()).unwrap();
+    let rig = laboratory.sensor().compile(&bare);
+    let sight = laboratory.sight(1).unwrap();
+    assert!(!rig.holds_in(sight.setting()));
+    assert!(rig.holds_in(&bare) && rig.holds_in(&bare.seen_from(&Pose::translation(1.0, 0.0, 0.0))));
+    same_over_the_rig(&laboratory, 1);
+    let names = sight.setting().names();
+    let left = beam::nearest(std::f64::consts::FRAC_PI_2).unwrap();
+    let ends = sight.sub_ray_ends(0, left);
+    let hits_intruder = ends.iter().any(|end| match end.stop {
+        catoptric::sim::reading::Stop::Hit { surface, .. } => names[surface] == "intruder",
+        _ => false,
+    });
+    assert!(hits_intruder, "{ends:?}");
+}
