@@ -254,8 +254,10 @@ impl<'a> Setting<'a> {
                 *ray = placed(ray, pose);
             }
         }
-        hits.extend(rays.iter().map(|ray| {
-            let mut hit = room.cast(ray, None)?;
+        let mut found = vec![None; rays.len()];
+        room.cast_beam(rays, None, &mut found);
+        hits.extend(found.into_iter().map(|hit: Option<Hit>| {
+            let mut hit = hit?;
             hit.surface += self.contents.first_of_room;
             let normal = moved.map_or(hit.normal, |pose| pose.inverse_transform_unit_vector(&hit.normal));
             Some((hit, normal))
