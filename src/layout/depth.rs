@@ -109,9 +109,10 @@ mod tests {
 
     #[test]
     fn all_ranges_are_those_to_the_walls() {
-        let scene: Scene = toml::from_str(include_str!("../../scenes/prototype.toml")).unwrap();
-        let drawing = Drawing::new(&scene, None).unwrap();
-        let found = depth(&scene, &drawing).unwrap();
+        let scene: Scene =
+            toml::from_str(include_str!("../../scenes/prototype.toml")).expect("it is a scene");
+        let drawing = Drawing::new(&scene, None).expect("it can be drawn");
+        let found = depth(&scene, &drawing).expect("its room has walls");
         let room_from_sensor = drawing.room_from_sensor;
         let expected = |from: &Point3<f64>, v: &Unit<Vector3<f64>>| {
             to_wall(
@@ -123,7 +124,10 @@ mod tests {
         for (i, range) in found.room_m.iter().enumerate() {
             let (azimuth, elevation) = found.direction(i / COLUMNS, i % COLUMNS);
             let wall = expected(&Point3::origin(), &beam::spherical(azimuth, elevation));
-            assert!((range.unwrap() - wall).abs() < 1e-9, "{azimuth} {elevation}");
+            assert!(
+                range.is_some_and(|r| (r - wall).abs() < 1e-9),
+                "{azimuth} {elevation}"
+            );
         }
         let (mut bent, mut lost) = (0, 0);
         for (ray, range) in drawing.rays.iter().zip(&found.read_m) {
@@ -134,8 +138,8 @@ mod tests {
             };
             let way: f64 = ray.points.windows(2).map(|p| (p[1] - p[0]).norm()).sum();
             bent += usize::from(!ray.facets.is_empty());
-            let wall = way + expected(ray.points.last().unwrap(), &exit);
-            assert!((range.unwrap() - wall).abs() < 1e-9, "{}", ray.beam);
+            let wall = way + expected(ray.points.last().expect("the scanner"), &exit);
+            assert!(range.is_some_and(|r| (r - wall).abs() < 1e-9), "{}", ray.beam);
         }
         assert!(bent > 400 && lost > 20, "{bent} {lost}");
     }
