@@ -127,18 +127,31 @@ impl Wanted {
             elements,
         })
     }
+}
 
-    /// Mean angle between it and the elements that look nearest to it, in degrees; as far as can be for those that lack.
-    fn distance(&self, exits: &[Unit<Vector3<f64>>]) -> f64 {
-        let own = beam::spherical(self.azimuth_deg.to_radians(), self.elevation_deg.to_radians());
-        let mut angles: Vec<f64> = exits
-            .iter()
-            .map(|v| beam::angle_between(&own, v).to_degrees())
-            .collect();
-        angles.sort_by(f64::total_cmp);
-        angles.resize(angles.len().max(self.elements), 180.0);
-        angles[..self.elements].iter().sum::<f64>() / self.elements as f64
+/// Mean over wanted directions of the mean angle to the elements that serve them, in degrees; as far as can be for those that
+/// lack. An element serves one direction: the nearest pairs are made first.
+fn apart(wanted: &[Wanted], exits: &[Unit<Vector3<f64>>]) -> f64 {
+    let mut pairs = Vec::with_capacity(wanted.len() * exits.len());
+    for (direction, w) in wanted.iter().enumerate() {
+        let own = beam::spherical(w.azimuth_deg.to_radians(), w.elevation_deg.to_radians());
+        let angles = exits.iter().map(|v| beam::angle_between(&own, v).to_degrees());
+        pairs.extend(angles.enumerate().map(|(exit, angle)| (angle, direction, exit)));
     }
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    let mut serves = vec![false; exits.len()];
+    let mut lacking: Vec<usize> = wanted.iter().map(|w| w.elements).collect();
+    let mut sums = vec![0.0; wanted.len()];
+    for (angle, direction, exit) in pairs {
+        if lacking[direction] > 0 && !serves[exit] {
+            serves[exit] = true;
+            lacking[direction] -= 1;
+            sums[direction] += angle;
+        }
+    }
+    let means = wanted.iter().zip(&sums).zip(&lacking);
+    let means = means.map(|((w, sum), lacking)| (sum + 180.0 * *lacking as f64) / w.elements as f64);
+    means.sum::<f64>() / wanted.len() as f64
 }
 
 impl Goal {
@@ -241,8 +254,7 @@ impl Goal {
                     .filter_map(|e| Some((e.exit_azimuth_deg?, e.exit_elevation_deg?)))
                     .map(|(azimuth, elevation)| beam::spherical(azimuth.to_radians(), elevation.to_radians()))
                     .collect();
-                let sum: f64 = wanted.iter().map(|w| w.distance(&exits)).sum();
-                Some(sum / wanted.len() as f64)
+                Some(apart(wanted, &exits))
             }
         }
     }
@@ -289,9 +301,11 @@ mod tests {
         let wanted = Wanted::parse("0,-90,2").expect("it is one");
         let exits = [(0.0, -80.0), (90.0, -84.0), (180.0, 0.0)];
         let exits = exits.map(|(a, e): (f64, f64)| beam::spherical(a.to_radians(), e.to_radians()));
-        assert!((wanted.distance(&exits) - 8.0).abs() < 1e-9);
+        assert!((apart(&[wanted], &exits) - 8.0).abs() < 1e-9);
         // One that lacks is as far as can be.
-        assert!((wanted.distance(&exits[..1]) - 95.0).abs() < 1e-9);
+        assert!((apart(&[wanted], &exits[..1]) - 95.0).abs() < 1e-9);
+        // Asked for twice, an element serves once: 6° and 10°, then 90° and nothing.
+        assert!((apart(&[wanted, wanted], &exits) - (8.0 + 0.5 * (90.0 + 180.0)) / 2.0).abs() < 1e-9);
         for text in ["", "90", "90,100", "90,-60,0", "90,-60,x", "1,2,3,4", "nan,0"] {
             assert!(Wanted::parse(text).is_err(), "{text}");
         }
