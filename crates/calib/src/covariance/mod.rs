@@ -2,8 +2,9 @@
 //!
 //! Per board: white noise σ²/N, a drift constant, the board's markers (one offset and two tilts of its plane). Common
 //! to all boards: the nodes of E_r, A_a, E_c of each color, the distance d, and the mounting of the sensor. A d that the
-//! scanner ranged has errors of E_r and A_a in it, which partly cancel those of the readings. They make Σ (K × K); the estimate x̂ = (HᵀWH)⁻¹HᵀW·(z − r) then has the sandwich covariance, and no unbiased estimate can
-//! have less than the bound (HᵀΣ⁻¹H)⁻¹.
+//! scanner ranged has errors of E_r and A_a in it, which partly cancel those of the readings. They make Σ (K × K); the
+//! estimate x̂ = (HᵀWH)⁻¹HᵀW·(z − r) then has the sandwich covariance, and no unbiased estimate can have less than the
+//! bound (HᵀΣ⁻¹H)⁻¹.
 
 mod plane;
 

@@ -8,7 +8,7 @@
 //! changed is found from the exact products (fused multiply-add).
 
 use super::FARTHEST;
-use super::lanes::{inlined, less};
+use super::lanes::{inlined, less, load};
 use crate::footprint::Ray;
 use fearless_simd::f64x8;
 use fearless_simd::{Simd, prelude::*};
@@ -71,18 +71,8 @@ impl Judge<'_> {
         if wanted == 0 {
             return [None; LANES];
         }
-        let load = inlined(
-            #[inline(always)]
-            |of: &[[f64; LANES]; 3]| {
-                [
-                    f64x8::simd_from(simd, of[0]),
-                    f64x8::simd_from(simd, of[1]),
-                    f64x8::simd_from(simd, of[2]),
-                ]
-            },
-        );
-        let direction = load(&direction);
-        let origin = load(&origin);
+        let direction = load(simd, &direction);
+        let origin = load(simd, &origin);
         // As in [`axes`].
         let [x, y, z] = [direction[0].abs(), direction[1].abs(), direction[2].abs()];
         let (along_x, over_z) = (x.simd_ge(y) & x.simd_ge(z), y.simd_ge(z));
@@ -119,7 +109,7 @@ impl Judge<'_> {
                             }
                         }
                     }
-                    load(&corners)
+                    load(simd, &corners)
                 };
                 turned(less(&seen, &origin))
             },

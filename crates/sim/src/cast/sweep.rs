@@ -6,7 +6,7 @@
 use super::build::upwards;
 use super::bundle::{Bundle, MOST};
 use super::exact::LANES;
-use super::lanes::{inlined, less};
+use super::lanes::{inlined, less, load};
 use super::wide::{Child, Node, STACK};
 use super::{EDGE_SLACK, FARTHEST, Hit, Polygon, Shape, World};
 use crate::footprint::Ray;
@@ -159,16 +159,6 @@ pub(super) fn polygon<S: Simd>(simd: S, polygon: &Polygon, rays: &[Ray]) -> [f64
             direction[k][lane] = ray.direction[k];
         }
     }
-    let load = inlined(
-        #[inline(always)]
-        |of: &[[f64; LANES]; 3]| {
-            [
-                f64x8::simd_from(simd, of[0]),
-                f64x8::simd_from(simd, of[1]),
-                f64x8::simd_from(simd, of[2]),
-            ]
-        },
-    );
     let splat = inlined(
         #[inline(always)]
         |v: &Vector3<f64>| {
@@ -184,7 +174,7 @@ pub(super) fn polygon<S: Simd>(simd: S, polygon: &Polygon, rays: &[Ray]) -> [f64
         #[inline(always)]
         |a: &[f64x8<S>; 3], b: &[f64x8<S>; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2],
     );
-    let (origin, direction) = (load(&origin), load(&direction));
+    let (origin, direction) = (load(simd, &origin), load(simd, &direction));
     let normal = splat(&polygon.normal);
     let closing = dot(&normal, &direction);
     let distance = dot(&normal, &less(&splat(&polygon.origin.coords), &origin)) / closing;
