@@ -12,6 +12,8 @@ mod bundle;
 mod cylinder;
 mod exact;
 mod lanes;
+mod pyramid;
+mod rows;
 mod single;
 mod skin;
 mod sweep;
@@ -259,6 +261,7 @@ impl World {
 }
 
 impl Hit {
+    #[inline(always)]
     fn new(surface: usize, distance: f64, normal: Unit<Vector3<f64>>, ray: &Ray) -> Self {
         Self {
             surface,

@@ -18,27 +18,28 @@
 //! place; whatever overlaps is decided in f64 at once ([`Judge`]); the ways themselves are found at the
 //! end.
 
-use super::bundle::{Bundle, LANES, MOST, NONE, Row, around};
-use super::exact::Judge;
+use super::FARTHEST;
+use super::bundle::{Bundle, around};
+use super::exact::{Judge, Plane};
 use super::lanes::{cross, dot, inlined, less, size};
+use super::rows::{HALF, LANES, Origin, Rows, Vectors, half, whole};
 use super::triangles::Met;
 use super::wide::{Child, Leaf, ROUNDING, STACK, WIDTH, Wide};
-use super::{FARTHEST, bundle};
 use fearless_simd::{Simd, prelude::*};
-use fearless_simd::{f32x8, f32x16, u32x16};
+use fearless_simd::{f32x8, f32x16, f64x8, u32x16};
 
 /// What a bundle has met so far.
-pub(super) struct Found {
+pub(super) struct Found<const R: usize> {
     /// Bounds of the nearest way.
-    low: Row<f32>,
-    high: Row<f32>,
-    pub(super) triangle: Row<u32>,
-    /// The way in f64, of rays marked as known.
-    way: Row<f64>,
-    known: [u32; MOST / LANES],
+    low: Rows<f32, R>,
+    high: Rows<f32, R>,
+    pub(super) triangle: Rows<u32, R>,
     /// Greatest of the upper bounds.
     limit: f32,
 }
+
+/// Number of a triangle that is none.
+const NONE: u32 = u32::MAX;
 
 /// What the rays need to know of eight triangles, in the order of [`At`].
 type Facts = [[f32; WIDTH]; 30];
@@ -59,37 +60,20 @@ impl At {
     const LEAST_CLOSING: usize = 24;
 }
 
-impl Found {
+impl<const R: usize> Found<R> {
     fn new(count: usize) -> Self {
+        let farthest = super::build::upwards(FARTHEST);
         let mut found = Self {
-            low: Row::of(super::build::downwards(FARTHEST)),
-            high: Row::of(super::build::upwards(FARTHEST)),
-            triangle: Row::of(NONE),
-            way: Row::of(FARTHEST),
-            known: [0; MOST / LANES],
-            limit: super::build::upwards(FARTHEST),
+            low: Rows::of(super::build::downwards(FARTHEST)),
+            high: Rows::of(farthest),
+            triangle: Rows::of(NONE),
+            limit: farthest,
         };
         // What a row is filled up with meets nothing.
-        for ray in count..count.next_multiple_of(LANES).min(MOST) {
+        for ray in count..R * LANES {
             found.high.set(ray, f32::NEG_INFINITY);
         }
         found
-    }
-
-    /// The way of a ray's present triangle.
-    fn way(&mut self, judge: &Judge<'_>, ray: usize) -> f64 {
-        let (vector, bit) = (ray / LANES, 1 << (ray % LANES));
-        let triangle = self.triangle.get(ray);
-        if triangle == NONE {
-            return FARTHEST;
-        }
-        if self.known[vector] & bit == 0 {
-            self.known[vector] |= bit;
-            // A triangle that is surely hit is.
-            let way = judge.meet(ray, triangle).unwrap_or(FARTHEST);
-            self.way.set(ray, way);
-        }
-        self.way.get(ray)
     }
 
     /// Decides in f64 about a triangle that a ray may meet.
@@ -99,11 +83,12 @@ impl Found {
         let Some(way) = judge.meet(ray, triangle) else {
             return;
         };
-        let present = self.way(judge, ray);
+        let present = match self.triangle.get(ray) {
+            NONE => FARTHEST,
+            triangle => judge.way(ray, triangle),
+        };
         if way < present || (way == present && triangle < self.triangle.get(ray)) {
             self.triangle.set(ray, triangle);
-            self.way.set(ray, way);
-            self.known[ray / LANES] |= 1 << (ray % LANES);
             let (low, high) = around(way);
             self.low.set(ray, low);
             self.high.set(ray, high);
@@ -112,17 +97,58 @@ impl Found {
 
     /// The nearest triangle of every ray, and the distance to it.
     #[inline(always)]
-    pub(super) fn finish<S: Simd>(&self, simd: S, judge: &Judge<'_>, met: &mut [Option<Met>]) {
-        const HALF: usize = super::exact::LANES;
-        for (number, met) in met.chunks_mut(HALF).enumerate() {
-            let first = number * HALF;
-            let (vector, start) = (first / LANES, first % LANES);
-            let mut triangles = [NONE; HALF];
-            triangles.copy_from_slice(&self.triangle.0[vector][start..start + HALF]);
-            let distances = judge.meet_each(simd, first, &triangles, NONE);
+    pub(super) fn finish<S: Simd>(
+        &self,
+        simd: S,
+        bundle: &Bundle<R>,
+        judge: &Judge<'_>,
+        met: &mut [Option<Met>],
+    ) {
+        let mut last = NONE;
+        let mut plane = Plane::default();
+        let mut common = f64x8::splat(simd, 0.0);
+        for (row, met) in met.chunks_mut(LANES).enumerate() {
+            let numbers = &self.triangle.0[row];
+            let triangles = u32x16::simd_from(simd, *numbers);
+            let some = !triangles.simd_eq(u32x16::splat(simd, NONE)).to_bitmask();
+            let mut ways = [f64x8::splat(simd, 0.0); 2];
+            let mut sure = 0;
+            // Rays of the same triangle, one triangle after the other.
+            let mut open = some & ((1 << met.len()) - 1);
+            while open != 0 {
+                let triangle = numbers[open.trailing_zeros() as usize & (LANES - 1)];
+                let alike = triangles.simd_eq(u32x16::splat(simd, triangle));
+                open &= !alike.to_bitmask();
+                if triangle != last {
+                    last = triangle;
+                    plane = judge.plane(triangle);
+                    if let Origin::Common(start) = &bundle.rays.origin {
+                        common = f64x8::splat(simd, plane.height(start));
+                    }
+                }
+                let (low, high) = alike.widen();
+                for (second, alike) in [low, high].into_iter().enumerate() {
+                    let height = match &bundle.rays.origin {
+                        Origin::Common(_) => common,
+                        Origin::Each(origins) => plane.heights(simd, &half(simd, origins, row, second)),
+                    };
+                    let direction = half(simd, &bundle.rays.direction, row, second);
+                    let (way, steep) = plane.ways(simd, height, &direction);
+                    ways[second] = alike.select(way, ways[second]);
+                    sure |= (steep & alike).to_bitmask() << (second * HALF);
+                }
+            }
+            let mut distances = [0.0; LANES];
+            ways[0].store_slice(&mut distances[..HALF]);
+            ways[1].store_slice(&mut distances[HALF..]);
             for (lane, met) in met.iter_mut().enumerate() {
-                let triangle = triangles[lane];
-                *met = distances[lane].map(|distance| Met { triangle, distance });
+                let triangle = numbers[lane];
+                let distance = if (sure | !some) >> lane & 1 == 1 {
+                    distances[lane]
+                } else {
+                    judge.way(row * LANES + lane, triangle)
+                };
+                *met = (triangle != NONE).then_some(Met { triangle, distance });
             }
         }
     }
@@ -130,8 +156,13 @@ impl Found {
 
 /// Follows a bundle through the index.
 #[inline(always)]
-pub(super) fn follow<S: Simd>(simd: S, wide: &Wide, bundle: &Bundle, judge: &Judge<'_>) -> Found {
-    let mut found = Found::new(bundle.count);
+pub(super) fn follow<S: Simd, const R: usize>(
+    simd: S,
+    wide: &Wide,
+    bundle: &Bundle<R>,
+    judge: &Judge<'_>,
+) -> Found<R> {
+    let mut found = Found::new(bundle.rays.count);
     let mut stack = [(0.0_f32, Child::NONE); STACK];
     stack[0] = (0.0, Child::node(0));
     let mut height = 1;
@@ -154,21 +185,21 @@ pub(super) fn follow<S: Simd>(simd: S, wide: &Wide, bundle: &Bundle, judge: &Jud
             continue;
         }
         let node = &wide.nodes[child.number()];
-        let (met, near) = bundle.boxes(simd, &node.bounds, found.limit);
+        let (met, near) = bundle.pyramid.boxes(simd, &node.bounds, found.limit);
         height = node.push(met, near, &mut stack, height);
     }
     found
 }
 
 #[inline(always)]
-fn leaf<S: Simd>(
+fn leaf<S: Simd, const R: usize>(
     simd: S,
     leaf: &Leaf,
     count: usize,
     reach: f32,
-    bundle: &Bundle,
+    bundle: &Bundle<R>,
     judge: &Judge<'_>,
-    found: &mut Found,
+    found: &mut Found<R>,
 ) {
     let load = inlined(
         #[inline(always)]
@@ -179,7 +210,7 @@ fn leaf<S: Simd>(
         |corner: usize| [load(corner, 0), load(corner, 1), load(corner, 2)],
     );
     let corners = [corner(0), corner(1), corner(2)];
-    let mut met = bundle.triangles(simd, &corners) & ((1 << count) - 1);
+    let mut met = bundle.pyramid.triangles(simd, &corners) & ((1 << count) - 1);
     if met == 0 {
         return;
     }
@@ -188,24 +219,24 @@ fn leaf<S: Simd>(
     while met != 0 {
         let lane = met.trailing_zeros() as usize & 7;
         met &= met - 1;
-        let number = leaf.triangles[lane];
-        changed |= if bundle.common {
-            triangle::<S, true>(simd, &facts, lane, number, bundle, judge, found)
-        } else {
-            triangle::<S, false>(simd, &facts, lane, number, bundle, judge, found)
-        };
+        changed |= triangle(simd, &facts, lane, leaf.triangles[lane], bundle, judge, found);
     }
     if changed {
         let mut limit = f32x16::splat(simd, f32::NEG_INFINITY);
-        for vector in 0..bundle.count.div_ceil(LANES) {
-            limit = limit.max(f32x16::simd_from(simd, found.high.0[vector]));
+        for row in 0..R {
+            limit = limit.max(f32x16::simd_from(simd, found.high.0[row]));
         }
         found.limit = limit.reduce_max();
     }
 }
 
 #[inline(always)]
-fn facts<S: Simd>(simd: S, corners: &[[f32x8<S>; 3]; 3], reach: f32, bundle: &Bundle) -> Facts {
+fn facts<S: Simd, const R: usize>(
+    simd: S,
+    corners: &[[f32x8<S>; 3]; 3],
+    reach: f32,
+    bundle: &Bundle<R>,
+) -> Facts {
     let splat = inlined(
         #[inline(always)]
         |x: f32| f32x8::splat(simd, x),
@@ -214,9 +245,9 @@ fn facts<S: Simd>(simd: S, corners: &[[f32x8<S>; 3]; 3], reach: f32, bundle: &Bu
         #[inline(always)]
         |corner: &[f32x8<S>; 3]| {
             [
-                corner[0] - splat(bundle.reference[0]),
-                corner[1] - splat(bundle.reference[1]),
-                corner[2] - splat(bundle.reference[2]),
+                corner[0] - splat(bundle.start.reference[0]),
+                corner[1] - splat(bundle.start.reference[1]),
+                corner[2] - splat(bundle.start.reference[2]),
             ]
         },
     );
@@ -227,8 +258,8 @@ fn facts<S: Simd>(simd: S, corners: &[[f32x8<S>; 3]; 3], reach: f32, bundle: &Bu
     let height = dot(&normal, &a);
     let far = size(&a).max(size(&b)).max(size(&c));
     let long = size(&bc).max(size(&ca)).max(size(&ab));
-    let eta = splat(3.0 * ROUNDING * (reach + bundle.reference_reach));
-    let spread = splat(bundle.spread);
+    let eta = splat(3.0 * ROUNDING * (reach + bundle.start.reach));
+    let spread = splat(bundle.start.spread);
     let u = inlined(
         #[inline(always)]
         |times: f32| splat(times * ROUNDING),
@@ -250,7 +281,7 @@ fn facts<S: Simd>(simd: S, corners: &[[f32x8<S>; 3]; 3], reach: f32, bundle: &Bu
             put(At::CROSSES + 3 * i + k, *coordinate);
         }
     }
-    if !bundle.common {
+    if bundle.apart.is_some() {
         for (i, vector) in [bc, ca, ab].iter().enumerate() {
             for (k, coordinate) in vector.iter().enumerate() {
                 put(At::EDGES + 3 * i + k, *coordinate);
@@ -269,14 +300,14 @@ fn facts<S: Simd>(simd: S, corners: &[[f32x8<S>; 3]; 3], reach: f32, bundle: &Bu
 
 /// One triangle and all rays; whether a ray has met it.
 #[inline(always)]
-fn triangle<S: Simd, const COMMON: bool>(
+fn triangle<S: Simd, const R: usize>(
     simd: S,
     facts: &Facts,
     lane: usize,
     number: u32,
-    bundle: &Bundle,
+    bundle: &Bundle<R>,
     judge: &Judge<'_>,
-    found: &mut Found,
+    found: &mut Found<R>,
 ) -> bool {
     let fact = inlined(
         #[inline(always)]
@@ -298,26 +329,19 @@ fn triangle<S: Simd, const COMMON: bool>(
         },
     );
     let mut changed = false;
-    for vector in 0..bundle.count.div_ceil(LANES) {
+    for row in 0..R {
         let load = inlined(
             #[inline(always)]
-            |rows: &[Row<f32>; 3]| {
-                [
-                    f32x16::simd_from(simd, rows[0].0[vector]),
-                    f32x16::simd_from(simd, rows[1].0[vector]),
-                    f32x16::simd_from(simd, rows[2].0[vector]),
-                ]
-            },
+            |rows: &Vectors<f32, R>| whole(simd, rows, row),
         );
         let direction = load(&bundle.direction);
         let edge = inlined(
             #[inline(always)]
             |i: usize| {
                 let about = product(&direction, At::CROSSES + 3 * i);
-                if COMMON {
-                    about
-                } else {
-                    more(&load(&bundle.moment), At::EDGES + 3 * i, about)
+                match &bundle.apart {
+                    None => about,
+                    Some(apart) => more(&load(&apart.moment), At::EDGES + 3 * i, about),
                 }
             },
         );
@@ -331,10 +355,9 @@ fn triangle<S: Simd, const COMMON: bool>(
         }
         let inside = least.simd_gt(error) | most.simd_lt(-error);
         let closing = product(&direction, At::NORMAL);
-        let height = if COMMON {
-            fact(At::HEIGHT)
-        } else {
-            fact(At::HEIGHT) - product(&load(&bundle.offset), At::NORMAL)
+        let height = match &bundle.apart {
+            None => fact(At::HEIGHT),
+            Some(apart) => fact(At::HEIGHT) - product(&load(&apart.offset), At::NORMAL),
         };
         let inverse = f32x16::splat(simd, 1.0) / closing;
         let way = height * inverse;
@@ -342,33 +365,28 @@ fn triangle<S: Simd, const COMMON: bool>(
         let (low, high) = (way - error, way + error);
         let sure = closing.abs().simd_gt(fact(At::LEAST_CLOSING));
         let (least, most) = (
-            f32x16::simd_from(simd, found.low.0[vector]),
-            f32x16::simd_from(simd, found.high.0[vector]),
+            f32x16::simd_from(simd, found.low.0[row]),
+            f32x16::simd_from(simd, found.high.0[row]),
         );
         let zero = f32x16::splat(simd, 0.0);
         let aside = sure & (low.simd_gt(most) | high.simd_lt(zero));
         let nearest = inside & sure & low.simd_gt(zero) & high.simd_lt(least) & most.simd_ge(zero);
         let (may, nearest_bits) = (may.to_bitmask() & !aside.to_bitmask(), nearest.to_bitmask());
         if nearest_bits != 0 {
-            nearest.select(low, least).store_slice(&mut found.low.0[vector]);
-            nearest.select(high, most).store_slice(&mut found.high.0[vector]);
-            let present = u32x16::simd_from(simd, found.triangle.0[vector]);
+            nearest.select(low, least).store_slice(&mut found.low.0[row]);
+            nearest.select(high, most).store_slice(&mut found.high.0[row]);
+            let present = u32x16::simd_from(simd, found.triangle.0[row]);
             let number = u32x16::splat(simd, number);
             nearest
                 .select(number, present)
-                .store_slice(&mut found.triangle.0[vector]);
-            // Sixteen lanes.
-            #[allow(clippy::cast_possible_truncation)]
-            {
-                found.known[vector] &= !(nearest_bits as u32);
-            }
+                .store_slice(&mut found.triangle.0[row]);
             changed = true;
         }
         let mut open = may & !nearest_bits;
         while open != 0 {
-            let ray = vector * LANES + open.trailing_zeros() as usize;
+            let ray = row * LANES + open.trailing_zeros() as usize;
             open &= open - 1;
-            if ray < bundle.count {
+            if ray < bundle.rays.count {
                 found.decide(judge, ray, number);
                 changed = true;
             }
@@ -376,6 +394,3 @@ fn triangle<S: Simd, const COMMON: bool>(
     }
     changed
 }
-
-/// The most that a bundle can hold.
-pub(super) const MOST_RAYS: usize = bundle::MOST;

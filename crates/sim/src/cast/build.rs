@@ -9,11 +9,11 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 /// Levels of nodes at most: below [`SORTED`] parts are halved by number.
-pub(super) const DEEPEST: usize = 28;
+pub(super) const DEEPEST: usize = 20;
 
 /// Levels of nodes before parts are halved by number whatever that costs, so that the deepest is bounded: 2²⁸ triangles
 /// are 2²⁵ leaves, nine levels more.
-const SORTED: usize = 18;
+const SORTED: usize = 10;
 
 const BINS: usize = 16;
 

@@ -3,23 +3,12 @@
 //! An instruction set that is found at run time holds for one function and what is inlined into it. So all that works
 //! in lanes is always inlined, closures too ([`inlined`]), and arrays are not mapped.
 
-use super::exact::LANES;
-use fearless_simd::{Simd, SimdFloat, f64x8, prelude::*};
+use fearless_simd::{Simd, SimdFloat};
 
 /// A closure that is inlined wherever it is called: write `inlined(#[inline(always)] |x| …)`.
 #[inline(always)]
 pub(super) fn inlined<F>(closure: F) -> F {
     closure
-}
-
-/// Eight points or directions, coordinate by coordinate.
-#[inline(always)]
-pub(super) fn load<S: Simd>(simd: S, of: &[[f64; LANES]; 3]) -> [f64x8<S>; 3] {
-    [
-        f64x8::simd_from(simd, of[0]),
-        f64x8::simd_from(simd, of[1]),
-        f64x8::simd_from(simd, of[2]),
-    ]
 }
 
 #[inline(always)]

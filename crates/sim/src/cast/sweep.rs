@@ -1,18 +1,41 @@
 //! A beam against all surfaces: whole shapes are left out by their boxes, polygons are met eight rays at a time.
 //!
 //! A polygon's plane and edges are computed in f64 as for a ray alone, in the same order: the answer is the same to the
-//! bit.
+//! bit. Where the whole pyramid around the rays passes inside the polygon, or outside, its edges need not be tried.
 
 use super::build::upwards;
-use super::bundle::{Bundle, MOST};
-use super::exact::LANES;
-use super::lanes::{inlined, less, load};
+use super::bundle::Bundle;
+use super::exact::product;
+use super::lanes::{inlined, less};
+use super::rows::{HALF, LANES, MOST, ROWS, Rows, half};
 use super::wide::{Child, Node, STACK};
 use super::{EDGE_SLACK, FARTHEST, Hit, Polygon, Shape, World};
 use crate::footprint::Ray;
-use fearless_simd::f64x8;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
+use fearless_simd::{f64x4, f64x8};
 use nalgebra::{Unit, Vector3};
+
+/// Number of a surface that is none.
+const NONE: u32 = u32::MAX;
+
+/// Where the corners of a pyramid meet a polygon's plane, as seen from the polygon.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Passes {
+    Inside,
+    Outside,
+    /// Or nothing is known.
+    Partly,
+}
+
+/// The nearest surface of every ray.
+struct Nearest<const R: usize> {
+    distance: Rows<f64, R>,
+    surface: Rows<u32, R>,
+    /// Its triangle, if it is a mesh.
+    triangle: Rows<u32, R>,
+    /// Not less than the greatest distance.
+    limit: f32,
+}
 
 impl World {
     pub(super) fn cast_beam_at(
@@ -30,17 +53,17 @@ impl World {
 
     /// What is no narrow cone may be two.
     fn cast_some(&self, level: Level, rays: &[Ray], left: Option<usize>, hits: &mut [Option<Hit>]) {
-        if let [ray] = rays {
-            hits[0] = self.cast(ray, left);
-            return;
-        }
-        let done = dispatch!(level, simd => match Bundle::new(simd, rays, self.reach) {
-            Some(bundle) => {
-                self.sweep(simd, &bundle, rays, left, hits);
+        const TWO_ROWS: usize = 2 * LANES;
+        let done = match rays.len() {
+            0 => true,
+            1 => {
+                hits[0] = self.cast(&rays[0], left);
                 true
             }
-            None => false,
-        });
+            ..=LANES => self.cast_in_rows::<1>(level, rays, left, hits),
+            ..=TWO_ROWS => self.cast_in_rows::<2>(level, rays, left, hits),
+            _ => self.cast_in_rows::<ROWS>(level, rays, left, hits),
+        };
         if !done {
             let middle = rays.len() / 2;
             let (first, second) = hits.split_at_mut(middle);
@@ -49,116 +72,176 @@ impl World {
         }
     }
 
-    #[inline(always)]
-    fn sweep<S: Simd>(
+    /// Whether the rays are a narrow cone; then also what they meet.
+    fn cast_in_rows<const R: usize>(
         &self,
-        simd: S,
-        bundle: &Bundle,
+        level: Level,
         rays: &[Ray],
         left: Option<usize>,
         hits: &mut [Option<Hit>],
-    ) {
-        let mut nearest = [(f64::INFINITY, usize::MAX); MOST];
-        let mut normals = [Vector3::x_axis(); MOST];
-        let mut met = [None; MOST];
-        let nearest_of = inlined(
-            #[inline(always)]
-            |surface: usize, limit: &mut f32| {
-                if left == Some(surface) {
-                    return;
+    ) -> bool {
+        dispatch!(level, simd => {
+            let mut bundle = Bundle::<R>::blank();
+            let narrow = bundle.fill(simd, rays, self.reach);
+            if narrow {
+                let nearest = self.sweep(simd, &bundle, rays, left);
+                for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
+                    *hit = self.hit(ray, nearest.surface.get(i), nearest.triangle.get(i), nearest.distance.get(i));
                 }
-                let mut changed = false;
-                let mut take = inlined(
-                    #[inline(always)]
-                    |ray: usize, distance: f64, normal: Unit<Vector3<f64>>| {
-                        if (distance, surface) < nearest[ray] {
-                            nearest[ray] = (distance, surface);
-                            normals[ray] = normal;
-                            changed = true;
-                        }
-                    },
-                );
-                match &self.shapes[surface] {
-                    Shape::Polygon(one) => {
-                        for first in (0..rays.len()).step_by(LANES) {
-                            let distances = polygon(simd, one, &rays[first..]);
-                            let count = LANES.min(rays.len() - first);
-                            for (lane, distance) in distances[..count].iter().enumerate() {
-                                if *distance < f64::INFINITY {
-                                    take(first + lane, *distance, one.normal);
-                                }
-                            }
+            }
+            narrow
+        })
+    }
+
+    #[inline(always)]
+    fn sweep<S: Simd, const R: usize>(
+        &self,
+        simd: S,
+        bundle: &Bundle<R>,
+        rays: &[Ray],
+        left: Option<usize>,
+    ) -> Nearest<R> {
+        let mut nearest = Nearest::new(rays.len());
+        let mut stack = [(0.0_f32, Child::NONE); STACK];
+        stack[0] = (0.0, Child::node(0));
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            let (near, child) = stack[height];
+            if near > nearest.limit {
+                continue;
+            }
+            if !child.is_leaf() {
+                let node: &Node = &self.nodes[child.number()];
+                let (met, near) = bundle.pyramid.boxes(simd, &node.bounds, nearest.limit);
+                height = node.push(met, near, &mut stack, height);
+                continue;
+            }
+            let surface = child.number();
+            if left == Some(surface) {
+                continue;
+            }
+            match &self.shapes[surface] {
+                Shape::Polygon(polygon) => nearest.polygon(simd, bundle, surface, polygon),
+                Shape::Mesh(mesh) => {
+                    let mut met = [None; MOST];
+                    mesh.nearest_of_bundle(simd, bundle, rays, &mut met[..rays.len()]);
+                    for (i, met) in met.iter().enumerate() {
+                        if let Some(met) = met {
+                            nearest.take(i, met.distance, surface, met.triangle);
                         }
                     }
-                    Shape::Mesh(mesh) => {
-                        mesh.nearest_of_beam(rays, &mut met[..rays.len()]);
-                        for (i, ray) in rays.iter().enumerate() {
-                            if let Some(met) = met[i] {
-                                take(i, met.distance, mesh.normal(met.triangle, ray));
-                            }
-                        }
-                    }
-                    other => {
-                        for (i, ray) in rays.iter().enumerate() {
-                            if let Some((distance, normal)) = other.cast(ray) {
-                                take(i, distance, normal);
-                            }
+                }
+                other => {
+                    for (i, ray) in rays.iter().enumerate() {
+                        if let Some(distance) = other.distance(ray) {
+                            nearest.take(i, distance, surface, NONE);
                         }
                     }
                 }
-                if changed {
-                    let farthest = nearest[..rays.len()].iter().fold(0.0, |m: f64, n| m.max(n.0));
-                    *limit = upwards(farthest.min(FARTHEST));
+            }
+            nearest.set_limit(simd);
+        }
+        nearest
+    }
+
+    /// What there is to know of a surface that a ray meets at a distance.
+    #[inline(always)]
+    fn hit(&self, ray: &Ray, surface: u32, triangle: u32, distance: f64) -> Option<Hit> {
+        if surface == NONE {
+            return None;
+        }
+        let surface = surface as usize;
+        let normal: Unit<Vector3<f64>> = match &self.shapes[surface] {
+            Shape::Polygon(polygon) => polygon.normal,
+            Shape::Mesh(mesh) => mesh.normal(triangle, ray),
+            other => other.cast(ray)?.1,
+        };
+        Some(Hit::new(surface, distance, normal, ray))
+    }
+}
+
+impl<const R: usize> Nearest<R> {
+    #[inline(always)]
+    fn new(count: usize) -> Self {
+        let mut nearest = Self {
+            distance: Rows::of(f64::INFINITY),
+            surface: Rows::of(NONE),
+            triangle: Rows::of(NONE),
+            limit: upwards(FARTHEST),
+        };
+        // What a row is filled up with meets nothing.
+        for ray in count..R * LANES {
+            nearest.distance.set(ray, f64::NEG_INFINITY);
+        }
+        nearest
+    }
+
+    /// A surface at some distance; of surfaces at the same distance the first counts.
+    fn take(&mut self, ray: usize, distance: f64, surface: usize, triangle: u32) {
+        // The numbers of shapes in a node of the index are as small.
+        #[allow(clippy::cast_possible_truncation)]
+        let surface = surface as u32;
+        if (distance, surface) < (self.distance.get(ray), self.surface.get(ray)) {
+            self.distance.set(ray, distance);
+            self.surface.set(ray, surface);
+            self.triangle.set(ray, triangle);
+        }
+    }
+
+    #[inline(always)]
+    fn set_limit<S: Simd>(&mut self, simd: S) {
+        let mut most = f64x8::splat(simd, 0.0);
+        for row in 0..R {
+            for half in self.distance.0[row].chunks_exact(HALF) {
+                most = most.max(f64x8::from_slice(simd, half));
+            }
+        }
+        self.limit = upwards(most.reduce_max().min(FARTHEST));
+    }
+
+    #[inline(always)]
+    fn polygon<S: Simd>(&mut self, simd: S, bundle: &Bundle<R>, surface: usize, polygon: &Polygon) {
+        let passes = passes(simd, bundle, polygon);
+        if passes == Passes::Outside {
+            return;
+        }
+        for row in 0..R {
+            for second in 0..2 {
+                let distances = distances(simd, bundle, row, second, polygon, passes == Passes::Inside);
+                let from = second * HALF;
+                let present = f64x8::from_slice(simd, &self.distance.0[row][from..from + HALF]);
+                // One that is as near may be a surface before this one.
+                let mut nearer = distances.simd_le(present).to_bitmask();
+                if nearer == 0 {
+                    continue;
                 }
-            },
-        );
-        boxes(simd, &self.nodes, bundle, upwards(FARTHEST), nearest_of);
-        for (i, hit) in hits.iter_mut().enumerate() {
-            let (distance, surface) = nearest[i];
-            *hit = (surface != usize::MAX).then(|| Hit::new(surface, distance, normals[i], &rays[i]));
+                let mut all = [0.0; HALF];
+                distances.store_slice(&mut all);
+                while nearer != 0 {
+                    let lane = nearer.trailing_zeros() as usize & (HALF - 1);
+                    nearer &= nearer - 1;
+                    if all[lane] < f64::INFINITY {
+                        self.take(row * LANES + from + lane, all[lane], surface, NONE);
+                    }
+                }
+            }
         }
     }
 }
 
-/// Tells of every shape whose box some ray of the bundle may meet within `limit`, which `tell` may lower; the nearest
-/// box comes first, as far as boxes have an order.
+/// Distances at which eight rays meet a polygon, infinite where they do not: `Polygon::cast`.
 #[inline(always)]
-pub(super) fn boxes<S: Simd>(
+fn distances<S: Simd, const R: usize>(
     simd: S,
-    nodes: &[Node],
-    bundle: &Bundle,
-    mut limit: f32,
-    mut tell: impl FnMut(usize, &mut f32),
-) {
-    let mut stack = [(0.0_f32, Child::NONE); STACK];
-    stack[0] = (0.0, Child::node(0));
-    let mut height = 1;
-    while height > 0 {
-        height -= 1;
-        let (near, child) = stack[height];
-        if near > limit {
-            continue;
-        }
-        if child.is_leaf() {
-            tell(child.number(), &mut limit);
-            continue;
-        }
-        let node = &nodes[child.number()];
-        let (met, near) = bundle.boxes(simd, &node.bounds, limit);
-        height = node.push(met, near, &mut stack, height);
-    }
-}
-
-/// Distances at which up to eight rays meet a polygon, infinite where they do not: `Polygon::cast`.
-#[inline(always)]
-pub(super) fn polygon<S: Simd>(simd: S, polygon: &Polygon, rays: &[Ray]) -> [f64; LANES] {
-    let (mut origin, mut direction) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
-    for (lane, ray) in rays.iter().take(LANES).enumerate() {
-        for k in 0..3 {
-            origin[k][lane] = ray.origin[k];
-            direction[k][lane] = ray.direction[k];
-        }
-    }
+    bundle: &Bundle<R>,
+    row: usize,
+    second: usize,
+    polygon: &Polygon,
+    inside: bool,
+) -> f64x8<S> {
+    let origin = bundle.rays.starts(simd, row, second);
+    let direction = half(simd, &bundle.rays.direction, row, second);
     let splat = inlined(
         #[inline(always)]
         |v: &Vector3<f64>| {
@@ -169,15 +252,12 @@ pub(super) fn polygon<S: Simd>(simd: S, polygon: &Polygon, rays: &[Ray]) -> [f64
             ]
         },
     );
-    // Not fused, as for a ray alone.
-    let dot = inlined(
-        #[inline(always)]
-        |a: &[f64x8<S>; 3], b: &[f64x8<S>; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2],
-    );
-    let (origin, direction) = (load(simd, &origin), load(simd, &direction));
-    let normal = splat(&polygon.normal);
-    let closing = dot(&normal, &direction);
-    let distance = dot(&normal, &less(&splat(&polygon.origin.coords), &origin)) / closing;
+    let closing = product(simd, &polygon.normal, &direction);
+    let seen = less(&splat(&polygon.origin.coords), &origin);
+    let distance = product(simd, &polygon.normal, &seen) / closing;
+    if inside {
+        return distance;
+    }
     let point = [
         origin[0] + direction[0] * distance,
         origin[1] + direction[1] * distance,
@@ -185,10 +265,55 @@ pub(super) fn polygon<S: Simd>(simd: S, polygon: &Polygon, rays: &[Ray]) -> [f64
     ];
     let mut met = distance.simd_gt(f64x8::splat(simd, 0.0)) & distance.simd_lt(f64x8::splat(simd, FARTHEST));
     for (inwards, edge) in &polygon.edges {
-        met &= dot(&splat(inwards), &point).simd_ge(f64x8::splat(simd, edge - EDGE_SLACK));
+        met &= product(simd, inwards, &point).simd_ge(f64x8::splat(simd, edge - EDGE_SLACK));
     }
-    let mut distances = [0.0; LANES];
     met.select(distance, f64x8::splat(simd, f64::INFINITY))
-        .store_slice(&mut distances);
-    distances
+}
+
+/// How the pyramid around the rays passes a polygon.
+///
+/// The plane cuts it in a convex outline whose corners are where the pyramid's do. Rays that start elsewhere than at its
+/// tip, by δ at most, are off by δ(1 + 1/N·d) there.
+#[inline(always)]
+fn passes<S: Simd, const R: usize>(simd: S, bundle: &Bundle<R>, polygon: &Polygon) -> Passes {
+    let splat = inlined(
+        #[inline(always)]
+        |x: f64| f64x4::splat(simd, x),
+    );
+    let corner = inlined(
+        #[inline(always)]
+        |k: usize| {
+            let [a, b, c, d] = bundle.pyramid.corners[k];
+            f64x4::simd_from(simd, [a.into(), b.into(), c.into(), d.into()])
+        },
+    );
+    let (x, y, z) = (corner(0), corner(1), corner(2));
+    let along = inlined(
+        #[inline(always)]
+        |v: &Vector3<f64>| x * splat(v.x) + y * splat(v.y) + z * splat(v.z),
+    );
+    let [sx, sy, sz] = bundle.start.reference.map(f64::from);
+    let n = &polygon.normal;
+    let height =
+        n.x * (polygon.origin.x - sx) + n.y * (polygon.origin.y - sy) + n.z * (polygon.origin.z - sz);
+    let closing = along(n);
+    let way = splat(height) / closing;
+    let (least, most) = (way.reduce_min(), way.reduce_max());
+    // The rounding of the tip, and of everything.
+    let apart = f64::from(bundle.start.spread) + 1e-6 * (1.0 + f64::from(bundle.start.reach));
+    let flattest = closing.abs().reduce_min();
+    let margin = apart * (1.0 + 2.0 / flattest);
+    if !(least * flattest > 2.0 * apart && most < 0.5 * FARTHEST) {
+        return Passes::Partly;
+    }
+    let mut inside = true;
+    for (inwards, edge) in &polygon.edges {
+        let start = inwards.x * sx + inwards.y * sy + inwards.z * sz;
+        let over = along(inwards) * way + splat(start - edge);
+        if over.reduce_max() < -margin {
+            return Passes::Outside;
+        }
+        inside &= over.reduce_min() > margin;
+    }
+    if inside { Passes::Inside } else { Passes::Partly }
 }

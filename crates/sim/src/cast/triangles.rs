@@ -4,16 +4,20 @@
 //! share an edge; the answer is the same with any instruction set, alone or in a beam. Of triangles that are met at the
 //! very same distance the first counts.
 
-use super::beam::{self, MOST_RAYS};
+use super::beam;
 use super::bundle::Bundle;
 use super::exact::Judge;
+use super::rows::{LANES, MOST, ROWS};
 use super::single;
 use super::wide::Wide;
 use crate::footprint::Ray;
 use crate::mesh::Mesh;
 use catoptric_model::Pose;
-use fearless_simd::{Level, dispatch};
+use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::{Point3, Unit, Vector3};
+
+/// Most rays of two rows.
+const TWO_ROWS: usize = 2 * LANES;
 
 /// A mesh in its place, with an index over its triangles.
 pub struct Triangles {
@@ -92,32 +96,54 @@ impl Triangles {
 
     pub(super) fn nearest_of_beam_at(&self, level: Level, rays: &[Ray], met: &mut [Option<Met>]) {
         assert_eq!(rays.len(), met.len(), "every ray has its place");
-        for (rays, met) in rays.chunks(MOST_RAYS).zip(met.chunks_mut(MOST_RAYS)) {
+        for (rays, met) in rays.chunks(MOST).zip(met.chunks_mut(MOST)) {
             self.nearest_of_some(level, rays, met);
         }
     }
 
     /// What is no narrow cone may be two.
     fn nearest_of_some(&self, level: Level, rays: &[Ray], met: &mut [Option<Met>]) {
-        if let [ray] = rays {
-            met[0] = self.nearest_at(level, ray);
-            return;
-        }
-        let judge = self.judge(rays);
-        let done = dispatch!(level, simd => match Bundle::new(simd, rays, self.wide.reach) {
-            Some(bundle) => {
-                let found = beam::follow(simd, &self.wide, &bundle, &judge);
-                found.finish(simd, &judge, met);
+        let done = match rays.len() {
+            0 => true,
+            1 => {
+                met[0] = self.nearest_at(level, &rays[0]);
                 true
             }
-            None => false,
-        });
+            ..=LANES => self.nearest_in_rows::<1>(level, rays, met),
+            ..=TWO_ROWS => self.nearest_in_rows::<2>(level, rays, met),
+            _ => self.nearest_in_rows::<ROWS>(level, rays, met),
+        };
         if !done {
             let middle = rays.len() / 2;
             let (first, second) = met.split_at_mut(middle);
             self.nearest_of_some(level, &rays[..middle], first);
             self.nearest_of_some(level, &rays[middle..], second);
         }
+    }
+
+    /// Whether the rays are a narrow cone; then also what they meet.
+    fn nearest_in_rows<const R: usize>(&self, level: Level, rays: &[Ray], met: &mut [Option<Met>]) -> bool {
+        dispatch!(level, simd => {
+            let mut bundle = Bundle::<R>::blank();
+            let narrow = bundle.fill(simd, rays, self.wide.reach);
+            if narrow {
+                self.nearest_of_bundle(simd, &bundle, rays, met);
+            }
+            narrow
+        })
+    }
+
+    /// What the rays of a bundle meet; it may be made for things that reach farther than the mesh.
+    #[inline(always)]
+    pub(super) fn nearest_of_bundle<S: Simd, const R: usize>(
+        &self,
+        simd: S,
+        bundle: &Bundle<R>,
+        rays: &[Ray],
+        met: &mut [Option<Met>],
+    ) {
+        let judge = self.judge(rays);
+        beam::follow(simd, &self.wide, bundle, &judge).finish(simd, bundle, &judge, met);
     }
 
     /// Normal of a triangle, for a ray that meets it.
