@@ -24,7 +24,7 @@ use super::exact::{Judge, Plane};
 use super::lanes::{cross, dot, inlined, less, size};
 use super::rows::{HALF, LANES, Origin, Rows, Vectors, half, whole};
 use super::triangles::Met;
-use super::wide::{Child, Leaf, ROUNDING, STACK, WIDTH, Wide};
+use super::wide::{Leaf, ROUNDING, WIDTH, Walk, Wide};
 use fearless_simd::{Simd, prelude::*};
 use fearless_simd::{f32x8, f32x16, f64x8, u32x16};
 
@@ -42,7 +42,7 @@ pub(super) struct Found<const R: usize> {
 const NONE: u32 = u32::MAX;
 
 /// What the rays need to know of eight triangles, in the order of [`At`].
-type Facts = [[f32; WIDTH]; 30];
+type Facts = [[f32; WIDTH]; 25];
 
 /// Places of a triangle's facts.
 struct At;
@@ -163,15 +163,8 @@ pub(super) fn follow<S: Simd, const R: usize>(
     judge: &Judge<'_>,
 ) -> Found<R> {
     let mut found = Found::new(bundle.rays.count);
-    let mut stack = [(0.0_f32, Child::NONE); STACK];
-    stack[0] = (0.0, Child::node(0));
-    let mut height = 1;
-    while height > 0 {
-        height -= 1;
-        let (near, child) = stack[height];
-        if near > found.limit {
-            continue;
-        }
+    let mut walk = Walk::new();
+    while let Some(child) = walk.next(found.limit) {
         if child.is_leaf() {
             leaf(
                 simd,
@@ -182,11 +175,11 @@ pub(super) fn follow<S: Simd, const R: usize>(
                 judge,
                 &mut found,
             );
-            continue;
+        } else {
+            let node = &wide.nodes[child.number()];
+            let (met, near) = bundle.pyramid.boxes(simd, &node.bounds, found.limit);
+            walk.push(node, met, near);
         }
-        let node = &wide.nodes[child.number()];
-        let (met, near) = bundle.pyramid.boxes(simd, &node.bounds, found.limit);
-        height = node.push(met, near, &mut stack, height);
     }
     found
 }
@@ -268,7 +261,7 @@ fn facts<S: Simd, const R: usize>(
     let cube = long * long * long;
     let way_error = ((far + spread).mul_add(u(16.0), eta * 4.0)).mul_add(size(&normal), cube * u(16.0)) * 2.0;
     let least_closing = long * (long.mul_add(u(16.0), eta * 8.0)) * 2.0;
-    let mut facts = [[0.0; WIDTH]; 30];
+    let mut facts = [[0.0; WIDTH]; 25];
     let mut put = inlined(
         #[inline(always)]
         |at: usize, value: f32x8<S>| value.store_slice(&mut facts[at]),

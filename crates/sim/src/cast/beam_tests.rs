@@ -115,7 +115,7 @@ fn beams_and_rays_find_what_trying_all_finds_with_any_lanes() {
                 continue;
             }
             let apart = [0.0, 0.005, 0.3][shot % 3];
-            let size = [1, 5, 16, 19, 64, 100][shot % 6];
+            let size = [1, 5, 16, 19, 64, 100, 128, 140][shot % 8];
             let rays = cone(&mut draws, from, towards, size, apart);
             let expected: Vec<_> = rays.iter().map(|ray| tried(&mesh, ray, count)).collect();
             hits += expected.iter().flatten().count();

@@ -11,9 +11,11 @@ pub(super) const LANES: usize = 16;
 /// Rays that one instruction treats in f64.
 pub(super) const HALF: usize = LANES / 2;
 
-/// Most rays of a bundle, and most rows of it.
+/// Most rows of a bundle. Bundles also come with one, two and four, and these are what fits.
+pub(super) const ROWS: usize = 8;
+pub(super) const TWO_ROWS: usize = 2 * LANES;
+pub(super) const FOUR_ROWS: usize = 4 * LANES;
 pub(super) const MOST: usize = ROWS * LANES;
-pub(super) const ROWS: usize = 4;
 
 /// A number of every ray.
 #[derive(Clone, Copy)]

@@ -8,7 +8,7 @@ use super::bundle::around;
 use super::exact::Judge;
 use super::lanes::{cross, dot, inlined, less, size};
 use super::triangles::Met;
-use super::wide::{Child, Leaf, Node, ROUNDING, STACK, WIDTH, Wide};
+use super::wide::{Leaf, Node, ROUNDING, WIDTH, Walk, Wide};
 use crate::footprint::Ray;
 use fearless_simd::f32x8;
 use fearless_simd::{Simd, prelude::*};
@@ -176,10 +176,7 @@ impl Nearest {
         let Some(triangle) = self.triangle else {
             return FARTHEST;
         };
-        // A triangle that is surely hit is.
-        *self
-            .way
-            .get_or_insert_with(|| judge.meet(0, triangle).unwrap_or(FARTHEST))
+        *self.way.get_or_insert_with(|| judge.way(0, triangle))
     }
 
     /// Decides in f64 about a triangle that the ray may meet.
@@ -207,15 +204,8 @@ pub(super) fn follow<S: Simd>(simd: S, wide: &Wide, ray: &Ray, judge: &Judge<'_>
         triangle: None,
         way: None,
     };
-    let mut stack = [(0.0_f32, Child::NONE); STACK];
-    stack[0] = (0.0, Child::node(0));
-    let mut height = 1;
-    while height > 0 {
-        height -= 1;
-        let (near, child) = stack[height];
-        if near > nearest.high {
-            continue;
-        }
+    let mut walk = Walk::new();
+    while let Some(child) = walk.next(nearest.high) {
         if child.is_leaf() {
             let leaf = &wide.leaves[child.number()];
             let outcome = line.triangles(simd, leaf, nearest.high);
@@ -239,7 +229,7 @@ pub(super) fn follow<S: Simd>(simd: S, wide: &Wide, ray: &Ray, judge: &Judge<'_>
         } else {
             let node = &wide.nodes[child.number()];
             let (met, near) = line.boxes(simd, node, nearest.high);
-            height = node.push(met, near, &mut stack, height);
+            walk.push(node, met, near);
         }
     }
     let distance = nearest.way(judge);

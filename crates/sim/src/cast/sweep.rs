@@ -7,8 +7,8 @@ use super::build::upwards;
 use super::bundle::Bundle;
 use super::exact::product;
 use super::lanes::{inlined, less};
-use super::rows::{HALF, LANES, MOST, ROWS, Rows, half};
-use super::wide::{Child, Node, STACK};
+use super::rows::{FOUR_ROWS, HALF, LANES, MOST, ROWS, Rows, TWO_ROWS, half};
+use super::wide::Walk;
 use super::{EDGE_SLACK, FARTHEST, Hit, Polygon, Shape, World};
 use crate::footprint::Ray;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
@@ -53,7 +53,6 @@ impl World {
 
     /// What is no narrow cone may be two.
     fn cast_some(&self, level: Level, rays: &[Ray], left: Option<usize>, hits: &mut [Option<Hit>]) {
-        const TWO_ROWS: usize = 2 * LANES;
         let done = match rays.len() {
             0 => true,
             1 => {
@@ -62,6 +61,7 @@ impl World {
             }
             ..=LANES => self.cast_in_rows::<1>(level, rays, left, hits),
             ..=TWO_ROWS => self.cast_in_rows::<2>(level, rays, left, hits),
+            ..=FOUR_ROWS => self.cast_in_rows::<4>(level, rays, left, hits),
             _ => self.cast_in_rows::<ROWS>(level, rays, left, hits),
         };
         if !done {
@@ -102,19 +102,12 @@ impl World {
         left: Option<usize>,
     ) -> Nearest<R> {
         let mut nearest = Nearest::new(rays.len());
-        let mut stack = [(0.0_f32, Child::NONE); STACK];
-        stack[0] = (0.0, Child::node(0));
-        let mut height = 1;
-        while height > 0 {
-            height -= 1;
-            let (near, child) = stack[height];
-            if near > nearest.limit {
-                continue;
-            }
+        let mut walk = Walk::new();
+        while let Some(child) = walk.next(nearest.limit) {
             if !child.is_leaf() {
-                let node: &Node = &self.nodes[child.number()];
+                let node = &self.nodes[child.number()];
                 let (met, near) = bundle.pyramid.boxes(simd, &node.bounds, nearest.limit);
-                height = node.push(met, near, &mut stack, height);
+                walk.push(node, met, near);
                 continue;
             }
             let surface = child.number();

@@ -7,7 +7,7 @@
 use super::beam;
 use super::bundle::Bundle;
 use super::exact::Judge;
-use super::rows::{LANES, MOST, ROWS};
+use super::rows::{FOUR_ROWS, LANES, MOST, ROWS, TWO_ROWS};
 use super::single;
 use super::wide::Wide;
 use crate::footprint::Ray;
@@ -15,9 +15,6 @@ use crate::mesh::Mesh;
 use catoptric_model::Pose;
 use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::{Point3, Unit, Vector3};
-
-/// Most rays of two rows.
-const TWO_ROWS: usize = 2 * LANES;
 
 /// A mesh in its place, with an index over its triangles.
 pub struct Triangles {
@@ -111,6 +108,7 @@ impl Triangles {
             }
             ..=LANES => self.nearest_in_rows::<1>(level, rays, met),
             ..=TWO_ROWS => self.nearest_in_rows::<2>(level, rays, met),
+            ..=FOUR_ROWS => self.nearest_in_rows::<4>(level, rays, met),
             _ => self.nearest_in_rows::<ROWS>(level, rays, met),
         };
         if !done {

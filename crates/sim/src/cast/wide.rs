@@ -15,7 +15,7 @@ pub(super) const WIDTH: usize = 8;
 pub(super) const ROUNDING: f32 = f32::EPSILON / 2.0;
 
 /// Most entries that a walk through the index holds: seven siblings on each of the levels that the builder allows.
-pub(super) const STACK: usize = (WIDTH - 1) * build::DEEPEST + 1;
+const STACK: usize = (WIDTH - 1) * build::DEEPEST + 1;
 
 /// Eight boxes and what is in them.
 #[derive(Debug, Clone, Copy)]
@@ -97,32 +97,84 @@ impl Node {
     }
 }
 
-impl Node {
-    /// Puts the children that are met on a stack, the nearest on top; the new height.
+/// What is still to be looked into, the nearest on top.
+pub(super) struct Walk {
+    /// What comes next, aside of the stack: most nodes have one child that is met.
+    next: Entry,
+    stack: [Entry; STACK],
+    height: usize,
+}
+
+/// A node or a leaf, and a way that is shorter than that to it.
+type Entry = (f32, Child);
+
+impl Walk {
+    const NOTHING: Entry = (f32::INFINITY, Child::NONE);
+
+    /// From the root.
     #[inline(always)]
-    pub(super) fn push<S: Simd>(
-        &self,
-        mut met: u32,
-        near: f32x8<S>,
-        stack: &mut [(f32, Child); STACK],
-        mut height: usize,
-    ) -> usize {
+    pub(super) fn new() -> Self {
+        Self {
+            next: (0.0, Child::node(0)),
+            stack: [Self::NOTHING; STACK],
+            height: 0,
+        }
+    }
+
+    /// The nearest thing before `limit` that is left.
+    #[inline(always)]
+    pub(super) fn next(&mut self, limit: f32) -> Option<Child> {
+        let mut entry = std::mem::replace(&mut self.next, Self::NOTHING);
+        while entry.0 > limit {
+            self.height = self.height.checked_sub(1)?;
+            entry = self.stack[self.height];
+        }
+        Some(entry.1)
+    }
+
+    /// Puts the children of a node that are met on the stack.
+    #[inline(always)]
+    pub(super) fn push<S: Simd>(&mut self, node: &Node, mut met: u32, near: f32x8<S>) {
+        if met == 0 {
+            return;
+        }
         let mut nears = [0.0; WIDTH];
         near.store_slice(&mut nears);
-        let bottom = height;
-        while met != 0 {
+        let mut take = || {
             let lane = met.trailing_zeros() as usize & (WIDTH - 1);
             met &= met - 1;
-            let entry = (nears[lane], self.children[lane]);
-            let mut place = height;
-            while place > bottom && stack[place - 1].0 < entry.0 {
-                stack[place] = stack[place - 1];
+            ((nears[lane], node.children[lane]), met == 0)
+        };
+        let (first, last) = take();
+        if last {
+            self.next = first;
+            return;
+        }
+        let (second, last) = take();
+        let (mut nearest, far) = if first.0 <= second.0 {
+            (first, second)
+        } else {
+            (second, first)
+        };
+        let bottom = self.height;
+        self.stack[self.height] = far;
+        self.height += 1;
+        let mut done = last;
+        while !done {
+            let (mut entry, last) = take();
+            done = last;
+            if entry.0 < nearest.0 {
+                std::mem::swap(&mut entry, &mut nearest);
+            }
+            let mut place = self.height;
+            while place > bottom && self.stack[place - 1].0 < entry.0 {
+                self.stack[place] = self.stack[place - 1];
                 place -= 1;
             }
-            stack[place] = entry;
-            height += 1;
+            self.stack[place] = entry;
+            self.height += 1;
         }
-        height
+        self.next = nearest;
     }
 }
 
