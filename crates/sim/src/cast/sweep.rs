@@ -124,6 +124,7 @@ impl World {
                             nearest.take(i, met.distance, surface, met.triangle);
                         }
                     }
+                    nearest.set_limit(simd);
                 }
                 other => {
                     for (i, ray) in rays.iter().enumerate() {
@@ -131,9 +132,9 @@ impl World {
                             nearest.take(i, distance, surface, NONE);
                         }
                     }
+                    nearest.set_limit(simd);
                 }
             }
-            nearest.set_limit(simd);
         }
         nearest
     }
@@ -170,16 +171,16 @@ impl<const R: usize> Nearest<R> {
         nearest
     }
 
-    /// A surface at some distance; of surfaces at the same distance the first counts.
-    fn take(&mut self, ray: usize, distance: f64, surface: usize, triangle: u32) {
-        // The numbers of shapes in a node of the index are as small.
-        #[allow(clippy::cast_possible_truncation)]
-        let surface = surface as u32;
-        if (distance, surface) < (self.distance.get(ray), self.surface.get(ray)) {
+    /// A surface at some distance; of surfaces at the same distance the first counts. Whether it does.
+    fn take(&mut self, ray: usize, distance: f64, surface: usize, triangle: u32) -> bool {
+        let surface = numbered(surface);
+        let nearer = (distance, surface) < (self.distance.get(ray), self.surface.get(ray));
+        if nearer {
             self.distance.set(ray, distance);
             self.surface.set(ray, surface);
             self.triangle.set(ray, triangle);
         }
+        nearer
     }
 
     #[inline(always)]
@@ -199,28 +200,47 @@ impl<const R: usize> Nearest<R> {
         if passes == Passes::Outside {
             return;
         }
+        let mut changed = false;
         for row in 0..R {
             for second in 0..2 {
                 let distances = distances(simd, bundle, row, second, polygon, passes == Passes::Inside);
                 let from = second * HALF;
                 let present = f64x8::from_slice(simd, &self.distance.0[row][from..from + HALF]);
+                let nearer = distances.simd_lt(present).to_bitmask();
+                if nearer == (1 << HALF) - 1 {
+                    let places = from..from + HALF;
+                    distances.store_slice(&mut self.distance.0[row][places.clone()]);
+                    self.surface.0[row][places.clone()].fill(numbered(surface));
+                    self.triangle.0[row][places].fill(NONE);
+                    changed = true;
+                    continue;
+                }
                 // One that is as near may be a surface before this one.
-                let mut nearer = distances.simd_le(present).to_bitmask();
-                if nearer == 0 {
+                let mut open = nearer | distances.simd_eq(present).to_bitmask();
+                if open == 0 {
                     continue;
                 }
                 let mut all = [0.0; HALF];
                 distances.store_slice(&mut all);
-                while nearer != 0 {
-                    let lane = nearer.trailing_zeros() as usize & (HALF - 1);
-                    nearer &= nearer - 1;
+                while open != 0 {
+                    let lane = open.trailing_zeros() as usize & (HALF - 1);
+                    open &= open - 1;
                     if all[lane] < f64::INFINITY {
-                        self.take(row * LANES + from + lane, all[lane], surface, NONE);
+                        changed |= self.take(row * LANES + from + lane, all[lane], surface, NONE);
                     }
                 }
             }
         }
+        if changed {
+            self.set_limit(simd);
+        }
     }
+}
+
+/// A surface's number; those of shapes in a node of the index are as small.
+#[allow(clippy::cast_possible_truncation)]
+fn numbered(surface: usize) -> u32 {
+    surface as u32
 }
 
 /// Distances at which eight rays meet a polygon, infinite where they do not: `Polygon::cast`.
