@@ -5,7 +5,8 @@ mod rig;
 mod setting;
 
 pub use rig::Rig;
-pub(crate) use setting::Met;
+pub(crate) use rig::Then;
+pub(crate) use setting::Beyond;
 pub use setting::{Mirrors, Role, Setting, Target};
 
 use crate::cast::Hit;

@@ -16,7 +16,7 @@ use crate::detect;
 use crate::echo::Receiver;
 use crate::error::SimError;
 use crate::footprint::{self, SubRay};
-use crate::optics::{End, MAX_BOUNCES, Path, Rig, Role, Setting};
+use crate::optics::{End, MAX_BOUNCES, Path, Rig, Role, Setting, Then};
 use crate::power::{self, Illumination};
 use crate::scene::{BeamShape, Detection, EchoChoice, ErrorModel, Errors, Light, Limits, Principle, Scene};
 use crate::truth::BeamClass;
@@ -210,14 +210,11 @@ impl Sensor {
 
     /// The structure's part in the ways of all sub-rays, for [`Sensor::observe_over`]; `bare` holds nothing else.
     pub fn compile(&self, bare: &Setting<'_>) -> Rig {
-        let beams = 0..beam::COUNT;
-        let rays = beams.flat_map(|beam| {
+        Rig::compile(bare, beam::COUNT, |beam| {
             let azimuth = beam::azimuth(beam);
-            self.sub_rays
-                .iter()
-                .map(move |s| footprint::ray(&self.shape, azimuth, s))
-        });
-        Rig::compile(bare, self.sub_rays.len(), rays)
+            let rays = self.sub_rays.iter();
+            rays.map(move |s| footprint::ray(&self.shape, azimuth, s))
+        })
     }
 
     /// What a beam brings home; `None` if no echo reaches the threshold.
@@ -368,44 +365,36 @@ impl Sensor {
     /// [`Sensor::illuminate`] from where the sub-rays depart from the structure.
     fn illuminate_over(&self, rig: &Rig, setting: &Setting<'_>, beam: usize, parts: &mut Parts) {
         parts.begin();
-        let departures = rig.departures(beam);
-        let (mut legs, mut met) = (std::mem::take(&mut parts.legs), std::mem::take(&mut parts.met));
-        legs.clear();
-        let leaving = departures.iter().filter(|d| matches!(d.end, End::Escaped));
-        legs.extend(leaving.map(|d| d.last));
-        setting.cast_into_room(&mut legs, &mut met);
-        let mut in_room = met.iter();
-        for (sub_ray, departure) in self.sub_rays.iter().zip(departures) {
-            let beyond = match departure.end {
-                End::Escaped => in_room.next().copied().flatten(),
-                End::Hit(hit) => Some((hit, hit.normal)),
-                End::Trapped => None,
+        let ways = rig.ways(beam);
+        let mut beyond = std::mem::take(&mut parts.beyond);
+        let mut in_room = setting.cast_into_room(ways.leaving(), &mut beyond);
+        for (sub_ray, departure) in self.sub_rays.iter().zip(ways.departures()) {
+            let end = match departure.then {
+                Then::Leaves => match in_room.next().flatten() {
+                    // A mirror of the room: its light may come back to the structure.
+                    Some(met) if met.reflects => {
+                        self.illuminate_by(setting, beam::azimuth(beam), sub_ray, parts);
+                        continue;
+                    }
+                    met => met.map(|met| (met.surface, met.cos_incidence, departure.length + met.distance)),
+                },
+                Then::EndsOn(surface, cos_incidence) => Some((surface, cos_incidence, departure.length)),
+                Then::Trapped => None,
             };
-            // A mirror of the room: its light may come back to the structure.
-            if matches!(departure.end, End::Escaped)
-                && beyond.is_some_and(|(hit, _)| setting.is_reflected(&hit))
-            {
-                self.illuminate_by(setting, beam::azimuth(beam), sub_ray, parts);
-                continue;
-            }
-            let (facets, meetings) = (rig.facets(departure), rig.meetings(departure));
+            let (facets, meetings) = (ways.facets(departure), ways.meetings(departure));
             let cosines = meetings.iter().map(|m| m.cos_incidence);
             let chief = is_chief(sub_ray);
-            if let Some((hit, normal)) = beyond {
-                let length = match departure.end {
-                    End::Escaped => departure.length + hit.distance,
-                    _ => departure.length,
-                };
+            if let Some((surface, cos_incidence, length)) = end {
                 let on = Illumination {
-                    reflectivity: setting.paint(hit.surface).reflectivity,
-                    cos_incidence: normal.dot(&departure.last.direction).abs(),
+                    reflectivity: setting.paint(surface).reflectivity,
+                    cos_incidence,
                     share: sub_ray.weight,
                     range: length,
                     mirrors: self.mirrors[departure.silvered] * departure.gain,
                 };
-                let place = (length, on.cos_incidence);
+                let place = (length, cos_incidence);
                 let (power, share) = (power::received(&self.light, &on), on.share * departure.gain);
-                parts.add((hit.surface, facets), power, share, place, cosines.clone(), chief);
+                parts.add((surface, facets), power, share, place, cosines.clone(), chief);
             }
             for arrival in self.on_mirrors(setting, sub_ray, meetings.iter().copied()) {
                 let on = &arrival.on;
@@ -416,7 +405,8 @@ impl Sensor {
                 parts.add((arrival.surface, facets), power, share, place, cosines, chief);
             }
         }
-        (parts.legs, parts.met) = (legs, met);
+        drop(in_room);
+        parts.beyond = beyond;
         if self.lacks_chief() {
             Self::add_chief(parts, &self.chief_path(setting, beam));
         }
@@ -470,9 +460,12 @@ impl Sensor {
                 edge.compensated(self.receiver.sd, self.receiver.threshold)
             }
         };
-        // A surface too dim to be seen without the others stands for its own range.
-        let alone = detect::leading_edge(&part.pulses, self.receiver.sd, self.receiver.threshold)
-            .map_or(geometric, |edge| read(&edge));
+        let alone = match parts {
+            [_] => read(&edge),
+            // A surface too dim to be seen without the others stands for its own range.
+            _ => detect::leading_edge(&part.pulses, self.receiver.sd, self.receiver.threshold)
+                .map_or(geometric, |edge| read(&edge)),
+        };
         let detection = if physical { alone - geometric } else { 0.0 };
         Some((part, read(&edge) - alone, detection))
     }

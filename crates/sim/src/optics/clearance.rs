@@ -33,20 +33,18 @@ impl Extent {
 
     /// Whether all of it is farther than a distance from a point, in metres; if in doubt it is not.
     pub(super) fn is_beyond(&self, point: &Point3<f64>, distance: f64) -> bool {
-        let bound = match self {
-            Self::Outline(sides) => {
-                let mut sides = sides
-                    .iter()
-                    .map(|(normal, offset)| offset - normal.dot(&point.coords));
-                let plane = sides.next().map_or(0.0, f64::abs);
-                sides.fold(plane, f64::max)
-            }
+        let distance = distance + SLACK;
+        match self {
+            Self::Outline(sides) => sides.iter().enumerate().any(|(i, (normal, offset))| {
+                let beyond = offset - normal.dot(&point.coords);
+                // Of the plane either side, of an edge what is outside.
+                beyond > distance || (i == 0 && -beyond > distance)
+            }),
             Self::Box(low, high) => {
                 let out = (low - point).sup(&(point - high)).sup(&Vector3::zeros());
-                out.norm()
+                out.norm() > distance
             }
-        };
-        bound > distance + SLACK
+        }
     }
 }
 

@@ -116,8 +116,22 @@ pub enum Mirrors {
     Removed,
 }
 
-/// What a leg beyond the structure meets, and the normal there in the sensor frame.
-pub(crate) type Met = Option<(Hit, Unit<Vector3<f64>>)>;
+/// What a leg beyond the structure meets.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Met {
+    pub(crate) surface: usize,
+    pub(crate) distance: f64,
+    pub(crate) cos_incidence: f64,
+    /// Whether it reflects.
+    pub(crate) reflects: bool,
+}
+
+/// Room for the legs of a beam in the frame of the room, and for what they meet.
+#[derive(Debug, Default)]
+pub(crate) struct Beyond {
+    rays: Vec<Ray>,
+    hits: Vec<Option<Hit>>,
+}
 
 /// A painted surface in the sensor frame: a board or a wall.
 pub struct Target {
@@ -240,33 +254,44 @@ impl<'a> Setting<'a> {
             .all(|e| e.is_beyond(&sensor, distance))
     }
 
-    /// The nearest surface of the room alone along every ray of a beam, given in the sensor frame, and the normal there in
-    /// that frame. The rays are left in the frame that the room is kept in.
-    pub(crate) fn cast_into_room(&self, rays: &mut [Ray], hits: &mut Vec<Met>) {
-        hits.clear();
-        let Some(room) = &self.contents.room else {
-            hits.resize(rays.len(), None);
-            return;
-        };
+    /// The nearest surface of the room alone along every ray of a beam, given in the sensor frame.
+    pub(crate) fn cast_into_room<'b>(
+        &'b self,
+        rays: &'b [Ray],
+        beyond: &'b mut Beyond,
+    ) -> impl Iterator<Item = Option<Met>> + 'b {
+        beyond.hits.clear();
+        beyond.hits.resize(rays.len(), None);
         let moved = self.start_from_sensor.as_ref();
-        if let Some(pose) = moved {
-            for ray in &mut *rays {
-                *ray = placed(ray, pose);
-            }
+        if let Some(room) = &self.contents.room {
+            let in_room = match moved {
+                None => rays,
+                Some(pose) => {
+                    beyond.rays.clear();
+                    beyond.rays.extend(rays.iter().map(|ray| placed(ray, pose)));
+                    &beyond.rays
+                }
+            };
+            room.cast_beam(in_room, None, &mut beyond.hits);
         }
-        let mut found = vec![None; rays.len()];
-        room.cast_beam(rays, None, &mut found);
-        hits.extend(found.into_iter().map(|hit: Option<Hit>| {
-            let mut hit = hit?;
+        // Rays of a beam mostly meet one plane: its normal is turned once.
+        let mut turned: Option<(Unit<Vector3<f64>>, Unit<Vector3<f64>>)> = None;
+        rays.iter().zip(&beyond.hits).map(move |(ray, hit)| {
+            let mut hit = (*hit)?;
             hit.surface += self.contents.first_of_room;
-            let normal = moved.map_or(hit.normal, |pose| pose.inverse_transform_unit_vector(&hit.normal));
-            Some((hit, normal))
-        }));
-    }
-
-    /// Whether a hit is on something that reflects.
-    pub(crate) fn is_reflected(&self, hit: &Hit) -> bool {
-        self.reflecting(hit).is_some()
+            let normal = match (moved, turned) {
+                (None, _) => hit.normal,
+                (Some(_), Some((kept, seen))) if kept == hit.normal => seen,
+                (Some(pose), _) => pose.inverse_transform_unit_vector(&hit.normal),
+            };
+            turned = Some((hit.normal, normal));
+            Some(Met {
+                surface: hit.surface,
+                distance: hit.distance,
+                cos_incidence: normal.dot(&ray.direction).abs(),
+                reflects: self.reflecting(&hit).is_some(),
+            })
+        })
     }
 
     /// What a surface is.
