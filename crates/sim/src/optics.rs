@@ -1,6 +1,7 @@
 //! The way of a ray: from the scanner over mirrors to whatever stops it.
 
 mod clearance;
+mod placed;
 mod rig;
 mod setting;
 
@@ -14,7 +15,8 @@ use crate::footprint::Ray;
 use crate::glass::{self, Passage};
 use catoptric_model::{Pose, mirror};
 use nalgebra::{Point3, Vector3};
-use setting::{Leg, placed};
+use placed::placed;
+use setting::Leg;
 
 /// Most mirrors a ray can meet; `max_bounces` may be less.
 pub const MAX_BOUNCES: usize = 8;

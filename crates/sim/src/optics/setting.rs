@@ -6,6 +6,7 @@
 
 use super::MAX_BOUNCES;
 use super::clearance::Extent;
+use super::placed::{place_all, placed};
 use crate::cast::{Hit, Shape, World};
 use crate::color::{self, Paint};
 use crate::error::SimError;
@@ -267,8 +268,7 @@ impl<'a> Setting<'a> {
             let in_room = match moved {
                 None => rays,
                 Some(pose) => {
-                    beyond.rays.clear();
-                    beyond.rays.extend(rays.iter().map(|ray| placed(ray, pose)));
+                    place_all(rays, pose, &mut beyond.rays);
                     &beyond.rays
                 }
             };
@@ -366,14 +366,6 @@ impl Leg<'_> {
             normal: pose.inverse_transform_unit_vector(&self.hit.normal),
             ..self.hit
         })
-    }
-}
-
-/// A ray moved into another frame.
-pub(super) fn placed(ray: &Ray, other_from_ray: &Pose) -> Ray {
-    Ray {
-        origin: other_from_ray * ray.origin,
-        direction: other_from_ray * ray.direction,
     }
 }
 
