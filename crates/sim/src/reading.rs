@@ -15,7 +15,7 @@ use crate::color;
 use crate::detect;
 use crate::echo::Receiver;
 use crate::error::SimError;
-use crate::footprint::{self, SubRay};
+use crate::footprint::{self, Ray, SubRay};
 use crate::optics::{End, MAX_BOUNCES, Path, Rig, Role, Setting, Then};
 use crate::power::{self, Illumination};
 use crate::scene::{BeamShape, Detection, EchoChoice, ErrorModel, Errors, Light, Limits, Principle, Scene};
@@ -183,20 +183,31 @@ impl Sensor {
         setting: &'a Setting<'_>,
         beam: usize,
     ) -> impl Iterator<Item = (&'a SubRay, Path)> {
+        let rays: Vec<Ray> = self.rays(beam).collect();
+        self.sub_rays.iter().zip(setting.trace_beam(&rays))
+    }
+
+    /// A beam's sub-rays as they leave the scanner, in the order in which they are cast.
+    pub fn rays(&self, beam: usize) -> impl Iterator<Item = Ray> {
         let azimuth = beam::azimuth(beam);
         self.sub_rays
             .iter()
-            .map(move |s| (s, setting.trace(&footprint::ray(&self.shape, azimuth, s))))
+            .map(move |s| footprint::ray(&self.shape, azimuth, s))
     }
 
-    /// The way of a beam's chief ray.
-    pub fn chief_path(&self, setting: &Setting<'_>, beam: usize) -> Path {
+    /// A beam's chief ray as it leaves the scanner.
+    pub fn chief_ray(&self, beam: usize) -> Ray {
         let chief = SubRay {
             wide: 0.0,
             narrow: 0.0,
             weight: 1.0,
         };
-        setting.trace(&footprint::ray(&self.shape, beam::azimuth(beam), &chief))
+        footprint::ray(&self.shape, beam::azimuth(beam), &chief)
+    }
+
+    /// The way of a beam's chief ray.
+    pub fn chief_path(&self, setting: &Setting<'_>, beam: usize) -> Path {
+        setting.trace(&self.chief_ray(beam))
     }
 
     /// What the structure does to a beam, and the share of its energy that goes the chief ray's way.
@@ -210,11 +221,7 @@ impl Sensor {
 
     /// The structure's part in the ways of all sub-rays, for [`Sensor::observe_over`]; `bare` holds nothing else.
     pub fn compile(&self, bare: &Setting<'_>) -> Rig {
-        Rig::compile(bare, beam::COUNT, |beam| {
-            let azimuth = beam::azimuth(beam);
-            let rays = self.sub_rays.iter();
-            rays.map(move |s| footprint::ray(&self.shape, azimuth, s))
-        })
+        Rig::compile(bare, beam::COUNT, |beam| self.rays(beam))
     }
 
     /// What a beam brings home; `None` if no echo reaches the threshold.

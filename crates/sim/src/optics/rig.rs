@@ -3,7 +3,7 @@
 //! Scanner and structure are rigid: what a sub-ray does until it leaves the structure for good, or ends on it, is the same
 //! wherever the sensor is and whatever is around it, as long as nothing of the room comes within the structure itself.
 
-use super::{Course, End, Meeting, Setting};
+use super::{End, Meeting, Setting};
 use crate::footprint::Ray;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -90,49 +90,54 @@ impl Rig {
 
 impl Ways {
     fn compile(bare: &Setting<'_>, rays: impl Iterator<Item = Ray>) -> Self {
+        let rays: Vec<Ray> = rays.collect();
         let mut ways = Self::default();
-        for ray in rays {
-            ways.add(bare, &ray);
-        }
-        ways
-    }
-
-    fn add(&mut self, bare: &Setting<'_>, ray: &Ray) {
-        let first = self.facets.len();
-        let mut reach = ray.origin.coords.norm();
-        let course: Course = bare.follow(ray, bare.contents.max_bounces, None, |bounce| {
-            self.facets.push(bounce.facet);
-            self.meetings.push(bounce.meeting);
+        let mut bounces: Vec<(usize, usize, Meeting)> = Vec::new();
+        let starts = rays.iter().map(|ray| ray.origin.coords.norm());
+        let mut reach = starts.fold(0.0, f64::max);
+        let courses = bare.follow_beam(&rays, bare.contents.max_bounces, |ray, bounce| {
+            bounces.push((ray, bounce.facet, bounce.meeting));
             let places = [bounce.point, bounce.after.origin];
             reach = places.iter().map(|p| p.coords.norm()).fold(reach, f64::max);
         });
-        let then = match course.end {
-            End::Escaped => {
-                self.leaving.push(course.last);
-                Then::Leaves
-            }
-            End::Hit(hit) => {
-                reach = reach.max(hit.point.coords.norm());
-                Then::EndsOn(hit.surface, hit.normal.dot(&course.last.direction).abs())
-            }
-            // It has met one more mirror, somewhere on the structure: all of that counts.
-            End::Trapped => {
-                reach = reach.max(bare.contents.span);
-                Then::Trapped
-            }
-        };
-        self.reach = self.reach.max(reach);
+        // Those of one ray after the other, each in order.
+        bounces.sort_by_key(|(ray, ..)| *ray);
         let facets = &bare.contents.facets;
-        let makes_ghost = |f: &usize| facets[*f].glass.is_some_and(|g| g.ghost);
-        self.ghosts |= self.facets[first..].iter().any(makes_ghost);
-        self.departures.push(Departure {
-            silvered: course.silvered,
-            gain: course.gain,
-            length: course.length,
-            then,
-            first,
-            count: course.count,
-        });
+        ways.ghosts = bounces
+            .iter()
+            .any(|(_, f, _)| facets[*f].glass.is_some_and(|g| g.ghost));
+        ways.facets = bounces.iter().map(|(_, facet, _)| *facet).collect();
+        ways.meetings = bounces.iter().map(|(.., meeting)| *meeting).collect();
+        ways.departures.reserve_exact(courses.len());
+        let mut first = 0;
+        for course in &courses {
+            let then = match course.end {
+                End::Escaped => {
+                    ways.leaving.push(course.last);
+                    Then::Leaves
+                }
+                End::Hit(hit) => {
+                    reach = reach.max(hit.point.coords.norm());
+                    Then::EndsOn(hit.surface, hit.normal.dot(&course.last.direction).abs())
+                }
+                // It has met one more mirror, somewhere on the structure: all of that counts.
+                End::Trapped => {
+                    reach = reach.max(bare.contents.span);
+                    Then::Trapped
+                }
+            };
+            ways.departures.push(Departure {
+                silvered: course.silvered,
+                gain: course.gain,
+                length: course.length,
+                then,
+                first,
+                count: course.count,
+            });
+            first += course.count;
+        }
+        ways.reach = reach;
+        ways
     }
 
     /// How the sub-rays are done with the structure.

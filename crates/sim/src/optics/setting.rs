@@ -327,14 +327,41 @@ impl<'a> Setting<'a> {
         }
     }
 
+    /// The structure, if there is nothing else.
+    pub(super) fn structure_alone(&self) -> Option<&World> {
+        self.contents.room.is_none().then_some(&self.contents.world)
+    }
+
+    /// Whether a surface is of the same kind in another setting, on the same side of the same facet.
+    pub(super) fn is_same_kind(&self, other: &Setting<'_>, surface: usize) -> bool {
+        let (a, b) = (
+            &self.contents.surfaces[surface],
+            &other.contents.surfaces[surface],
+        );
+        a.role == b.role && a.side == b.side
+    }
+
+    /// Whether the mirror that a surface is part of, if it is, turns light alike in another setting.
+    pub(super) fn reflects_alike(&self, other: &Setting<'_>, surface: usize) -> bool {
+        match self.contents.surfaces[surface].role {
+            Role::Facet(facet) => self.contents.facets[facet].reflects_like(&other.contents.facets[facet]),
+            _ => true,
+        }
+    }
+
+    /// A leg that ends where the sensor frame is that of the surface.
+    pub(super) fn unmoved(&self, hit: Hit, incoming: Unit<Vector3<f64>>) -> Leg<'_> {
+        Leg {
+            hit,
+            incoming,
+            kept_from_sensor: None,
+        }
+    }
+
     /// The nearest surface along a ray of the sensor frame, `left` (the one it just left) aside.
     pub(super) fn cast(&self, ray: &Ray, left: Option<usize>) -> Option<Leg<'_>> {
         let contents = &*self.contents;
-        let unmoved = |hit| Leg {
-            hit,
-            incoming: ray.direction,
-            kept_from_sensor: None,
-        };
+        let unmoved = |hit| self.unmoved(hit, ray.direction);
         let Some(room) = &contents.room else {
             return contents.world.cast(ray, left).map(unmoved);
         };
