@@ -275,16 +275,16 @@ impl<'a> Setting<'a> {
             room.cast_beam(in_room, None, &mut beyond.hits);
         }
         // Rays of a beam mostly meet one plane: its normal is turned once.
-        let mut turned: Option<(Unit<Vector3<f64>>, Unit<Vector3<f64>>)> = None;
+        let mut turned: Option<[Unit<Vector3<f64>>; 2]> = None;
         rays.iter().zip(&beyond.hits).map(move |(ray, hit)| {
             let mut hit = (*hit)?;
             hit.surface += self.contents.first_of_room;
             let normal = match (moved, turned) {
                 (None, _) => hit.normal,
-                (Some(_), Some((kept, seen))) if kept == hit.normal => seen,
+                (Some(_), Some([kept, seen])) if kept == hit.normal => seen,
                 (Some(pose), _) => pose.inverse_transform_unit_vector(&hit.normal),
             };
-            turned = Some((hit.normal, normal));
+            turned = Some([hit.normal, normal]);
             Some(Met {
                 surface: hit.surface,
                 distance: hit.distance,
