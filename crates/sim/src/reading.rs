@@ -341,9 +341,10 @@ impl Sensor {
     /// The surfaces that a beam's light reaches, each with its pulses.
     fn illuminate(&self, setting: &Setting<'_>, beam: usize, parts: &mut Parts) {
         parts.begin();
-        let azimuth = beam::azimuth(beam);
-        for sub_ray in &self.sub_rays {
-            self.illuminate_by(setting, azimuth, sub_ray, parts);
+        let rays: Vec<Ray> = self.rays(beam).collect();
+        let paths = setting.trace_beam(&rays);
+        for ((sub_ray, ray), path) in self.sub_rays.iter().zip(&rays).zip(&paths) {
+            self.illuminate_along(setting, sub_ray, ray, path, parts);
         }
         if self.lacks_chief() {
             Self::add_chief(parts, &self.chief_path(setting, beam));
@@ -351,21 +352,26 @@ impl Sensor {
         parts.end();
     }
 
-    /// What one sub-ray's light reaches.
-    fn illuminate_by(&self, setting: &Setting<'_>, azimuth: f64, sub_ray: &SubRay, parts: &mut Parts) {
-        let ray = footprint::ray(&self.shape, azimuth, sub_ray);
-        let path = setting.trace(&ray);
+    /// What one sub-ray's light reaches on its way.
+    fn illuminate_along(
+        &self,
+        setting: &Setting<'_>,
+        sub_ray: &SubRay,
+        ray: &Ray,
+        path: &Path,
+        parts: &mut Parts,
+    ) {
         let chief = is_chief(sub_ray);
-        if let Some(arrival) = self.at_end(setting, sub_ray, &path) {
-            self.add(parts, &path, &arrival, chief);
+        if let Some(arrival) = self.at_end(setting, sub_ray, path) {
+            self.add(parts, path, &arrival, chief);
         }
-        for ghost in setting.ghosts(&ray, &path) {
+        for ghost in setting.ghosts(ray, path) {
             if let Some(arrival) = self.at_end(setting, sub_ray, &ghost) {
                 self.add(parts, &ghost, &arrival, false);
             }
         }
         for arrival in self.on_mirrors(setting, sub_ray, path.meetings()) {
-            self.add(parts, &path, &arrival, chief);
+            self.add(parts, path, &arrival, chief);
         }
     }
 
@@ -380,7 +386,8 @@ impl Sensor {
                 Then::Leaves => match in_room.next().flatten() {
                     // A mirror of the room: its light may come back to the structure.
                     Some(met) if met.reflects => {
-                        self.illuminate_by(setting, beam::azimuth(beam), sub_ray, parts);
+                        let ray = footprint::ray(&self.shape, beam::azimuth(beam), sub_ray);
+                        self.illuminate_along(setting, sub_ray, &ray, &setting.trace(&ray), parts);
                         continue;
                     }
                     met => met.map(|met| (met.surface, met.cos_incidence, departure.length + met.distance)),

@@ -219,7 +219,7 @@ impl<'a> Setting<'a> {
             // Cylinders are drawn with flat faces.
             span: 1.01 * corners.map(|c| c.coords.norm()).fold(0.0, f64::max),
             world: World::new(list.shapes),
-            extents: room.iter().map(Extent::of).collect(),
+            extents: room.iter().map(|shape| Extent::of(shape, flies)).collect(),
             room: (!room.is_empty()).then(|| World::new(room)),
             surfaces: list.surfaces,
             first_of_room,
@@ -370,16 +370,57 @@ impl<'a> Setting<'a> {
         let moved = self.start_from_sensor.as_ref();
         let ray_in_room = moved.map_or(*ray, |pose| placed(ray, pose));
         let past = room.cast(&ray_in_room, left.and_then(|l| l.checked_sub(first)));
+        self.nearer((own, ray), (past, &ray_in_room))
+    }
+
+    /// The same along every ray of a beam.
+    pub(super) fn cast_beam<'s>(
+        &'s self,
+        rays: &[Ray],
+        left: Option<usize>,
+        legs: &mut Vec<Option<Leg<'s>>>,
+    ) {
+        legs.clear();
+        let contents = &*self.contents;
+        let first = contents.first_of_room;
+        let mut own = vec![None; rays.len()];
+        contents
+            .world
+            .cast_beam(rays, left.filter(|l| *l < first), &mut own);
+        let Some(room) = &contents.room else {
+            let each = own.into_iter().zip(rays);
+            legs.extend(each.map(|(hit, ray)| Some(self.unmoved(hit?, ray.direction))));
+            return;
+        };
+        let mut in_room = Vec::new();
+        match &self.start_from_sensor {
+            None => in_room.extend_from_slice(rays),
+            Some(pose) => place_all(rays, pose, &mut in_room),
+        }
+        let mut past = vec![None; rays.len()];
+        room.cast_beam(&in_room, left.and_then(|l| l.checked_sub(first)), &mut past);
+        let pairs = own.into_iter().zip(rays).zip(past.into_iter().zip(&in_room));
+        legs.extend(pairs.map(|(own, past)| self.nearer(own, past)));
+    }
+
+    /// The nearer of what a ray meets of the structure and, in the frame of the room, of that.
+    fn nearer(
+        &self,
+        (own, ray): (Option<Hit>, &Ray),
+        (past, in_room): (Option<Hit>, &Ray),
+    ) -> Option<Leg<'_>> {
         match (own, past) {
-            (Some(own), Some(past)) if own.distance <= past.distance => Some(unmoved(own)),
-            (own, None) => own.map(unmoved),
+            (Some(own), Some(past)) if own.distance <= past.distance => {
+                Some(self.unmoved(own, ray.direction))
+            }
+            (own, None) => Some(self.unmoved(own?, ray.direction)),
             (_, Some(past)) => Some(Leg {
                 hit: Hit {
-                    surface: past.surface + first,
+                    surface: past.surface + self.contents.first_of_room,
                     ..past
                 },
-                incoming: ray_in_room.direction,
-                kept_from_sensor: moved,
+                incoming: in_room.direction,
+                kept_from_sensor: self.start_from_sensor.as_ref(),
             }),
         }
     }

@@ -1,4 +1,4 @@
-//! The ways of the rays of a beam over the structure, leg by leg together: rays that left one mirror are a beam again.
+//! The ways of the rays of a beam, leg by leg together: rays that left one mirror are a beam again.
 
 use super::{Bounce, Course, End, MAX_BOUNCES, Path, Setting};
 use crate::footprint::Ray;
@@ -31,29 +31,20 @@ impl Setting<'_> {
         limit: usize,
         mut tell: impl FnMut(usize, &Bounce),
     ) -> Vec<Course> {
-        let Some(world) = self.structure_alone() else {
-            let each = rays.iter().enumerate();
-            return each
-                .map(|(i, ray)| self.follow(ray, limit, None, |bounce| tell(i, bounce)))
-                .collect();
-        };
         let mut courses: Vec<Course> = rays.iter().map(Course::begin).collect();
         // The mirror that a ray has left, and its number.
         let mut going: Vec<(Option<usize>, usize)> = (0..rays.len()).map(|ray| (None, ray)).collect();
-        let (mut legs, mut hits) = (Vec::new(), Vec::new());
+        let (mut beam, mut legs) = (Vec::new(), Vec::new());
         while !going.is_empty() {
             let mut next = Vec::new();
             for group in going.chunk_by(|a, b| a.0 == b.0) {
-                legs.clear();
-                legs.extend(group.iter().map(|(_, ray)| courses[*ray].last));
-                hits.clear();
-                hits.resize(legs.len(), None);
-                world.cast_beam(&legs, group[0].0, &mut hits);
-                for ((_, ray), hit) in group.iter().zip(&hits) {
+                beam.clear();
+                beam.extend(group.iter().map(|(_, ray)| courses[*ray].last));
+                self.cast_beam(&beam, group[0].0, &mut legs);
+                for ((_, ray), leg) in group.iter().zip(&legs) {
                     let course = &mut courses[*ray];
-                    let leg = hit.map(|hit| self.unmoved(hit, course.last.direction));
                     if let Some(leg) = leg
-                        && let Some(left) = self.step(course, &leg, limit, None, &mut |b| tell(*ray, b))
+                        && let Some(left) = self.step(course, leg, limit, None, &mut |b| tell(*ray, b))
                     {
                         next.push((Some(left), *ray));
                     }
