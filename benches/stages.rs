@@ -1,15 +1,17 @@
-//! How long each stage of the main job takes: compiling a rig, tracing, detecting, drawing, writing, calibrating.
+//! How long each stage of the main job takes: compiling a rig, looking at a layout, tracing, detecting, drawing, writing, calibrating.
 //!
 //! Compare two versions with criterion's `--save-baseline` and `--baseline`; absolute times depend on the machine.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use catoptric::calib::{self, Method, Options};
 use catoptric::io::RecordingWriter;
+use catoptric::layout::{Detail, Layout, analyze};
 use catoptric::model::beam;
 use catoptric::sim::detect::{self, Pulse};
 use catoptric::sim::noise::{Columns, Purpose};
 use catoptric::sim::optics::{Mirrors, Setting};
 use catoptric::sim::reading::Sensor;
+use catoptric::sim::scene::{FacetShape, PolygonShape};
 use catoptric::sim::structure::Structure;
 use catoptric::sim::{Laboratory, Scene};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -50,6 +52,37 @@ fn compile(c: &mut Criterion) {
     group.bench_function("rig of the prototype, sub-rays", |b| {
         b.iter(|| sensor.compile(&bare))
     });
+    group.finish();
+}
+
+/// A layout as a whole, and after one facet was moved a little.
+fn layout(c: &mut Criterion) {
+    let scene = prototype();
+    let mut moved = scene.clone();
+    let facet = &mut moved.superstructure.facet[3];
+    let corners = catoptric::sim::layout::corners(&facet.shape).unwrap();
+    let corners_mm = corners
+        .iter()
+        .map(|c| [c.x * 1e3 + 0.3, c.y * 1e3 - 0.2, c.z * 1e3]);
+    facet.shape = FacetShape::Polygon(PolygonShape {
+        corners_mm: corners_mm.collect(),
+    });
+    let mut group = c.benchmark_group("layout");
+    for (name, detail) in [("full", Detail::Full), ("coarse", Detail::Coarse)] {
+        let known = Layout::new(&scene, None, detail).unwrap();
+        group.bench_function(format!("{name}, as a whole"), |b| {
+            b.iter(|| analyze(&moved, None, detail).unwrap());
+        });
+        group.bench_function(format!("{name}, one facet edited"), |b| {
+            b.iter(|| known.edited(&moved).unwrap().analysis().unwrap());
+        });
+        group.bench_function(
+            format!("{name}, one facet edited, without what is said of it"),
+            |b| {
+                b.iter(|| known.edited(&moved).unwrap());
+            },
+        );
+    }
     group.finish();
 }
 
@@ -154,5 +187,7 @@ fn calibrate(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(stages, compile, simulate, fly, detection, noise, write, calibrate);
+criterion_group!(
+    stages, compile, layout, simulate, fly, detection, noise, write, calibrate
+);
 criterion_main!(stages);

@@ -3,6 +3,7 @@
 
     benches/peers/compare.py                              # all sizes and engines, some minutes
     benches/peers/compare.py --meshes lab,10k --rounds 1  # a short look
+    benches/peers/compare.py --simulate --meshes 10k,1m   # the whole simulator in those rooms, files included
 
 Needs cargo and NumPy. Embree is measured where g++ and Debian's `libembree-dev` are there, Open3D and Mitsuba where
 the PyPI packages `open3d` and `mitsuba` are; what is missing is named and left out. Engines take turns round by round,
@@ -14,6 +15,7 @@ import argparse
 import importlib.util
 import json
 import os
+import resource
 import statistics
 import subprocess
 import sys
@@ -177,6 +179,96 @@ def python_peer(folder, mesh, engine, rays_name, threads, seconds):
     print(json.dumps({"mrays": len(all_rays) / statistics.median(times) / 1e6, "build_s": build}))
 
 
+# ---- the whole simulator: a scanner that flies, every pulse traced, detected and written ------------------------------
+
+SCENE = """
+schema_version = 1
+name = "room-of-{mesh}"
+
+[scanner]
+preset = "ust-20lx"
+sub_rays = 19
+beam = {{ wide_full_mrad = 10, narrow_full_mrad = 10, wide_aperture_mm = 5, narrow_aperture_mm = 5 }}
+
+[superstructure]
+marker = [
+    {{ name = "a", position_mm = [100, 0, 0] }},
+    {{ name = "b", position_mm = [0, 120, 10] }},
+    {{ name = "c", position_mm = [-90, -30, 40] }},
+]
+
+[[room.surface]]
+name = "room"
+shape.mesh = {{ file = "{mesh}.ply", units = "m" }}
+
+[[flight]]
+name = "across"
+waypoint = [
+    {{ time_s = 0, position_m = [5.0, 4.2, 1.4] }},
+    {{ time_s = {seconds}, position_m = [6.0, 4.8, 1.8], yaw_deg = 170, pitch_deg = 25, roll_deg = 30 }},
+]
+"""
+# Lengths of the flights, in seconds: what the shorter one takes too, reading and indexing above all, is taken off.
+FLIGHTS = (1, 9)
+SCANS_PER_S = 40
+
+
+def write_ply(np, folder, mesh):
+    vertices = np.fromfile(folder / f"{mesh}.vertices.f32", "<f4").reshape(-1, 3)
+    triangles = np.fromfile(folder / f"{mesh}.triangles.u32", "<u4").reshape(-1, 3)
+    rows = np.empty(len(triangles), [("count", "u1"), ("corners", "<u4", 3)])
+    rows["count"], rows["corners"] = 3, triangles
+    header = f"""ply
+format binary_little_endian 1.0
+element vertex {len(vertices)}
+property float x
+property float y
+property float z
+element face {len(triangles)}
+property list uchar uint vertex_indices
+end_header
+"""
+    with open(folder / f"{mesh}.ply", "wb") as file:
+        file.write(header.encode())
+        vertices.tofile(file)
+        rows.tofile(file)
+
+
+def clock(threads):
+    """On one thread the processor's time, which others on the machine do not change much."""
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return children.ru_utime + children.ru_stime if threads == 1 else time.perf_counter()
+
+
+def simulate(np, folder, arguments):
+    program = arguments.program
+    if not program:
+        subprocess.run(["cargo", "build", "--release"], cwd=HERE, check=True)
+        program = HERE.parent.parent / "target" / "release" / "catoptric"
+    print(f"\nthe whole simulator, 19 sub-rays a pulse, {arguments.threads} thread(s)\n")
+    print("| mesh | files | k pulses/s | M sub-rays/s | start, s |")
+    print("|---|---|---|---|---|")
+    for mesh in arguments.meshes.split(","):
+        write_ply(np, folder, mesh)
+        for files, more in (("recording", []), ("and every return as text", ["--returns"])):
+            rates, starts = [], []
+            for _ in range(arguments.rounds):
+                times = []
+                for seconds in FLIGHTS:
+                    (folder / f"{mesh}.toml").write_text(SCENE.format(mesh=mesh, seconds=seconds))
+                    command = [str(program), "simulate", str(folder / f"{mesh}.toml"), "--out", str(folder / "data"), "--replace"]
+                    begin = clock(arguments.threads)
+                    done = subprocess.run([*command, "--threads", str(arguments.threads), *more], capture_output=True, text=True)
+                    times.append(clock(arguments.threads) - begin)
+                    if done.returncode:
+                        sys.exit(f"simulate on {mesh}: {done.stderr[-600:]}")
+                per_s = (times[1] - times[0]) / (FLIGHTS[1] - FLIGHTS[0])
+                rates.append(SCANS_PER_S * BEAMS / per_s)
+                starts.append(times[0] - per_s * FLIGHTS[0])
+            rate = statistics.median(rates)
+            print(f"| {mesh} | {files} | {rate / 1e3:.0f} | {19 * rate / 1e6:.1f} | {statistics.median(starts):.2f} |", flush=True)
+
+
 # ---- running ---------------------------------------------------------------------------------------------------------
 
 
@@ -206,6 +298,8 @@ def main():
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--seconds", type=float, default=1.0, help="of one engine in one round")
     parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--simulate", action="store_true", help="measure the whole simulator instead")
+    parser.add_argument("--program", type=Path, help="for --simulate, another catoptric than that of this tree")
     parser.add_argument("--peer", nargs=3, metavar=("MESH", "ENGINE", "RAYS"), help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.peer:
@@ -217,6 +311,8 @@ def main():
     folder.mkdir(parents=True, exist_ok=True)
     meshes, engines = arguments.meshes.split(","), arguments.engines.split(",")
     make_inputs(np, folder, meshes)
+    if arguments.simulate:
+        return simulate(np, folder, arguments)
     ours, embree = build_ours(), build_embree(folder)
     there = {
         "embree16": embree,

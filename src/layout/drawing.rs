@@ -2,7 +2,7 @@
 
 use super::element::{Class, exit, trace};
 use super::field::{Cell, cells};
-use super::footprint::{Footprint, footprints};
+use super::footprint::{Footprint, Outlines};
 use super::size::HOUSING;
 use catoptric_model::Pose;
 use catoptric_sim::cast::Triangle;
@@ -86,7 +86,9 @@ impl Drawing {
                     exit: exit(&t.chief),
                 }
             });
-            (rays.collect(), footprints(&sensor, &structure, &traced))
+            let outlines = Outlines::new(&sensor, &structure);
+            let footprints = traced.iter().flat_map(|t| outlines.of(t));
+            (rays.collect(), footprints.collect())
         };
         Ok(Self {
             name: scene.name.clone(),

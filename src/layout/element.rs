@@ -10,8 +10,8 @@
 
 use super::footprint::Footprint;
 use catoptric_model::beam;
-use catoptric_sim::footprint::SubRay;
-use catoptric_sim::optics::{End, Path, Setting};
+use catoptric_sim::footprint::Ray;
+use catoptric_sim::optics::{End, Path, Setting, Trail};
 use catoptric_sim::reading::{Sensor, class};
 use catoptric_sim::structure::Structure;
 use catoptric_sim::truth::BeamClass;
@@ -89,6 +89,8 @@ pub(crate) struct Traced {
     /// What two passes leave of the light that goes the chief ray's way.
     pub(crate) light: f64,
     pub(crate) sees: bool,
+    /// Where all of its light went over the structure.
+    pub(crate) trail: Trail,
 }
 
 impl Traced {
@@ -169,32 +171,37 @@ fn mirror_at(path: &Path) -> f64 {
 
 /// Follows every beam through a setting without targets.
 pub(crate) fn trace(sensor: &Sensor, bare: &Setting<'_>, scene: &Scene) -> Vec<Traced> {
-    let of_one = |beam| {
-        let chief = sensor.chief_path(bare, beam);
-        let paths: Vec<(&SubRay, Path)> = sensor.paths(bare, beam).collect();
-        let (status, chief_energy) = class(&chief, paths.iter().map(|(s, p)| (*s, p)));
-        let along = paths.iter();
-        let along = along.filter(|(_, p)| exit(p).is_some() && p.facets() == chief.facets());
-        let light = along.map(|(s, p)| {
-            let pass = libm::pow(scene.superstructure.mirror.reflectivity, p.silvered as f64) * p.gain;
-            s.weight * pass * pass
-        });
-        let mut traced = Traced {
-            beam,
-            status,
-            chief_energy,
-            light: light.sum(),
-            sees: false,
-            chief,
-        };
-        let leaves = matches!(
-            status,
-            BeamClass::Direct | BeamClass::Deflected | BeamClass::MultiBounce
-        );
-        traced.sees = leaves && farthest(scene, &traced, white(scene)) > nearest(scene, &traced);
-        traced
+    let beams = (0..beam::COUNT).into_par_iter();
+    beams.map(|beam| trace_one(sensor, bare, scene, beam)).collect()
+}
+
+/// Follows a beam through a setting without targets.
+pub(crate) fn trace_one(sensor: &Sensor, bare: &Setting<'_>, scene: &Scene, beam: usize) -> Traced {
+    let rays: Vec<Ray> = sensor.rays(beam).chain([sensor.chief_ray(beam)]).collect();
+    let (paths, trail) = bare.trace_with_trail(&rays);
+    let chief = paths[paths.len() - 1];
+    let paths = || sensor.bundle().iter().zip(&paths);
+    let (status, chief_energy) = class(&chief, paths());
+    let along = paths().filter(|(_, p)| exit(p).is_some() && p.facets() == chief.facets());
+    let light = along.map(|(s, p)| {
+        let pass = libm::pow(scene.superstructure.mirror.reflectivity, p.silvered as f64) * p.gain;
+        s.weight * pass * pass
+    });
+    let mut traced = Traced {
+        beam,
+        status,
+        chief_energy,
+        light: light.sum(),
+        sees: false,
+        chief,
+        trail,
     };
-    (0..beam::COUNT).into_par_iter().map(of_one).collect()
+    let leaves = matches!(
+        status,
+        BeamClass::Direct | BeamClass::Deflected | BeamClass::MultiBounce
+    );
+    traced.sees = leaves && farthest(scene, &traced, white(scene)) > nearest(scene, &traced);
+    traced
 }
 
 /// Reflectivity of the white that scenes mean.
@@ -222,8 +229,8 @@ pub(crate) fn elements(
     scene: &Scene,
     structure: &Structure,
     names: &[&str],
-    traced: &[Traced],
-    footprints: &[Footprint],
+    traced: &[&Traced],
+    footprints: &[&Footprint],
 ) -> Vec<Element> {
     let white = white(scene);
     let mut margins: Vec<Option<(f64, f64)>> = vec![None; traced.len()];
@@ -262,5 +269,5 @@ pub(crate) fn elements(
             margin_beams: margins[t.beam].map(|(_, beams)| beams),
         }
     };
-    traced.iter().map(of_one).collect()
+    traced.iter().map(|t| of_one(t)).collect()
 }

@@ -66,9 +66,9 @@ pub struct FacetView {
 pub(crate) fn facets(
     structure: &Structure,
     elements: &[Element],
-    traced: &[Traced],
+    traced: &[&Traced],
     cells: &[Cell],
-    footprints: &[Footprint],
+    footprints: &[&Footprint],
 ) -> Vec<FacetView> {
     (0..structure.facets.len())
         .map(|facet| view(structure, facet, elements, traced, cells, footprints))
@@ -79,9 +79,9 @@ fn view(
     structure: &Structure,
     facet: usize,
     elements: &[Element],
-    traced: &[Traced],
+    traced: &[&Traced],
     cells: &[Cell],
-    footprints: &[Footprint],
+    footprints: &[&Footprint],
 ) -> FacetView {
     let built = &structure.facets[facet];
     let meets = |t: &Traced| t.chief.facets().contains(&facet);
@@ -97,7 +97,7 @@ fn view(
     let angles = own.iter().map(|(e, _)| cells[e.beam].solid_angle());
     // An empty sum is −0.
     let solid_angle_sr = angles.fold(0.0, |sum, angle| sum + angle);
-    let sees = |f: &&Footprint| f.facet == facet && elements[f.beam].class.sees();
+    let sees = |f: &&&Footprint| f.facet == facet && elements[f.beam].class.sees();
     let nearest = footprints
         .iter()
         .filter(sees)
@@ -147,7 +147,7 @@ fn view(
 }
 
 /// Least and greatest azimuth of a fan, in degrees, measured from its middle so that no turn is counted twice.
-fn azimuths(own: &[(&Element, &Traced)]) -> Option<[f64; 2]> {
+fn azimuths(own: &[(&Element, &&Traced)]) -> Option<[f64; 2]> {
     let (_, middle) = own.get(own.len() / 2)?;
     let middle = exit(&middle.chief)?;
     let from = libm::atan2(middle.y, middle.x);

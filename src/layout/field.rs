@@ -11,7 +11,9 @@ use catoptric_model::beam;
 use catoptric_sim::scene::BeamShape;
 use catoptric_sim::structure::Structure;
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
 /// Angle within which a direction is near a beam, in degrees.
 pub const NEAR_DEG: f64 = 5.0;
@@ -21,6 +23,9 @@ const PARTS: [usize; 2] = [3, 6];
 
 /// Directions of the lattice on which nearness is counted: the share is right to about 1e-3.
 const LATTICE: usize = 8000;
+
+/// Fewest directions or cells that are worth another thread.
+const AT_ONCE: usize = 64;
 
 /// What one element stands for in the scan: half-way to its neighbors, and across as far as its beam reaches.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,7 +87,7 @@ pub(crate) fn cells(shape: &BeamShape) -> Vec<Cell> {
 }
 
 impl Ways {
-    pub(crate) fn new(structure: &Structure, traced: &[Traced]) -> Self {
+    pub(crate) fn new(structure: &Structure, traced: &[&Traced]) -> Self {
         let mut beams: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
         for t in traced.iter().filter(|t| t.sees) {
             beams.entry(t.chief.facets().to_vec()).or_default().push(t.beam);
@@ -164,24 +169,27 @@ impl Way {
 }
 
 /// What all ways see together.
-pub(crate) fn field(ways: &Ways, cells: &[Cell], traced: &[Traced]) -> Field {
+pub(crate) fn field(ways: &Ways, cells: &[Cell], traced: &[&Traced]) -> Field {
     let highest = cells.iter().fold(0.0_f64, |h, c| h.max(libm::sin(c.half_height)));
-    let mut covered_sr = 0.0;
-    let mut direct_sr = 0.0;
-    for (own, way) in ways.0.iter().enumerate() {
-        for &beam in &way.beams {
-            let cell = &cells[beam];
-            let seen = part_directions(cell).map(|(in_scan, weight)| {
-                let direction = way.turn * in_scan;
-                let before = ways.0[..own].iter().any(|w| w.sees(&direction, cells, highest));
-                if before { 0.0 } else { weight }
-            });
-            covered_sr += seen.sum::<f64>();
-            if way.facets.is_empty() {
-                direct_sr += cell.solid_angle();
-            }
-        }
-    }
+    let seen_by = |(own, beam): &(usize, usize)| -> f64 {
+        let (way, before) = (&ways.0[*own], &ways.0[..*own]);
+        let seen = part_directions(&cells[*beam]).map(|(in_scan, weight)| {
+            let direction = way.turn * in_scan;
+            let counted = before.iter().any(|w| w.sees(&direction, cells, highest));
+            if counted { 0.0 } else { weight }
+        });
+        seen.sum()
+    };
+    let all = ways.0.iter().enumerate();
+    let all: Vec<(usize, usize)> = all
+        .flat_map(|(own, way)| way.beams.iter().map(move |beam| (own, *beam)))
+        .collect();
+    // Added up in order, so that the sum is the same on any number of threads.
+    let seen: Vec<f64> = all.par_iter().with_min_len(AT_ONCE).map(seen_by).collect();
+    let covered_sr = seen.iter().fold(0.0, |sum, seen| sum + seen);
+    let direct = ways.0.iter().filter(|way| way.facets.is_empty());
+    let direct = direct.flat_map(|way| &way.beams);
+    let direct_sr = direct.fold(0.0, |sum, beam| sum + cells[*beam].solid_angle());
     let seeing = || traced.iter().filter(|t| t.sees).filter_map(|t| exit(&t.chief));
     let elevations: Vec<f64> = seeing()
         .map(|v| libm::atan2(v.z, libm::hypot(v.x, v.y)).to_degrees())
@@ -221,16 +229,22 @@ fn near(ways: &Ways) -> f64 {
     // π·(3 − √5): each turn of the spiral falls between those before.
     const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
     let (sin_near, cos_near) = libm::sincos(NEAR_DEG.to_radians());
-    let is_near = |k: &usize| {
-        let z = 1.0 - (2 * k + 1) as f64 / LATTICE as f64;
-        let (sin, cos) = libm::sincos(GOLDEN_ANGLE * *k as f64);
-        let radius = (1.0 - z * z).sqrt();
-        let direction = Vector3::new(radius * cos, radius * sin, z);
+    static DIRECTIONS: LazyLock<Vec<Vector3<f64>>> = LazyLock::new(|| {
+        let direction = |k: usize| {
+            let z = 1.0 - (2 * k + 1) as f64 / LATTICE as f64;
+            let (sin, cos) = libm::sincos(GOLDEN_ANGLE * k as f64);
+            let radius = (1.0 - z * z).sqrt();
+            Vector3::new(radius * cos, radius * sin, z)
+        };
+        (0..LATTICE).map(direction).collect()
+    });
+    let is_near = |direction: &&Vector3<f64>| {
         ways.0
             .iter()
-            .any(|way| way.is_near(&direction, sin_near, cos_near))
+            .any(|way| way.is_near(direction, sin_near, cos_near))
     };
-    (0..LATTICE).filter(is_near).count() as f64 / LATTICE as f64
+    let directions = DIRECTIONS.par_iter().with_min_len(AT_ONCE);
+    directions.filter(is_near).count() as f64 / LATTICE as f64
 }
 
 /// Number of whole degrees between −limit and limit in which a value lies.

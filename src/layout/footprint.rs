@@ -39,35 +39,49 @@ pub struct Footprint {
     pub margin_beams: f64,
 }
 
-/// The footprints of all beams, in order of beam and bounce.
-pub(crate) fn footprints(sensor: &Sensor, structure: &Structure, traced: &[Traced]) -> Vec<Footprint> {
-    let edges: Vec<Vec<Edge>> = structure.facets.iter().map(|f| edges(&f.face)).collect();
-    let shape = sensor.shape();
-    let contour: [SubRay; OUTLINE] = std::array::from_fn(|k| {
-        let (sin, cos) = libm::sincos(std::f64::consts::TAU * k as f64 / OUTLINE as f64);
-        SubRay {
-            wide: cos,
-            narrow: sin,
-            weight: 0.0,
+/// What footprints are made of: the contour of a beam, and the edges of the facets.
+pub(crate) struct Outlines<'a> {
+    sensor: &'a Sensor,
+    structure: &'a Structure,
+    contour: [SubRay; OUTLINE],
+    edges: Vec<Vec<Edge>>,
+}
+
+impl<'a> Outlines<'a> {
+    pub(crate) fn new(sensor: &'a Sensor, structure: &'a Structure) -> Self {
+        Self {
+            sensor,
+            structure,
+            contour: std::array::from_fn(|k| {
+                let (sin, cos) = libm::sincos(std::f64::consts::TAU * k as f64 / OUTLINE as f64);
+                SubRay {
+                    wide: cos,
+                    narrow: sin,
+                    weight: 0.0,
+                }
+            }),
+            edges: structure.facets.iter().map(|f| edges(&f.face)).collect(),
         }
-    });
-    let chief = SubRay {
-        wide: 0.0,
-        narrow: 0.0,
-        weight: 1.0,
-    };
-    let mut footprints = Vec::new();
-    for t in traced {
-        let facets = t.chief.facets();
+    }
+
+    /// The footprints of a beam, in order of the bounces.
+    pub(crate) fn of(&self, traced: &Traced) -> Vec<Footprint> {
+        let facets = traced.chief.facets();
         if facets.is_empty() {
-            continue;
+            return Vec::new();
         }
-        let azimuth = beam::azimuth(t.beam);
-        let mut rays: [Ray; OUTLINE] = std::array::from_fn(|k| ray(shape, azimuth, &contour[k]));
+        let (beam, shape) = (traced.beam, self.sensor.shape());
+        let chief = SubRay {
+            wide: 0.0,
+            narrow: 0.0,
+            weight: 1.0,
+        };
+        let azimuth = beam::azimuth(beam);
+        let mut rays: [Ray; OUTLINE] = std::array::from_fn(|k| ray(shape, azimuth, &self.contour[k]));
         let mut center = ray(shape, azimuth, &chief);
         let mut neighbor = ray(shape, azimuth + beam::STEP, &chief);
-        for (bounce, &facet) in facets.iter().enumerate() {
-            let face = &structure.facets[facet].face;
+        let of_bounce = |(bounce, &facet): (usize, &usize)| {
+            let face = &self.structure.facets[facet].face;
             for ray in rays.iter_mut().chain([&mut center, &mut neighbor]) {
                 *ray = reflected(ray, face);
             }
@@ -78,13 +92,14 @@ pub(crate) fn footprints(sensor: &Sensor, structure: &Structure, traced: &[Trace
                 1e3 * each.fold(f64::INFINITY, f64::min)
             };
             let along = step.normalize();
-            let beside = edges[facet]
+            let edges = &self.edges[facet];
+            let beside = edges
                 .iter()
                 .filter(|e| e.inwards.dot(&along).abs() < std::f64::consts::FRAC_1_SQRT_2);
-            let margin_mm = edges[facet].iter().map(margin).fold(f64::INFINITY, f64::min);
+            let margin_mm = edges.iter().map(margin).fold(f64::INFINITY, f64::min);
             let spacing_mm = 1e3 * step.norm();
-            footprints.push(Footprint {
-                beam: t.beam,
+            Footprint {
+                beam,
                 facet,
                 bounce,
                 center: center.origin,
@@ -93,10 +108,10 @@ pub(crate) fn footprints(sensor: &Sensor, structure: &Structure, traced: &[Trace
                 across_mm: beside.map(margin).reduce(f64::min),
                 spacing_mm,
                 margin_beams: margin_mm / spacing_mm,
-            });
-        }
+            }
+        };
+        facets.iter().enumerate().map(of_bounce).collect()
     }
-    footprints
 }
 
 /// An edge of a polygon: the direction in the plane that points inwards, and its product with the edge's points.

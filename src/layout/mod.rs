@@ -40,6 +40,7 @@ mod footprint;
 mod require;
 mod sensitivity;
 mod size;
+mod ways;
 
 pub use accuracy::{Accuracy, FacetAccuracy, predict};
 pub use depth::{Depth, depth};
@@ -54,9 +55,9 @@ pub use require::{Requirement, RequirementError, Unmet, figures};
 pub(crate) use sensitivity::center;
 pub(crate) use size::plate_thickness;
 pub use size::{MIRROR_DENSITY, POST_DENSITY, Size};
+pub use ways::Layout;
 
 use catoptric_model::beam;
-use catoptric_sim::optics::{Mirrors, Setting};
 use catoptric_sim::reading::Sensor;
 use catoptric_sim::structure::Structure;
 use catoptric_sim::{Scene, SimError};
@@ -162,42 +163,36 @@ pub struct Run {
 /// # Errors
 /// [`SimError`] for a facet without a shape, an unknown color or a mesh that nobody has read.
 pub fn analyze(scene: &Scene, seed: Option<u64>, detail: Detail) -> Result<Analysis, SimError> {
-    let structure = match seed {
-        None => Structure::nominal(scene)?,
-        Some(seed) => Structure::as_built(scene, seed)?,
-    };
-    let scene_seen = match detail {
-        Detail::Full => scene.clone(),
-        Detail::Coarse => {
-            let mut scene = scene.clone();
-            scene.scanner.sub_rays = 1;
-            scene
-        }
-    };
-    let sensor = Sensor::new(&scene_seen)?;
-    let setting = Setting::new(&scene_seen, &structure, Mirrors::Attached, Vec::new())?;
-    let traced = element::trace(&sensor, &setting, scene);
-    let names = setting.names();
-    let ways = field::Ways::new(&structure, &traced);
+    Layout::new(scene, seed, detail)?.analysis()
+}
+
+/// What is said of a layout whose beams are known.
+fn analysis(layout: &Layout, names: &[&str], traced: &[&Traced], footprints: &[&Footprint]) -> Analysis {
+    let Layout {
+        scene,
+        structure,
+        sensor,
+        ..
+    } = layout;
+    let ways = field::Ways::new(structure, traced);
     let cells = field::cells(sensor.shape());
-    let footprints = footprint::footprints(&sensor, &structure, &traced);
-    let elements = element::elements(scene, &structure, &names, &traced, &footprints);
-    let field = field::field(&ways, &cells, &traced);
+    let elements = element::elements(scene, structure, names, traced, footprints);
+    let field = field::field(&ways, &cells, traced);
     let mut counts: BTreeMap<Class, usize> = Class::ALL.map(|class| (class, 0)).into();
     for element in &elements {
         *counts.entry(element.class).or_default() += 1;
     }
     let seeing = elements.iter().filter(|e| e.class.sees()).count();
     let runs = runs(&elements);
-    Ok(Analysis {
+    Analysis {
         schema_version: SCHEMA_VERSION,
         name: scene.name.clone(),
-        seed,
+        seed: layout.seed,
         sub_rays: sensor.sub_rays(),
         counts,
         seeing,
         lost: elements.len() - seeing,
-        stopped_by_facets: stopped_by_facets(&structure, &elements),
+        stopped_by_facets: stopped_by_facets(structure, &elements),
         largest_gap_deg: largest_gap(&elements),
         field_of_regard: field.covered_sr / SPHERE_SR,
         solid_angle_sr: field.covered_sr,
@@ -206,13 +201,13 @@ pub fn analyze(scene: &Scene, seed: Option<u64>, detail: Detail) -> Result<Analy
         elevation_deg: field.elevation_deg,
         elevation_covered_deg: field.elevation_covered_deg,
         azimuth_covered_deg: field.azimuth_covered_deg,
-        facets: facet::facets(&structure, &elements, &traced, &cells, &footprints),
-        spots: spots(&sensor),
-        size: size::size(scene, &structure),
+        facets: facet::facets(structure, &elements, traced, &cells, footprints),
+        spots: spots(sensor),
+        size: size::size(scene, structure),
         accuracy: None,
         runs,
         elements,
-    })
+    }
 }
 
 /// Solid angle of all directions.

@@ -3,7 +3,7 @@
 use super::goal::{Goal, requires_accuracy};
 use super::{Open, OptimizeError, Options};
 use crate::io::template::Template;
-use crate::layout::{self, Analysis};
+use crate::layout::{self, Analysis, Layout};
 use catoptric_sim::Scene;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -63,6 +63,8 @@ pub(super) struct Judge<'a> {
     parameters: &'a [Open],
     options: &'a Options,
     accuracy: bool,
+    /// The scene as it is, of which a candidate mostly is a part changed.
+    start: Layout,
 }
 
 impl<'a> Judge<'a> {
@@ -79,6 +81,7 @@ impl<'a> Judge<'a> {
             parameters,
             options,
             accuracy,
+            start: Layout::new(template.scene(), None, options.detail)?,
         };
         let analysis = judge.analyze(template.scene())?;
         let figures = layout::figures(&analysis);
@@ -179,7 +182,7 @@ impl<'a> Judge<'a> {
     }
 
     fn analyze(&self, scene: &Scene) -> Result<Analysis, catoptric_sim::SimError> {
-        let mut analysis = layout::analyze(scene, None, self.options.detail)?;
+        let mut analysis = self.start.edited(scene)?.analysis()?;
         if self.accuracy {
             analysis.accuracy = Some(layout::predict(scene, scene.seed));
         }

@@ -14,6 +14,7 @@ mod consistency;
 mod detection;
 mod determinism;
 mod docs;
+mod edits;
 mod energy;
 mod export;
 mod gates;

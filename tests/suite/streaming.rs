@@ -324,3 +324,38 @@ position_m = [0, 0.05, 1.76]
     });
     assert!(hits_intruder, "{ends:?}");
 }
+
+/// A room that is one mesh is all around the sensor: the compiled ways hold where nothing of it is near, and elsewhere all is
+/// traced as a whole.
+#[test]
+fn flights_within_a_mesh_are_those_without_the_compiled_rig() {
+    let mut scene = load(&file("flight-through-a-duct"), &[]).unwrap();
+    let mirrors = self::scene(TWO_MIRROR).superstructure.facet;
+    scene.superstructure.facet = mirrors;
+    scene.scanner.sub_rays = 7;
+    // From the axis to the wall.
+    let last = scene.flight[0].waypoint.last_mut().unwrap();
+    last.position_m = [3.6, 0.0, 1.45];
+    let laboratory = Laboratory::new(&scene, 3).unwrap();
+    let structure = Structure::as_built(&scene, 3).unwrap();
+    let bare = Setting::new(&scene, &structure, Mirrors::Attached, Vec::new()).unwrap();
+    let rig = laboratory.sensor().compile(&bare);
+    let sight = laboratory.sight(0).unwrap();
+    assert!(rig.holds_in(sight.setting()));
+    let ends = laboratory.scans_of(0) - 1;
+    let gone = sight.setting().seen_from(&Pose::translation(0.6, 0.0, 1.45));
+    assert!(!rig.holds_in(&gone));
+    for scan in [0, ends] {
+        let returns = sight.returns(scan);
+        for beam in (0..beam::COUNT).step_by(9) {
+            let ends = sight.sub_ray_ends(scan, beam);
+            // The chief ray is the first; its surface is the echo's unless another way is brighter.
+            let way: f64 = ends[0].path;
+            if let Some(found) = &returns[beam]
+                && found.share > 0.999
+            {
+                assert!((found.geometric - way).abs() < 1e-9, "scan {scan}, beam {beam}");
+            }
+        }
+    }
+}

@@ -51,11 +51,37 @@ pub fn yaw_pitch_roll(yaw: f64, pitch: f64, roll: f64) -> UnitQuaternion<f64> {
 /// `share` is 0 at `from` and 1 at `to`, and may lie beyond. Equal attitudes give exactly that attitude; of two that
 /// are half a turn apart, either arc may be taken.
 pub fn slerp(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>, share: f64) -> UnitQuaternion<f64> {
-    if from == to {
-        return *from;
+    Arc::new(from, to).at(share)
+}
+
+/// The way of [`slerp`] between two attitudes, for many shares of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Arc {
+    from: UnitQuaternion<f64>,
+    /// Axis and angle of the turn; none between equal attitudes.
+    turn: Option<(Option<Unit<Vector3<f64>>>, f64)>,
+}
+
+impl Arc {
+    /// The shorter arc from one attitude to another.
+    pub fn new(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>) -> Self {
+        let turn = || from.inverse() * to;
+        Self {
+            from: *from,
+            turn: (from != to).then(turn).map(|turn| (turn.axis(), turn.angle())),
+        }
     }
-    let turn = from.inverse() * to;
-    UnitQuaternion::new_normalize((from * turn.powf(share)).into_inner())
+
+    /// The attitude at a share of the way.
+    pub fn at(&self, share: f64) -> UnitQuaternion<f64> {
+        let Some((axis, angle)) = &self.turn else {
+            return self.from;
+        };
+        let turn = axis.map_or_else(UnitQuaternion::identity, |axis| {
+            UnitQuaternion::from_axis_angle(&axis, angle * share)
+        });
+        UnitQuaternion::new_normalize((self.from * turn).into_inner())
+    }
 }
 
 /// Two unit vectors `(across, up)` that span the plane perpendicular to a direction.

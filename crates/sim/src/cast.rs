@@ -201,6 +201,29 @@ impl Shape {
         }
     }
 
+    /// Two corners of a box that holds it.
+    pub(crate) fn corners_of_box(&self) -> (Point3<f64>, Point3<f64>) {
+        let bounds = self.bounds();
+        let corner = |v: Vector| Point3::new(v.x, v.y, v.z);
+        (corner(bounds.mins), corner(bounds.maxs))
+    }
+
+    /// Whether another is the very same shape in the same place. Meshes are, where they are one.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Polygon(a), Self::Polygon(b)) => a.corners == b.corners,
+            (Self::Block(a), Self::Block(b)) => {
+                a.sensor_from_block == b.sensor_from_block && a.cuboid == b.cuboid
+            }
+            (Self::Cylinder(a), Self::Cylinder(b)) => {
+                a.frame_from_cylinder == b.frame_from_cylinder
+                    && (a.radius, a.half_height) == (b.radius, b.half_height)
+            }
+            (Self::Mesh(a), Self::Mesh(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        }
+    }
+
     /// Whether a point is inside a closed body: what a ray from there meets first is a back.
     pub(crate) fn holds(&self, point: &Point3<f64>) -> bool {
         let ray = Ray {
@@ -233,6 +256,11 @@ impl World {
             nodes: build::over_boxes(&corners, reach),
             reach,
         }
+    }
+
+    /// The shapes, in the order in which hits name them.
+    pub(crate) fn shapes(&self) -> &[Shape] {
+        &self.shapes
     }
 
     /// The nearest surface along a ray, `left` (the mirror it just left) aside.

@@ -1,11 +1,16 @@
 //! The way of a ray: from the scanner over mirrors to whatever stops it.
 
 mod clearance;
+mod edit;
+mod placed;
 mod rig;
 mod setting;
+mod together;
 
+pub use edit::{Edit, Trail};
 pub use rig::Rig;
-pub(crate) use setting::Met;
+pub(crate) use rig::Then;
+pub(crate) use setting::Beyond;
 pub use setting::{Mirrors, Role, Setting, Target};
 
 use crate::cast::Hit;
@@ -13,7 +18,8 @@ use crate::footprint::Ray;
 use crate::glass::{self, Passage};
 use catoptric_model::{Pose, mirror};
 use nalgebra::{Point3, Vector3};
-use setting::{Leg, placed};
+use placed::placed;
+use setting::Leg;
 
 /// Most mirrors a ray can meet; `max_bounces` may be less.
 pub const MAX_BOUNCES: usize = 8;
@@ -136,27 +142,10 @@ impl Setting<'_> {
     }
 
     fn path(&self, ray: &Ray, ghost: Option<usize>) -> Path {
-        let mut facets = [0; MAX_BOUNCES];
-        let mut points = [Point3::origin(); MAX_BOUNCES];
-        let mut meetings = [None; MAX_BOUNCES];
-        let mut count = 0;
-        let course = self.follow(ray, self.contents.max_bounces, ghost, |bounce| {
-            facets[count] = bounce.facet;
-            points[count] = bounce.point;
-            meetings[count] = Some(bounce.meeting);
-            count += 1;
-        });
-        Path {
-            count,
-            facets,
-            points,
-            meetings,
-            silvered: course.silvered,
-            gain: course.gain,
-            length: course.length,
-            last: course.last,
-            end: course.end,
-        }
+        let mut path = Path::begin(ray);
+        let course = self.follow(ray, self.contents.max_bounces, ghost, |bounce| path.add(bounce));
+        path.end(&course);
+        path
     }
 
     /// Follows a ray over at most `limit` mirrors and tells of every bounce; at bounce number `ghost` the light is
@@ -168,49 +157,56 @@ impl Setting<'_> {
         ghost: Option<usize>,
         mut tell: impl FnMut(&Bounce),
     ) -> Course {
-        let mut course = Course {
-            count: 0,
-            length: 0.0,
-            silvered: 0,
-            gain: 1.0,
-            last: *ray,
-            end: End::Escaped,
-        };
+        let mut course = Course::begin(ray);
         let mut left = None;
         while let Some(leg) = self.cast(&course.last, left) {
-            let Some((facet, back)) = self.reflecting(&leg.hit) else {
-                course.length += leg.hit.distance;
-                course.end = End::Hit(leg.in_sensor_frame());
-                break;
-            };
-            if course.count == limit {
-                course.end = End::Trapped;
+            left = self.step(&mut course, &leg, limit, ghost, &mut tell);
+            if left.is_none() {
                 break;
             }
-            let Some(bounce) = self.bounce(&course, &leg, facet, back, ghost == Some(course.count)) else {
-                course.end = End::Trapped;
-                break;
-            };
-            tell(&bounce);
-            let meeting = bounce.meeting;
-            let glass = self.contents.facets[facet].glass.filter(|g| g.ghost);
-            if ghost == Some(course.count) {
-                // No glass in the way turns nothing back.
-                course.gain *= bounce.passage.map_or(0.0, |p| p.fresnel);
-            } else {
-                course.silvered += 1;
-                if let (Some(_), Some(passage)) = (glass, &bounce.passage) {
-                    // In and out through the front.
-                    let through = 1.0 - passage.fresnel;
-                    course.gain *= through * through;
-                }
-            }
-            course.count += 1;
-            course.length = bounce.length_after;
-            course.last = bounce.after;
-            left = Some(meeting.surface);
         }
         course
+    }
+
+    /// Takes a course to the end of a leg, and over the mirror there; the surface that it leaves if it goes on.
+    fn step(
+        &self,
+        course: &mut Course,
+        leg: &Leg<'_>,
+        limit: usize,
+        ghost: Option<usize>,
+        tell: &mut impl FnMut(&Bounce),
+    ) -> Option<usize> {
+        let Some((facet, back)) = self.reflecting(&leg.hit) else {
+            course.length += leg.hit.distance;
+            course.end = End::Hit(leg.in_sensor_frame());
+            return None;
+        };
+        if course.count == limit {
+            course.end = End::Trapped;
+            return None;
+        }
+        let Some(bounce) = self.bounce(course, leg, facet, back, ghost == Some(course.count)) else {
+            course.end = End::Trapped;
+            return None;
+        };
+        tell(&bounce);
+        let glass = self.contents.facets[facet].glass.filter(|g| g.ghost);
+        if ghost == Some(course.count) {
+            // No glass in the way turns nothing back.
+            course.gain *= bounce.passage.map_or(0.0, |p| p.fresnel);
+        } else {
+            course.silvered += 1;
+            if let (Some(_), Some(passage)) = (glass, &bounce.passage) {
+                // In and out through the front.
+                let through = 1.0 - passage.fresnel;
+                course.gain *= through * through;
+            }
+        }
+        course.count += 1;
+        course.length = bounce.length_after;
+        course.last = bounce.after;
+        Some(bounce.meeting.surface)
     }
 
     /// A reflection; `None` if the light comes to the rim of the glass.

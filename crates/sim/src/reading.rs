@@ -15,8 +15,8 @@ use crate::color;
 use crate::detect;
 use crate::echo::Receiver;
 use crate::error::SimError;
-use crate::footprint::{self, SubRay};
-use crate::optics::{End, MAX_BOUNCES, Path, Rig, Role, Setting};
+use crate::footprint::{self, Ray, SubRay};
+use crate::optics::{End, MAX_BOUNCES, Path, Rig, Role, Setting, Then};
 use crate::power::{self, Illumination};
 use crate::scene::{BeamShape, Detection, EchoChoice, ErrorModel, Errors, Light, Limits, Principle, Scene};
 use crate::truth::BeamClass;
@@ -183,20 +183,31 @@ impl Sensor {
         setting: &'a Setting<'_>,
         beam: usize,
     ) -> impl Iterator<Item = (&'a SubRay, Path)> {
+        let rays: Vec<Ray> = self.rays(beam).collect();
+        self.sub_rays.iter().zip(setting.trace_beam(&rays))
+    }
+
+    /// A beam's sub-rays as they leave the scanner, in the order in which they are cast.
+    pub fn rays(&self, beam: usize) -> impl Iterator<Item = Ray> {
         let azimuth = beam::azimuth(beam);
         self.sub_rays
             .iter()
-            .map(move |s| (s, setting.trace(&footprint::ray(&self.shape, azimuth, s))))
+            .map(move |s| footprint::ray(&self.shape, azimuth, s))
     }
 
-    /// The way of a beam's chief ray.
-    pub fn chief_path(&self, setting: &Setting<'_>, beam: usize) -> Path {
+    /// A beam's chief ray as it leaves the scanner.
+    pub fn chief_ray(&self, beam: usize) -> Ray {
         let chief = SubRay {
             wide: 0.0,
             narrow: 0.0,
             weight: 1.0,
         };
-        setting.trace(&footprint::ray(&self.shape, beam::azimuth(beam), &chief))
+        footprint::ray(&self.shape, beam::azimuth(beam), &chief)
+    }
+
+    /// The way of a beam's chief ray.
+    pub fn chief_path(&self, setting: &Setting<'_>, beam: usize) -> Path {
+        setting.trace(&self.chief_ray(beam))
     }
 
     /// What the structure does to a beam, and the share of its energy that goes the chief ray's way.
@@ -210,14 +221,7 @@ impl Sensor {
 
     /// The structure's part in the ways of all sub-rays, for [`Sensor::observe_over`]; `bare` holds nothing else.
     pub fn compile(&self, bare: &Setting<'_>) -> Rig {
-        let beams = 0..beam::COUNT;
-        let rays = beams.flat_map(|beam| {
-            let azimuth = beam::azimuth(beam);
-            self.sub_rays
-                .iter()
-                .map(move |s| footprint::ray(&self.shape, azimuth, s))
-        });
-        Rig::compile(bare, self.sub_rays.len(), rays)
+        Rig::compile(bare, beam::COUNT, |beam| self.rays(beam))
     }
 
     /// What a beam brings home; `None` if no echo reaches the threshold.
@@ -337,9 +341,10 @@ impl Sensor {
     /// The surfaces that a beam's light reaches, each with its pulses.
     fn illuminate(&self, setting: &Setting<'_>, beam: usize, parts: &mut Parts) {
         parts.begin();
-        let azimuth = beam::azimuth(beam);
-        for sub_ray in &self.sub_rays {
-            self.illuminate_by(setting, azimuth, sub_ray, parts);
+        let rays: Vec<Ray> = self.rays(beam).collect();
+        let paths = setting.trace_beam(&rays);
+        for ((sub_ray, ray), path) in self.sub_rays.iter().zip(&rays).zip(&paths) {
+            self.illuminate_along(setting, sub_ray, ray, path, parts);
         }
         if self.lacks_chief() {
             Self::add_chief(parts, &self.chief_path(setting, beam));
@@ -347,65 +352,63 @@ impl Sensor {
         parts.end();
     }
 
-    /// What one sub-ray's light reaches.
-    fn illuminate_by(&self, setting: &Setting<'_>, azimuth: f64, sub_ray: &SubRay, parts: &mut Parts) {
-        let ray = footprint::ray(&self.shape, azimuth, sub_ray);
-        let path = setting.trace(&ray);
+    /// What one sub-ray's light reaches on its way.
+    fn illuminate_along(
+        &self,
+        setting: &Setting<'_>,
+        sub_ray: &SubRay,
+        ray: &Ray,
+        path: &Path,
+        parts: &mut Parts,
+    ) {
         let chief = is_chief(sub_ray);
-        if let Some(arrival) = self.at_end(setting, sub_ray, &path) {
-            self.add(parts, &path, &arrival, chief);
+        if let Some(arrival) = self.at_end(setting, sub_ray, path) {
+            self.add(parts, path, &arrival, chief);
         }
-        for ghost in setting.ghosts(&ray, &path) {
+        for ghost in setting.ghosts(ray, path) {
             if let Some(arrival) = self.at_end(setting, sub_ray, &ghost) {
                 self.add(parts, &ghost, &arrival, false);
             }
         }
         for arrival in self.on_mirrors(setting, sub_ray, path.meetings()) {
-            self.add(parts, &path, &arrival, chief);
+            self.add(parts, path, &arrival, chief);
         }
     }
 
     /// [`Sensor::illuminate`] from where the sub-rays depart from the structure.
     fn illuminate_over(&self, rig: &Rig, setting: &Setting<'_>, beam: usize, parts: &mut Parts) {
         parts.begin();
-        let departures = rig.departures(beam);
-        let (mut legs, mut met) = (std::mem::take(&mut parts.legs), std::mem::take(&mut parts.met));
-        legs.clear();
-        let leaving = departures.iter().filter(|d| matches!(d.end, End::Escaped));
-        legs.extend(leaving.map(|d| d.last));
-        setting.cast_into_room(&mut legs, &mut met);
-        let mut in_room = met.iter();
-        for (sub_ray, departure) in self.sub_rays.iter().zip(departures) {
-            let beyond = match departure.end {
-                End::Escaped => in_room.next().copied().flatten(),
-                End::Hit(hit) => Some((hit, hit.normal)),
-                End::Trapped => None,
+        let ways = rig.ways(beam);
+        let mut beyond = std::mem::take(&mut parts.beyond);
+        let mut in_room = setting.cast_into_room(ways.leaving(), &mut beyond);
+        for (sub_ray, departure) in self.sub_rays.iter().zip(ways.departures()) {
+            let end = match departure.then {
+                Then::Leaves => match in_room.next().flatten() {
+                    // A mirror of the room: its light may come back to the structure.
+                    Some(met) if met.reflects => {
+                        let ray = footprint::ray(&self.shape, beam::azimuth(beam), sub_ray);
+                        self.illuminate_along(setting, sub_ray, &ray, &setting.trace(&ray), parts);
+                        continue;
+                    }
+                    met => met.map(|met| (met.surface, met.cos_incidence, departure.length + met.distance)),
+                },
+                Then::EndsOn(surface, cos_incidence) => Some((surface, cos_incidence, departure.length)),
+                Then::Trapped => None,
             };
-            // A mirror of the room: its light may come back to the structure.
-            if matches!(departure.end, End::Escaped)
-                && beyond.is_some_and(|(hit, _)| setting.is_reflected(&hit))
-            {
-                self.illuminate_by(setting, beam::azimuth(beam), sub_ray, parts);
-                continue;
-            }
-            let (facets, meetings) = (rig.facets(departure), rig.meetings(departure));
+            let (facets, meetings) = (ways.facets(departure), ways.meetings(departure));
             let cosines = meetings.iter().map(|m| m.cos_incidence);
             let chief = is_chief(sub_ray);
-            if let Some((hit, normal)) = beyond {
-                let length = match departure.end {
-                    End::Escaped => departure.length + hit.distance,
-                    _ => departure.length,
-                };
+            if let Some((surface, cos_incidence, length)) = end {
                 let on = Illumination {
-                    reflectivity: setting.paint(hit.surface).reflectivity,
-                    cos_incidence: normal.dot(&departure.last.direction).abs(),
+                    reflectivity: setting.paint(surface).reflectivity,
+                    cos_incidence,
                     share: sub_ray.weight,
                     range: length,
                     mirrors: self.mirrors[departure.silvered] * departure.gain,
                 };
-                let place = (length, on.cos_incidence);
+                let place = (length, cos_incidence);
                 let (power, share) = (power::received(&self.light, &on), on.share * departure.gain);
-                parts.add((hit.surface, facets), power, share, place, cosines.clone(), chief);
+                parts.add((surface, facets), power, share, place, cosines.clone(), chief);
             }
             for arrival in self.on_mirrors(setting, sub_ray, meetings.iter().copied()) {
                 let on = &arrival.on;
@@ -416,7 +419,8 @@ impl Sensor {
                 parts.add((arrival.surface, facets), power, share, place, cosines, chief);
             }
         }
-        (parts.legs, parts.met) = (legs, met);
+        drop(in_room);
+        parts.beyond = beyond;
         if self.lacks_chief() {
             Self::add_chief(parts, &self.chief_path(setting, beam));
         }
@@ -470,9 +474,12 @@ impl Sensor {
                 edge.compensated(self.receiver.sd, self.receiver.threshold)
             }
         };
-        // A surface too dim to be seen without the others stands for its own range.
-        let alone = detect::leading_edge(&part.pulses, self.receiver.sd, self.receiver.threshold)
-            .map_or(geometric, |edge| read(&edge));
+        let alone = match parts {
+            [_] => read(&edge),
+            // A surface too dim to be seen without the others stands for its own range.
+            _ => detect::leading_edge(&part.pulses, self.receiver.sd, self.receiver.threshold)
+                .map_or(geometric, |edge| read(&edge)),
+        };
         let detection = if physical { alone - geometric } else { 0.0 };
         Some((part, read(&edge) - alone, detection))
     }

@@ -69,7 +69,7 @@ pub struct Structure {
 }
 
 /// Slope of a facet's surface about its plane: the gradient of a cubic height field over the facet.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 struct Slope {
     center: Point3<f64>,
     /// Axes of the facet's plane, over the facet's half extent.
@@ -174,6 +174,11 @@ impl BuiltFacet {
             },
             face,
         })
+    }
+
+    /// Whether light that meets one of them where the other is goes on alike.
+    pub(crate) fn reflects_like(&self, other: &Self) -> bool {
+        self.slope == other.slope && self.glass == other.glass && self.face.corners == other.face.corners
     }
 
     /// Normal of the reflecting surface at one of its points.

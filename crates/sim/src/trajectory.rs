@@ -14,7 +14,7 @@
 
 use crate::scene::{Attitude, Flight, Waypoint};
 use catoptric_model::Pose;
-use catoptric_model::frame::{slerp, yaw_pitch_roll};
+use catoptric_model::frame::{Arc, slerp, yaw_pitch_roll};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 /// A way through waypoints.
@@ -25,9 +25,10 @@ pub struct Trajectory {
     times: Vec<f64>,
     positions: Vec<Vector3<f64>>,
     velocities: Vec<Vector3<f64>>,
-    attitudes: Vec<UnitQuaternion<f64>>,
-    /// Squad's aᵢ and bᵢ₊₁ for every interval; none for slerp.
-    controls: Vec<[UnitQuaternion<f64>; 2]>,
+    /// From each attitude to the next.
+    chords: Vec<Arc>,
+    /// From squad's aᵢ to bᵢ₊₁ for every interval; none for slerp.
+    controls: Vec<Arc>,
 }
 
 impl Trajectory {
@@ -66,7 +67,7 @@ impl Trajectory {
             velocities: velocities(&times, &positions),
             times,
             positions,
-            attitudes,
+            chords: attitudes.windows(2).map(|q| Arc::new(&q[0], &q[1])).collect(),
             controls,
         })
     }
@@ -105,10 +106,10 @@ impl Trajectory {
     }
 
     fn attitude(&self, i: usize, u: f64) -> UnitQuaternion<f64> {
-        let chord = slerp(&self.attitudes[i], &self.attitudes[i + 1], u);
+        let chord = self.chords[i].at(u);
         match self.controls.get(i) {
             None => chord,
-            Some([a, b]) => slerp(&chord, &slerp(a, b, u), 2.0 * u * (1.0 - u)),
+            Some(control) => slerp(&chord, &control.at(u), 2.0 * u * (1.0 - u)),
         }
     }
 }
@@ -159,8 +160,8 @@ fn velocities(times: &[f64], positions: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     slopes(&intervals, &chords)
 }
 
-/// Squad's aᵢ and bᵢ₊₁ for every interval.
-fn controls(times: &[f64], attitudes: &[UnitQuaternion<f64>]) -> Vec<[UnitQuaternion<f64>; 2]> {
+/// From squad's aᵢ to bᵢ₊₁ for every interval.
+fn controls(times: &[f64], attitudes: &[UnitQuaternion<f64>]) -> Vec<Arc> {
     let intervals = intervals(times);
     let turns: Vec<Vector3<f64>> = attitudes
         .windows(2)
@@ -174,10 +175,10 @@ fn controls(times: &[f64], attitudes: &[UnitQuaternion<f64>]) -> Vec<[UnitQuater
         .zip(&turns)
         .enumerate()
         .map(|(i, (h, turn))| {
-            [
-                beside(&attitudes[i], (rates[i] * *h - turn) * 0.5),
-                beside(&attitudes[i + 1], (turn - rates[i + 1] * *h) * 0.5),
-            ]
+            Arc::new(
+                &beside(&attitudes[i], (rates[i] * *h - turn) * 0.5),
+                &beside(&attitudes[i + 1], (turn - rates[i + 1] * *h) * 0.5),
+            )
         })
         .collect()
 }

@@ -60,9 +60,14 @@ impl Triangles {
         &self.vertices
     }
 
+    /// Its triangles one by one, in metres.
+    pub(crate) fn each(&self) -> impl Iterator<Item = [Point3<f64>; 3]> {
+        (0..self.triangles.len()).map(|t| self.corners(t))
+    }
+
     /// All of its triangles, in metres.
     pub(super) fn skin(&self) -> Vec<[Point3<f64>; 3]> {
-        (0..self.triangles.len()).map(|t| self.corners(t)).collect()
+        self.each().collect()
     }
 
     pub(super) fn judge<'a>(&'a self, rays: &'a [Ray]) -> Judge<'a> {

@@ -3,7 +3,10 @@
 //! Light on its way from mirror to mirror of the structure stays within a ball around the sensor. Nothing of the room
 //! that is farther away than that can be in its way.
 
+mod grid;
+
 use crate::cast::{Polygon, Shape};
+use grid::Grid;
 use nalgebra::{Point3, Vector3};
 
 /// What a shape of the room keeps clear of.
@@ -13,6 +16,8 @@ pub(super) enum Extent {
     Outline(Vec<(Vector3<f64>, f64)>),
     /// A box around anything else.
     Box(Point3<f64>, Point3<f64>),
+    /// A mesh that the sensor flies past or within.
+    Mesh(Grid),
 }
 
 /// How much a box is larger than what it was made from, as a part of its diagonal: a cylinder is drawn with flat faces.
@@ -22,9 +27,13 @@ const MARGIN: f64 = 0.01;
 const SLACK: f64 = 1e-6;
 
 impl Extent {
-    /// The extent of a shape.
-    pub(super) fn of(shape: &Shape) -> Self {
+    /// The extent of a shape; of a mesh more closely for a sensor that flies.
+    pub(super) fn of(shape: &Shape, flies: bool) -> Self {
         match shape {
+            Shape::Mesh(mesh) if flies => {
+                let (low, high) = shape.corners_of_box();
+                Self::Mesh(Grid::of(mesh.each(), (&low, &high)))
+            }
             Shape::Polygon(polygon) => Self::Outline(outline(polygon)),
             Shape::Mesh(mesh) => around(mesh.vertices().iter().copied()),
             _ => around(shape.triangles().into_iter().flatten()),
@@ -33,20 +42,19 @@ impl Extent {
 
     /// Whether all of it is farther than a distance from a point, in metres; if in doubt it is not.
     pub(super) fn is_beyond(&self, point: &Point3<f64>, distance: f64) -> bool {
-        let bound = match self {
-            Self::Outline(sides) => {
-                let mut sides = sides
-                    .iter()
-                    .map(|(normal, offset)| offset - normal.dot(&point.coords));
-                let plane = sides.next().map_or(0.0, f64::abs);
-                sides.fold(plane, f64::max)
-            }
+        let distance = distance + SLACK;
+        match self {
+            Self::Outline(sides) => sides.iter().enumerate().any(|(i, (normal, offset))| {
+                let beyond = offset - normal.dot(&point.coords);
+                // Of the plane either side, of an edge what is outside.
+                beyond > distance || (i == 0 && -beyond > distance)
+            }),
             Self::Box(low, high) => {
                 let out = (low - point).sup(&(point - high)).sup(&Vector3::zeros());
-                out.norm()
+                out.norm() > distance
             }
-        };
-        bound > distance + SLACK
+            Self::Mesh(grid) => grid.is_beyond(point, distance),
+        }
     }
 }
 
@@ -85,14 +93,20 @@ mod tests {
     fn bounds_are_below_the_distance_and_not_far_below() {
         let square = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
         let corners = square.map(|(x, y)| Point3::new(x, y, 2.0)).to_vec();
-        let polygon = Extent::of(&Shape::Polygon(Polygon::new(corners).expect("it has an area")));
+        let polygon = Extent::of(
+            &Shape::Polygon(Polygon::new(corners).expect("it has an area")),
+            false,
+        );
         let origin = Point3::origin();
         assert!(polygon.is_beyond(&origin, 1.99) && !polygon.is_beyond(&origin, 2.0));
         // Beside it, in its plane.
         let beside = Point3::new(4.0, 0.0, 2.0);
         assert!(polygon.is_beyond(&beside, 2.99) && !polygon.is_beyond(&beside, 3.0));
         let size = Vector3::new(1.0, 1.0, 1.0);
-        let block = Extent::of(&Shape::Block(Block::new(Pose::translation(3.0, 0.0, 0.0), size)));
+        let block = Extent::of(
+            &Shape::Block(Block::new(Pose::translation(3.0, 0.0, 0.0), size)),
+            false,
+        );
         assert!(block.is_beyond(&origin, 2.45) && !block.is_beyond(&origin, 2.5));
         assert!(!block.is_beyond(&Point3::new(3.1, 0.2, 0.0), 0.0));
     }

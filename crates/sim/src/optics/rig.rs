@@ -3,22 +3,32 @@
 //! Scanner and structure are rigid: what a sub-ray does until it leaves the structure for good, or ends on it, is the same
 //! wherever the sensor is and whatever is around it, as long as nothing of the room comes within the structure itself.
 
-use super::{Course, End, Meeting, Setting};
-use crate::cast::Hit;
+use super::{End, Meeting, Setting};
 use crate::footprint::Ray;
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// The ways of every sub-ray of every beam over the structure.
 #[derive(Debug, Clone)]
 pub struct Rig {
-    departures: Vec<Departure>,
-    sub_rays: usize,
-    /// Mirrors met and what was brought to them, of all ways one after the other.
-    facets: Vec<usize>,
-    meetings: Vec<Meeting>,
+    beams: Vec<Ways>,
     /// No way leaves the ball of this radius around the sensor before it departs, in metres.
     reach: f64,
     /// Whether a mirror on any way has a glass that makes ghosts.
+    ghosts: bool,
+}
+
+/// The ways of a beam's sub-rays over the structure, in the order in which they are cast.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Ways {
+    departures: Vec<Departure>,
+    /// The last legs of those that leave.
+    leaving: Vec<Ray>,
+    /// Mirrors met and what was brought to them, of all ways one after the other.
+    facets: Vec<usize>,
+    meetings: Vec<Meeting>,
+    /// As for all beams together.
+    reach: f64,
     ghosts: bool,
 }
 
@@ -31,65 +41,113 @@ pub(crate) struct Departure {
     pub(crate) gain: f64,
     /// Length of the way, in metres: to its end on the structure, or to where the last leg begins.
     pub(crate) length: f64,
-    /// The last leg.
-    pub(crate) last: Ray,
-    /// Whether and where it ends on the structure.
-    pub(crate) end: End,
+    /// What comes then.
+    pub(crate) then: Then,
     first: usize,
     count: usize,
 }
 
+/// What a sub-ray does when it is done with the mirrors of the structure.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Then {
+    /// It leaves, by the next of [`Ways::leaving`].
+    Leaves,
+    /// It ends on a surface of the structure, under an incidence of this cosine.
+    EndsOn(usize, f64),
+    /// It is trapped.
+    Trapped,
+}
+
 impl Rig {
-    /// Follows rays over the structure of a setting that holds nothing else; beam after beam with as many sub-rays each.
-    pub(crate) fn compile(bare: &Setting<'_>, sub_rays: usize, rays: impl Iterator<Item = Ray>) -> Self {
-        let mut rig = Self {
-            departures: Vec::new(),
-            sub_rays,
-            facets: Vec::new(),
-            meetings: Vec::new(),
-            reach: 0.0,
-            ghosts: false,
-        };
-        for ray in rays {
-            rig.add(bare, &ray);
+    /// Follows the rays of every beam over the structure of a setting that holds nothing else.
+    pub(crate) fn compile<R: Iterator<Item = Ray>>(
+        bare: &Setting<'_>,
+        beams: usize,
+        rays: impl Fn(usize) -> R + Sync,
+    ) -> Self {
+        let beams: Vec<Ways> = (0..beams)
+            .into_par_iter()
+            .map(|beam| Ways::compile(bare, rays(beam)))
+            .collect();
+        Self {
+            reach: beams.iter().map(|ways| ways.reach).fold(0.0, f64::max),
+            ghosts: beams.iter().any(|ways| ways.ghosts),
+            beams,
         }
-        rig
     }
 
-    fn add(&mut self, bare: &Setting<'_>, ray: &Ray) {
-        let first = self.facets.len();
-        let mut reach = ray.origin.coords.norm();
-        let course: Course = bare.follow(ray, bare.contents.max_bounces, None, |bounce| {
-            self.facets.push(bounce.facet);
-            self.meetings.push(bounce.meeting);
+    /// The ways of a beam.
+    pub(crate) fn ways(&self, beam: usize) -> &Ways {
+        &self.beams[beam]
+    }
+
+    /// Whether these ways are those of a setting: nothing of its room comes near enough, and there are no ghosts, whose
+    /// ways are others.
+    pub fn holds_in(&self, setting: &Setting<'_>) -> bool {
+        !self.ghosts && setting.is_clear(self.reach)
+    }
+}
+
+impl Ways {
+    fn compile(bare: &Setting<'_>, rays: impl Iterator<Item = Ray>) -> Self {
+        let rays: Vec<Ray> = rays.collect();
+        let mut ways = Self::default();
+        let mut bounces: Vec<(usize, usize, Meeting)> = Vec::new();
+        let starts = rays.iter().map(|ray| ray.origin.coords.norm());
+        let mut reach = starts.fold(0.0, f64::max);
+        let courses = bare.follow_beam(&rays, bare.contents.max_bounces, |ray, bounce| {
+            bounces.push((ray, bounce.facet, bounce.meeting));
             let places = [bounce.point, bounce.after.origin];
             reach = places.iter().map(|p| p.coords.norm()).fold(reach, f64::max);
         });
-        if let End::Hit(Hit { point, .. }) = course.end {
-            reach = reach.max(point.coords.norm());
-        }
-        // Light that is trapped has met one more mirror, somewhere on the structure: all of that counts.
-        if matches!(course.end, End::Trapped) {
-            reach = reach.max(bare.contents.span);
-        }
-        self.reach = self.reach.max(reach);
+        // Those of one ray after the other, each in order.
+        bounces.sort_by_key(|(ray, ..)| *ray);
         let facets = &bare.contents.facets;
-        let makes_ghost = |f: &usize| facets[*f].glass.is_some_and(|g| g.ghost);
-        self.ghosts |= self.facets[first..].iter().any(makes_ghost);
-        self.departures.push(Departure {
-            silvered: course.silvered,
-            gain: course.gain,
-            length: course.length,
-            last: course.last,
-            end: course.end,
-            first,
-            count: course.count,
-        });
+        ways.ghosts = bounces
+            .iter()
+            .any(|(_, f, _)| facets[*f].glass.is_some_and(|g| g.ghost));
+        ways.facets = bounces.iter().map(|(_, facet, _)| *facet).collect();
+        ways.meetings = bounces.iter().map(|(.., meeting)| *meeting).collect();
+        ways.departures.reserve_exact(courses.len());
+        let mut first = 0;
+        for course in &courses {
+            let then = match course.end {
+                End::Escaped => {
+                    ways.leaving.push(course.last);
+                    Then::Leaves
+                }
+                End::Hit(hit) => {
+                    reach = reach.max(hit.point.coords.norm());
+                    Then::EndsOn(hit.surface, hit.normal.dot(&course.last.direction).abs())
+                }
+                // It has met one more mirror, somewhere on the structure: all of that counts.
+                End::Trapped => {
+                    reach = reach.max(bare.contents.span);
+                    Then::Trapped
+                }
+            };
+            ways.departures.push(Departure {
+                silvered: course.silvered,
+                gain: course.gain,
+                length: course.length,
+                then,
+                first,
+                count: course.count,
+            });
+            first += course.count;
+        }
+        ways.reach = reach;
+        ways
     }
 
-    /// How the sub-rays of a beam are done with the structure, in the order in which they are cast.
-    pub(crate) fn departures(&self, beam: usize) -> &[Departure] {
-        &self.departures[beam * self.sub_rays..(beam + 1) * self.sub_rays]
+    /// How the sub-rays are done with the structure.
+    pub(crate) fn departures(&self) -> &[Departure] {
+        &self.departures
+    }
+
+    /// The last legs of those that leave.
+    pub(crate) fn leaving(&self) -> &[Ray] {
+        &self.leaving
     }
 
     /// The mirrors that a sub-ray met.
@@ -100,12 +158,6 @@ impl Rig {
     /// What it brought to them.
     pub(crate) fn meetings(&self, departure: &Departure) -> &[Meeting] {
         &self.meetings[departure.range()]
-    }
-
-    /// Whether these ways are those of a setting: nothing of its room comes near enough, and there are no ghosts, whose
-    /// ways are others.
-    pub fn holds_in(&self, setting: &Setting<'_>) -> bool {
-        !self.ghosts && setting.is_clear(self.reach)
     }
 }
 

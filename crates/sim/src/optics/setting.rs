@@ -6,6 +6,7 @@
 
 use super::MAX_BOUNCES;
 use super::clearance::Extent;
+use super::placed::{place_all, placed};
 use crate::cast::{Hit, Shape, World};
 use crate::color::{self, Paint};
 use crate::error::SimError;
@@ -116,8 +117,22 @@ pub enum Mirrors {
     Removed,
 }
 
-/// What a leg beyond the structure meets, and the normal there in the sensor frame.
-pub(crate) type Met = Option<(Hit, Unit<Vector3<f64>>)>;
+/// What a leg beyond the structure meets.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Met {
+    pub(crate) surface: usize,
+    pub(crate) distance: f64,
+    pub(crate) cos_incidence: f64,
+    /// Whether it reflects.
+    pub(crate) reflects: bool,
+}
+
+/// Room for the legs of a beam in the frame of the room, and for what they meet.
+#[derive(Debug, Default)]
+pub(crate) struct Beyond {
+    rays: Vec<Ray>,
+    hits: Vec<Option<Hit>>,
+}
 
 /// A painted surface in the sensor frame: a board or a wall.
 pub struct Target {
@@ -204,7 +219,7 @@ impl<'a> Setting<'a> {
             // Cylinders are drawn with flat faces.
             span: 1.01 * corners.map(|c| c.coords.norm()).fold(0.0, f64::max),
             world: World::new(list.shapes),
-            extents: room.iter().map(Extent::of).collect(),
+            extents: room.iter().map(|shape| Extent::of(shape, flies)).collect(),
             room: (!room.is_empty()).then(|| World::new(room)),
             surfaces: list.surfaces,
             first_of_room,
@@ -240,33 +255,43 @@ impl<'a> Setting<'a> {
             .all(|e| e.is_beyond(&sensor, distance))
     }
 
-    /// The nearest surface of the room alone along every ray of a beam, given in the sensor frame, and the normal there in
-    /// that frame. The rays are left in the frame that the room is kept in.
-    pub(crate) fn cast_into_room(&self, rays: &mut [Ray], hits: &mut Vec<Met>) {
-        hits.clear();
-        let Some(room) = &self.contents.room else {
-            hits.resize(rays.len(), None);
-            return;
-        };
+    /// The nearest surface of the room alone along every ray of a beam, given in the sensor frame.
+    pub(crate) fn cast_into_room<'b>(
+        &'b self,
+        rays: &'b [Ray],
+        beyond: &'b mut Beyond,
+    ) -> impl Iterator<Item = Option<Met>> + 'b {
+        beyond.hits.clear();
+        beyond.hits.resize(rays.len(), None);
         let moved = self.start_from_sensor.as_ref();
-        if let Some(pose) = moved {
-            for ray in &mut *rays {
-                *ray = placed(ray, pose);
-            }
+        if let Some(room) = &self.contents.room {
+            let in_room = match moved {
+                None => rays,
+                Some(pose) => {
+                    place_all(rays, pose, &mut beyond.rays);
+                    &beyond.rays
+                }
+            };
+            room.cast_beam(in_room, None, &mut beyond.hits);
         }
-        let mut found = vec![None; rays.len()];
-        room.cast_beam(rays, None, &mut found);
-        hits.extend(found.into_iter().map(|hit: Option<Hit>| {
-            let mut hit = hit?;
+        // Rays of a beam mostly meet one plane: its normal is turned once.
+        let mut turned: Option<[Unit<Vector3<f64>>; 2]> = None;
+        rays.iter().zip(&beyond.hits).map(move |(ray, hit)| {
+            let mut hit = (*hit)?;
             hit.surface += self.contents.first_of_room;
-            let normal = moved.map_or(hit.normal, |pose| pose.inverse_transform_unit_vector(&hit.normal));
-            Some((hit, normal))
-        }));
-    }
-
-    /// Whether a hit is on something that reflects.
-    pub(crate) fn is_reflected(&self, hit: &Hit) -> bool {
-        self.reflecting(hit).is_some()
+            let normal = match (moved, turned) {
+                (None, _) => hit.normal,
+                (Some(_), Some([kept, seen])) if kept == hit.normal => seen,
+                (Some(pose), _) => pose.inverse_transform_unit_vector(&hit.normal),
+            };
+            turned = Some([hit.normal, normal]);
+            Some(Met {
+                surface: hit.surface,
+                distance: hit.distance,
+                cos_incidence: normal.dot(&ray.direction).abs(),
+                reflects: self.reflecting(&hit).is_some(),
+            })
+        })
     }
 
     /// What a surface is.
@@ -302,14 +327,41 @@ impl<'a> Setting<'a> {
         }
     }
 
+    /// The structure, if there is nothing else.
+    pub(super) fn structure_alone(&self) -> Option<&World> {
+        self.contents.room.is_none().then_some(&self.contents.world)
+    }
+
+    /// Whether a surface is of the same kind in another setting, on the same side of the same facet.
+    pub(super) fn is_same_kind(&self, other: &Setting<'_>, surface: usize) -> bool {
+        let (a, b) = (
+            &self.contents.surfaces[surface],
+            &other.contents.surfaces[surface],
+        );
+        a.role == b.role && a.side == b.side
+    }
+
+    /// Whether the mirror that a surface is part of, if it is, turns light alike in another setting.
+    pub(super) fn reflects_alike(&self, other: &Setting<'_>, surface: usize) -> bool {
+        match self.contents.surfaces[surface].role {
+            Role::Facet(facet) => self.contents.facets[facet].reflects_like(&other.contents.facets[facet]),
+            _ => true,
+        }
+    }
+
+    /// A leg that ends where the sensor frame is that of the surface.
+    pub(super) fn unmoved(&self, hit: Hit, incoming: Unit<Vector3<f64>>) -> Leg<'_> {
+        Leg {
+            hit,
+            incoming,
+            kept_from_sensor: None,
+        }
+    }
+
     /// The nearest surface along a ray of the sensor frame, `left` (the one it just left) aside.
     pub(super) fn cast(&self, ray: &Ray, left: Option<usize>) -> Option<Leg<'_>> {
         let contents = &*self.contents;
-        let unmoved = |hit| Leg {
-            hit,
-            incoming: ray.direction,
-            kept_from_sensor: None,
-        };
+        let unmoved = |hit| self.unmoved(hit, ray.direction);
         let Some(room) = &contents.room else {
             return contents.world.cast(ray, left).map(unmoved);
         };
@@ -318,16 +370,57 @@ impl<'a> Setting<'a> {
         let moved = self.start_from_sensor.as_ref();
         let ray_in_room = moved.map_or(*ray, |pose| placed(ray, pose));
         let past = room.cast(&ray_in_room, left.and_then(|l| l.checked_sub(first)));
+        self.nearer((own, ray), (past, &ray_in_room))
+    }
+
+    /// The same along every ray of a beam.
+    pub(super) fn cast_beam<'s>(
+        &'s self,
+        rays: &[Ray],
+        left: Option<usize>,
+        legs: &mut Vec<Option<Leg<'s>>>,
+    ) {
+        legs.clear();
+        let contents = &*self.contents;
+        let first = contents.first_of_room;
+        let mut own = vec![None; rays.len()];
+        contents
+            .world
+            .cast_beam(rays, left.filter(|l| *l < first), &mut own);
+        let Some(room) = &contents.room else {
+            let each = own.into_iter().zip(rays);
+            legs.extend(each.map(|(hit, ray)| Some(self.unmoved(hit?, ray.direction))));
+            return;
+        };
+        let mut in_room = Vec::new();
+        match &self.start_from_sensor {
+            None => in_room.extend_from_slice(rays),
+            Some(pose) => place_all(rays, pose, &mut in_room),
+        }
+        let mut past = vec![None; rays.len()];
+        room.cast_beam(&in_room, left.and_then(|l| l.checked_sub(first)), &mut past);
+        let pairs = own.into_iter().zip(rays).zip(past.into_iter().zip(&in_room));
+        legs.extend(pairs.map(|(own, past)| self.nearer(own, past)));
+    }
+
+    /// The nearer of what a ray meets of the structure and, in the frame of the room, of that.
+    fn nearer(
+        &self,
+        (own, ray): (Option<Hit>, &Ray),
+        (past, in_room): (Option<Hit>, &Ray),
+    ) -> Option<Leg<'_>> {
         match (own, past) {
-            (Some(own), Some(past)) if own.distance <= past.distance => Some(unmoved(own)),
-            (own, None) => own.map(unmoved),
+            (Some(own), Some(past)) if own.distance <= past.distance => {
+                Some(self.unmoved(own, ray.direction))
+            }
+            (own, None) => Some(self.unmoved(own?, ray.direction)),
             (_, Some(past)) => Some(Leg {
                 hit: Hit {
-                    surface: past.surface + first,
+                    surface: past.surface + self.contents.first_of_room,
                     ..past
                 },
-                incoming: ray_in_room.direction,
-                kept_from_sensor: moved,
+                incoming: in_room.direction,
+                kept_from_sensor: self.start_from_sensor.as_ref(),
             }),
         }
     }
@@ -341,14 +434,6 @@ impl Leg<'_> {
             normal: pose.inverse_transform_unit_vector(&self.hit.normal),
             ..self.hit
         })
-    }
-}
-
-/// A ray moved into another frame.
-pub(super) fn placed(ray: &Ray, other_from_ray: &Pose) -> Ray {
-    Ray {
-        origin: other_from_ray * ray.origin,
-        direction: other_from_ray * ray.direction,
     }
 }
 

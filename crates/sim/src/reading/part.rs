@@ -1,8 +1,8 @@
 //! The light of a beam by the surfaces that it reaches and the ways it goes there.
 
 use crate::detect::Pulse;
-use crate::footprint::Ray;
-use crate::optics::{MAX_BOUNCES, Met};
+use crate::optics::{Beyond, MAX_BOUNCES};
+use std::borrow::Cow;
 
 /// The sub-rays that went one way to one surface.
 #[derive(Debug, Default)]
@@ -33,9 +33,7 @@ pub(super) struct Place {
 pub struct Parts {
     live: Vec<Part>,
     spare: Vec<Part>,
-    /// The legs that leave the structure, and what they meet.
-    pub(super) legs: Vec<Ray>,
-    pub(super) met: Vec<Met>,
+    pub(super) beyond: Beyond,
 }
 
 impl Place {
@@ -61,10 +59,10 @@ impl Place {
         }
     }
 
-    fn divide(&mut self, by: f64) {
+    fn divide(&mut self, by: f64, facets: usize) {
         self.range /= by;
         self.cos_incidence /= by;
-        for cos in &mut self.facets {
+        for cos in &mut self.facets[..facets] {
             *cos /= by;
         }
     }
@@ -82,7 +80,7 @@ impl Part {
     }
 
     fn went(&self, surface: usize, facets: &[usize]) -> bool {
-        self.surface == surface && self.facets() == facets
+        self.surface == surface && self.facets().iter().eq(facets)
     }
 
     /// Begins anew with nothing in it.
@@ -143,12 +141,15 @@ impl Parts {
     /// Ends a beam: sums become means.
     pub(super) fn end(&mut self) {
         for part in self.live.iter_mut().filter(|p| p.power > 0.0) {
-            part.mean.divide(part.power);
+            part.mean.divide(part.power, part.count);
         }
     }
 
     /// All pulses, part by part.
-    pub(super) fn pulses(parts: &[Part]) -> Vec<Pulse> {
-        parts.iter().flat_map(|p| p.pulses.iter().copied()).collect()
+    pub(super) fn pulses(parts: &[Part]) -> Cow<'_, [Pulse]> {
+        match parts {
+            [only] => Cow::Borrowed(&only.pulses),
+            _ => parts.iter().flat_map(|p| p.pulses.iter().copied()).collect(),
+        }
     }
 }
