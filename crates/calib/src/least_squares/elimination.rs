@@ -8,7 +8,7 @@
 //! Columns are first brought to length 1, so one threshold tells dependence in any units. A damped problem, with rows
 //! √μ·D below, starts from the triangles and not from J: its cost does not depend on the number of residuals.
 
-use super::qr::PivotedQr;
+use super::qr::{PivotedQr, dot};
 use nalgebra::{DMatrix, DVector};
 
 /// Rows of one group: own columns, shared columns, right side.
@@ -276,11 +276,21 @@ impl Triangle {
         rows
     }
 
+    /// The columns of the square part of R, which are those of as many independent parameters.
+    fn columns(&self) -> impl DoubleEndedIterator<Item = &[f64]> + ExactSizeIterator {
+        // A rank of 0 has no columns, yet chunks must not be empty.
+        self.r.as_slice().chunks_exact(self.rank.max(1)).take(self.rank)
+    }
+
     fn back_substitute(&self, right: &DVector<f64>) -> DVector<f64> {
         let mut x = right.clone();
-        for i in (0..self.rank).rev() {
-            let sum: f64 = (i + 1..self.rank).map(|j| self.r[(i, j)] * x[j]).sum();
-            x[i] = (x[i] - sum) / self.r[(i, i)];
+        let x_of = x.as_mut_slice();
+        for (i, column) in self.columns().enumerate().rev() {
+            x_of[i] /= column[i];
+            let known = x_of[i];
+            for (x, r) in x_of[..i].iter_mut().zip(column) {
+                *x -= known * r;
+            }
         }
         x
     }
@@ -295,9 +305,9 @@ impl Triangle {
 
     fn solve_transposed(&self, g: &DVector<f64>) -> DVector<f64> {
         let mut z = DVector::zeros(self.rank);
-        for i in 0..self.rank {
-            let sum: f64 = (0..i).map(|j| self.r[(j, i)] * z[j]).sum();
-            z[i] = (g[self.order[i]] - sum) / self.r[(i, i)];
+        let z_of = z.as_mut_slice();
+        for (i, column) in self.columns().enumerate() {
+            z_of[i] = (g[self.order[i]] - dot(&column[..i], &z_of[..i])) / column[i];
         }
         z
     }
