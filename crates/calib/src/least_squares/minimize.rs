@@ -136,39 +136,6 @@ pub fn minimize<P: GroupedProblem>(
     })
 }
 
-/// A problem linearized at a state.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Linearized {
-    /// The step to the linear problem's minimum: Gauss and Newton's.
-    pub step: DVector<f64>,
-    /// ‖f + J·step‖².
-    pub least_sum_of_squares: f64,
-    /// JᵀJ at the state.
-    pub information: Information,
-}
-
-/// Linearizes at a state, without moving.
-///
-/// # Errors
-///
-/// As [`minimize`], of the state.
-pub fn linearize<P: GroupedProblem>(problem: &P, state: &State) -> Result<Linearized, ProblemError> {
-    let residuals = evaluate(problem, state).map_err(|group| ProblemError::Undefined {
-        group,
-        place: "point reached",
-    })?;
-    let rows = rows(problem, state, &residuals)?;
-    let linear = Elimination::new(rows, state.shared.dimension(), Options::default().rank_threshold);
-    let step = linear.solve();
-    // Perpendicular to what the step explains.
-    let least_sum_of_squares = (norm(&residuals).powi(2) - linear.image_norm(&step).powi(2)).max(0.0);
-    Ok(Linearized {
-        step,
-        least_sum_of_squares,
-        information: Information::new(linear),
-    })
-}
-
 struct Search<'a, P> {
     problem: &'a P,
     state: State,
@@ -312,7 +279,7 @@ impl Slope {
     }
 }
 
-fn norm(residuals: &[DVector<f64>]) -> f64 {
+pub(super) fn norm(residuals: &[DVector<f64>]) -> f64 {
     residuals.iter().map(|r| r.norm_squared()).sum::<f64>().sqrt()
 }
 
@@ -334,37 +301,10 @@ fn rows<P: GroupedProblem>(
     state: &State,
     residuals: &[DVector<f64>],
 ) -> Result<Vec<Rows>, ProblemError> {
-    let shared_columns = state.shared.dimension();
-    let mut all = Vec::with_capacity(residuals.len());
-    for (group, f) in residuals.iter().enumerate() {
+    let of_group = |(group, f): (usize, &DVector<f64>)| {
         let own = state.own(group);
-        let part = problem
-            .jacobian(group, &state.shared, own)
-            .filter(|j| j.shared.iter().chain(j.own.iter()).all(|v| v.is_finite()))
-            .ok_or(ProblemError::Undefined {
-                group,
-                place: "point reached",
-            })?;
-        for (parameters, matrix, columns) in [
-            ("shared", &part.shared, shared_columns),
-            ("own", &part.own, own.dimension()),
-        ] {
-            if matrix.shape() != (f.len(), columns) {
-                return Err(ProblemError::Shape {
-                    group,
-                    parameters,
-                    rows: f.len(),
-                    columns,
-                    found_rows: matrix.nrows(),
-                    found_columns: matrix.ncols(),
-                });
-            }
-        }
-        all.push(Rows {
-            own: part.own,
-            shared: part.shared,
-            right: -f,
-        });
-    }
-    Ok(all)
+        let jacobian = problem.jacobian(group, &state.shared, own);
+        Rows::of_group(group, f, jacobian, [state.shared.dimension(), own.dimension()])
+    };
+    residuals.iter().enumerate().map(of_group).collect()
 }

@@ -27,6 +27,18 @@ pub struct GroupJacobian {
     pub own: DMatrix<f64>,
 }
 
+/// One group of residuals linearized.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupRows {
+    /// f, m numbers.
+    pub residuals: DVector<f64>,
+    /// Its derivatives.
+    pub jacobian: GroupJacobian,
+    /// ln det of the covariance that the residuals were divided by the root of, 0 for one that is never compared with
+    /// another.
+    pub log_covariance: f64,
+}
+
 /// Residuals in groups, each depending on the shared parameters and on the group's own.
 ///
 /// Every [`Problem`] is one: a single group that owns nothing.
@@ -37,6 +49,14 @@ pub trait GroupedProblem {
     fn residuals(&self, group: usize, shared: &Point, own: &Point) -> Option<DVector<f64>>;
     /// Derivatives of one group; see [`Problem::jacobian`].
     fn jacobian(&self, group: usize, shared: &Point, own: &Point) -> Option<GroupJacobian>;
+    /// Both at a point.
+    fn linearized(&self, group: usize, shared: &Point, own: &Point) -> Option<GroupRows> {
+        Some(GroupRows {
+            residuals: self.residuals(group, shared, own)?,
+            jacobian: self.jacobian(group, shared, own)?,
+            log_covariance: 0.0,
+        })
+    }
     /// How many rows of a group, counted from its first, are measurements that a robust loss may doubt.
     ///
     /// The others (priors, by convention the last) always keep their full weight.
