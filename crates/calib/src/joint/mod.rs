@@ -68,7 +68,17 @@ pub(crate) fn calibrate(
     planes: &[MirrorPlane],
     assigned: Vec<Assigned>,
 ) -> Result<Outcome, ProblemError> {
-    let components = components(work.dataset.session.facets.len(), &assigned);
+    // Within the pool: groups are handed out over and over, and from outside each time would wake it.
+    rayon::scope(|_| within_pool(work, mount, planes, &assigned))
+}
+
+fn within_pool(
+    work: &Workspace,
+    mount: &Mount,
+    planes: &[MirrorPlane],
+    assigned: &[Assigned],
+) -> Result<Outcome, ProblemError> {
+    let components = components(work.dataset.session.facets.len(), assigned);
     if work.method == Method::Facet {
         let mut outcome = Outcome::default();
         for facets in components {

@@ -11,6 +11,7 @@
 use super::problem::{GroupJacobian, ProblemError};
 use super::qr::{PivotedQr, dot};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// Rows of one group: own columns, shared columns, right side.
 #[derive(Debug, Clone)]
@@ -142,22 +143,12 @@ impl Elimination {
     }
 
     fn scaled(rows: Vec<Rows>, scale: DVector<f64>, shared_width: usize, threshold: f64) -> Self {
-        let mut groups = Vec::with_capacity(rows.len());
-        let mut rest = Vec::with_capacity(rows.len());
-        for group in rows {
-            let (height, columns) = (group.own.nrows(), group.own.ncols());
-            let mut carried = group.shared.resize_horizontally(shared_width + 1, 0.0);
-            carried.set_column(shared_width, &group.right);
-            let (own, carried) = Triangle::of(group.own, carried, threshold);
-            debug_assert_eq!(own.width(), columns);
-            let (rank, left) = (own.rank, height - own.rank);
-            groups.push(Eliminated {
-                coupling: carried.view((0, 0), (rank, shared_width)).into_owned(),
-                right: carried.view((0, shared_width), (rank, 1)).column(0).into_owned(),
-                own,
-            });
-            rest.push(carried.rows(rank, left).into_owned());
-        }
+        let eliminate = |group: Rows| Eliminated::of(group, shared_width, threshold);
+        let (groups, rest): (Vec<_>, Vec<_>) = if rows.len() < 2 {
+            rows.into_iter().map(eliminate).unzip()
+        } else {
+            rows.into_par_iter().with_max_len(1).map(eliminate).unzip()
+        };
         let height = rest.iter().map(DMatrix::nrows).sum();
         let mut all = DMatrix::zeros(height, shared_width + 1);
         let mut row = 0;
@@ -321,6 +312,23 @@ impl Elimination {
             all.extend_from_slice(group.own.solve(&right(group, x)).as_slice());
         }
         DVector::from_vec(all)
+    }
+}
+
+impl Eliminated {
+    /// The group without its own parameters, and the rows that are left of it: shared columns, right side.
+    fn of(group: Rows, shared_width: usize, threshold: f64) -> (Self, DMatrix<f64>) {
+        let height = group.own.nrows();
+        let mut carried = group.shared.resize_horizontally(shared_width + 1, 0.0);
+        carried.set_column(shared_width, &group.right);
+        let (own, carried) = Triangle::of(group.own, carried, threshold);
+        let rank = own.rank;
+        let eliminated = Self {
+            coupling: carried.view((0, 0), (rank, shared_width)).into_owned(),
+            right: carried.view((0, shared_width), (rank, 1)).column(0).into_owned(),
+            own,
+        };
+        (eliminated, carried.rows(rank, height - rank).into_owned())
     }
 }
 

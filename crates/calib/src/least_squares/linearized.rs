@@ -2,7 +2,7 @@
 
 use super::elimination::{Elimination, Rows};
 use super::information::Information;
-use super::minimize::Options;
+use super::minimize::{Options, of_groups};
 use super::problem::{GroupedProblem, ProblemError, State};
 use nalgebra::DVector;
 
@@ -51,29 +51,24 @@ impl Reduced {
         threshold: f64,
     ) -> Result<Self, ProblemError> {
         let width = state.shared.dimension();
-        let (mut sum_of_squares, mut log_covariance) = (0.0, 0.0);
-        let mut all = Vec::with_capacity(problem.groups());
-        for group in 0..problem.groups() {
+        let all = of_groups(problem.groups(), |group| {
             let own = state.own(group);
-            let linear = problem
+            let at = problem
                 .linearized(group, &state.shared, own)
                 .filter(|l| l.residuals.norm_squared().is_finite())
                 .ok_or(ProblemError::Undefined {
                     group,
                     place: "point reached",
                 })?;
-            sum_of_squares += linear.residuals.norm_squared();
-            log_covariance += linear.log_covariance;
             let columns = [width, own.dimension()];
-            all.push(Rows::of_group(
-                group,
-                &linear.residuals,
-                Some(linear.jacobian),
-                columns,
-            )?);
-        }
+            let rows = Rows::of_group(group, &at.residuals, Some(at.jacobian), columns)?;
+            Ok((rows, at.residuals.norm_squared(), at.log_covariance))
+        })?;
+        let sum_of_squares = all.iter().map(|(_, squares, _)| squares).sum();
+        let log_covariance = all.iter().map(|(.., log)| log).sum();
+        let rows = all.into_iter().map(|(rows, ..)| rows).collect();
         Ok(Self {
-            linear: Elimination::new(all, width, threshold),
+            linear: Elimination::new(rows, width, threshold),
             sum_of_squares,
             log_covariance,
         })

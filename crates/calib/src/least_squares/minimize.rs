@@ -9,6 +9,7 @@ use super::information::Information;
 use super::problem::{GroupedProblem, ProblemError, State};
 use super::trust_region;
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 /// Columns shorter than this part of their length are left out of a step.
 const STEP_THRESHOLD: f64 = 1e-14;
@@ -283,16 +284,26 @@ pub(super) fn norm(residuals: &[DVector<f64>]) -> f64 {
     residuals.iter().map(|r| r.norm_squared()).sum::<f64>().sqrt()
 }
 
+/// Something of each group, side by side; of several errors that of the first group.
+pub(super) fn of_groups<T: Send, E: Send>(
+    groups: usize,
+    one: impl Fn(usize) -> Result<T, E> + Send + Sync,
+) -> Result<Vec<T>, E> {
+    if groups < 2 {
+        return (0..groups).map(one).collect();
+    }
+    let all: Vec<Result<T, E>> = (0..groups).into_par_iter().with_max_len(1).map(one).collect();
+    all.into_iter().collect()
+}
+
 /// Residuals of all groups, or the group where they are undefined or not finite.
 fn evaluate<P: GroupedProblem>(problem: &P, state: &State) -> Result<Vec<DVector<f64>>, usize> {
-    (0..problem.groups())
-        .map(|group| {
-            problem
-                .residuals(group, &state.shared, state.own(group))
-                .filter(|r| r.norm_squared().is_finite())
-                .ok_or(group)
-        })
-        .collect()
+    of_groups(problem.groups(), |group| {
+        problem
+            .residuals(group, &state.shared, state.own(group))
+            .filter(|r| r.norm_squared().is_finite())
+            .ok_or(group)
+    })
 }
 
 /// Rows of all groups, with −f on the right.
@@ -301,10 +312,10 @@ fn rows<P: GroupedProblem>(
     state: &State,
     residuals: &[DVector<f64>],
 ) -> Result<Vec<Rows>, ProblemError> {
-    let of_group = |(group, f): (usize, &DVector<f64>)| {
+    of_groups(residuals.len(), |group| {
         let own = state.own(group);
         let jacobian = problem.jacobian(group, &state.shared, own);
-        Rows::of_group(group, f, jacobian, [state.shared.dimension(), own.dimension()])
-    };
-    residuals.iter().enumerate().map(of_group).collect()
+        let columns = [state.shared.dimension(), own.dimension()];
+        Rows::of_group(group, &residuals[group], jacobian, columns)
+    })
 }

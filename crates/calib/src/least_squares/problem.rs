@@ -11,7 +11,7 @@ use thiserror::Error;
 ///
 /// Residuals are best given in units of their standard deviations: then covariances need no further factor. A residual
 /// function that is undefined at a point (a ray that misses its board) returns `None`; the solver then tries nearer.
-pub trait Problem {
+pub trait Problem: Sync {
     /// f(x), m numbers; the same m at every point.
     fn residuals(&self, at: &Point) -> Option<DVector<f64>>;
     /// ∂f(x ⊞ δ)/∂δ at δ = 0, m × n, with n the dimension of the point's tangent space.
@@ -41,8 +41,8 @@ pub struct GroupRows {
 
 /// Residuals in groups, each depending on the shared parameters and on the group's own.
 ///
-/// Every [`Problem`] is one: a single group that owns nothing.
-pub trait GroupedProblem {
+/// Every [`Problem`] is one: a single group that owns nothing. Groups are worked at side by side, in any order.
+pub trait GroupedProblem: Sync {
     /// Number of groups.
     fn groups(&self) -> usize;
     /// Residuals of one group; see [`Problem::residuals`].
