@@ -4,8 +4,8 @@ use super::problem::{BOARD_ERRORS, Element, FACET_PARAMETERS, FIGURE_ORDERS, Fan
 use crate::covariance::PlaneFit;
 use crate::jacobian;
 use crate::least_squares::{GroupJacobian, Point};
-use catoptric_model::bias::ColorBias;
-use catoptric_model::{BoardPlane, RangeBias, frame};
+use catoptric_model::bias::ColoredBias;
+use catoptric_model::{BoardPlane, frame};
 use nalgebra::{DVector, Dyn, Matrix2, Matrix3, OMatrix, Point3, U2, U6, Unit, Vector2, Vector3};
 
 /// Step of (range, cosine) over which a bias is differentiated: tables are linear over centimeters and degrees.
@@ -34,8 +34,7 @@ pub(super) struct Placed<'j> {
 
 /// The believed biases on one color.
 pub(super) struct Paint<'j> {
-    bias: &'j RangeBias,
-    color: Option<&'j ColorBias>,
+    bias: ColoredBias<'j>,
     /// Where the color stands among the common errors.
     place: Option<usize>,
 }
@@ -81,23 +80,17 @@ pub(super) struct Weight<'l> {
 impl<'j> Paint<'j> {
     pub(super) fn of(joint: &'j Joint, color: &str) -> Self {
         Self {
-            bias: joint.bias,
-            color: joint.bias.color.get(color),
+            bias: joint.bias.on(color),
             place: joint.common.place(color),
         }
     }
 
     /// Derivatives of the biased range with respect to the range and to the cosine of the incidence.
     fn slopes(&self, range: f64, cos: f64) -> (f64, f64) {
-        let slope = self.total(range + BIAS_STEP, cos) - self.total(range - BIAS_STEP, cos);
+        let at = |range: f64, cos: f64| self.bias.terms(range, cos).total();
+        let slope = (at(range + BIAS_STEP, cos) - at(range - BIAS_STEP, cos)) / (2.0 * BIAS_STEP);
         let (low, high) = ((cos - BIAS_STEP).max(0.0), (cos + BIAS_STEP).min(1.0));
-        let bend = self.bias.angle.error(high) - self.bias.angle.error(low);
-        (1.0 + slope / (2.0 * BIAS_STEP), bend / (high - low))
-    }
-
-    fn total(&self, range: f64, cos: f64) -> f64 {
-        let color = self.color.map_or(0.0, |c| c.error(range));
-        self.bias.distance.error(range) + self.bias.angle.error(cos) + color
+        (1.0 + slope, (at(range, high) - at(range, low)) / (high - low))
     }
 }
 
@@ -189,7 +182,7 @@ impl Joint<'_> {
                 }
                 line.common = self.common.entries(range, cos, paint.place);
                 let common: f64 = line.common.iter().map(|(i, c)| c * w[*i]).sum();
-                let predicted = range + paint.total(range, cos) + common + drift;
+                let predicted = range + paint.bias.terms(range, cos).total() + common + drift;
                 let lever = line.lever() / sight.sd;
                 for (column, axis) in axes.iter().enumerate() {
                     h[(row, column)] = lever * plane.normal.dot(axis);
