@@ -1,12 +1,15 @@
-//! How long each stage of the main job takes: compiling a rig, looking at a layout, tracing, detecting, drawing, writing, calibrating.
+//! How long each stage of the main job takes: compiling a rig, looking at a layout, tracing, detecting, drawing, writing, fitting
+//! an element, calibrating.
 //!
 //! Compare two versions with criterion's `--save-baseline` and `--baseline`; absolute times depend on the machine.
 #![allow(missing_docs, clippy::unwrap_used)]
 
+use catoptric::calib::observations::{BoardView, Observation};
+use catoptric::calib::solve::{self, BareDistance, Element};
 use catoptric::calib::{self, Method, Options};
 use catoptric::io::RecordingWriter;
 use catoptric::layout::{Detail, Layout, analyze};
-use catoptric::model::beam;
+use catoptric::model::{BoardPlane, Deflection, RawRange, beam, range};
 use catoptric::sim::detect::{self, Pulse};
 use catoptric::sim::noise::{Columns, Purpose};
 use catoptric::sim::optics::{Mirrors, Setting};
@@ -15,6 +18,7 @@ use catoptric::sim::scene::{FacetShape, PolygonShape};
 use catoptric::sim::structure::Structure;
 use catoptric::sim::{Laboratory, Scene};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use nalgebra::{Unit, Vector3};
 use std::hint::black_box;
 use std::path::Path;
 
@@ -187,7 +191,70 @@ fn calibrate(c: &mut Criterion) {
     group.finish();
 }
 
+/// Two angles by the paper's method, from a start 0.05 rad away, with the believed biases.
+fn fit(c: &mut Criterion) {
+    let bias = Laboratory::new(&prototype(), 1)
+        .unwrap()
+        .session()
+        .unwrap()
+        .believed
+        .bias;
+    let truth = Deflection {
+        azimuth: 0.1,
+        elevation: 0.7,
+        distance: 0.06,
+    };
+    let v = truth.exit_direction(0.3).into_inner();
+    let boards: Vec<Observation> = (0..10).map(|i| board(&truth, &v, i)).collect();
+    let element = Element {
+        azimuth: 0.3,
+        observations: &boards,
+        distance: BareDistance {
+            distance: truth.distance,
+            thickness: 0.0,
+        },
+        bias: &bias,
+    };
+    let start = Deflection {
+        azimuth: 0.15,
+        elevation: 0.65,
+        ..truth
+    };
+    let options = Options {
+        step_tolerance_rad: 1e-9,
+        ..Options::default()
+    };
+    let mut group = c.benchmark_group("fit");
+    group.throughput(Throughput::Elements(1));
+    group.bench_function("ten boards, elements", |b| {
+        b.iter(|| solve::batch(black_box(&element), black_box(&start), &options).unwrap())
+    });
+    group.finish();
+}
+
+/// The i-th of ten boards around a ray, 0.5 m to 4 m away and tilted by up to 30°, read some millimetres too near or far.
+fn board(truth: &Deflection, v: &Vector3<f64>, i: u8) -> Observation<'static> {
+    let turn = f64::from(i) * 2.4;
+    let tilt = Vector3::new(turn.cos(), turn.sin(), (0.7 * turn).cos()) * 0.35;
+    let origin = truth.deflection_point(0.3);
+    let plane = BoardPlane::new(
+        origin + v * (0.5 + 0.35 * f64::from(i)),
+        Unit::new_normalize(tilt - v),
+    );
+    let off = 0.005 * (1.7 * turn).sin();
+    Observation {
+        board: BoardView {
+            plane,
+            markers: &[],
+            color: "white",
+            noise_sd: 5e-3,
+            count: 100,
+        },
+        mean: RawRange(range::predict(truth, 0.3, &plane).unwrap() + off),
+    }
+}
+
 criterion_group!(
-    stages, compile, layout, simulate, fly, detection, noise, write, calibrate
+    stages, compile, layout, simulate, fly, detection, noise, write, fit, calibrate
 );
 criterion_main!(stages);

@@ -194,9 +194,15 @@ pub fn read_session(dataset: &Path) -> Result<Session, IoError> {
 pub fn read_stretches(dataset: &Path) -> Result<(Session, Vec<Stretch>), IoError> {
     let hashes = read_hashes(dataset)?;
     let session = parse_session(dataset, &read_checked(dataset, SESSION, hashes.as_ref())?)?;
-    let recording = read_checked(dataset, OBSERVATIONS, hashes.as_ref())?;
-    let stretches = parse_recording(&recording, &dataset.join(OBSERVATIONS), &session)?;
-    Ok((session, stretches))
+    let path = dataset.join(OBSERVATIONS);
+    let recording = fs::read(&path).map_err(|e| IoError::read(&path, e))?;
+    // What was changed is not worth an error of its own: the one about the change comes first.
+    let (known, stretches) = rayon::join(
+        || check(dataset, OBSERVATIONS, &recording, hashes.as_ref()),
+        || parse_recording(&recording, &path, &session),
+    );
+    known?;
+    Ok((session, stretches?))
 }
 
 /// Reads a dataset and checks that its parts fit together. The truth is not looked at.
@@ -246,12 +252,23 @@ fn read_checked(
 ) -> Result<Vec<u8>, IoError> {
     let path = dataset.join(name);
     let bytes = fs::read(&path).map_err(|e| IoError::read(&path, e))?;
+    check(dataset, name, &bytes, hashes)?;
+    Ok(bytes)
+}
+
+/// Whether the bytes of a file are those that the manifest knows.
+fn check(
+    dataset: &Path,
+    name: &str,
+    bytes: &[u8],
+    hashes: Option<&BTreeMap<String, String>>,
+) -> Result<(), IoError> {
     match hashes {
-        Some(hashes) if hashes.get(name) != Some(&sha256(&bytes)) => Err(IoError::Changed {
-            path,
+        Some(hashes) if hashes.get(name) != Some(&sha256(bytes)) => Err(IoError::Changed {
+            path: dataset.join(name),
             manifest: dataset.join(MANIFEST),
         }),
-        _ => Ok(bytes),
+        _ => Ok(()),
     }
 }
 

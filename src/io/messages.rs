@@ -246,8 +246,7 @@ fn read_point(cdr: &mut CdrReader<'_>) -> Result<Point3<f64>, MessageError> {
 }
 
 fn read_singles(cdr: &mut CdrReader<'_>) -> Result<Vec<f64>, CdrError> {
-    let length = cdr.length(size_of::<f32>())?;
-    (0..length).map(|_| cdr.f32().map(f64::from)).collect()
+    Ok(cdr.f32_sequence()?.map(f64::from).collect())
 }
 
 /// Reads the time and the echoes of every beam of a `MultiEchoLaserScan`.

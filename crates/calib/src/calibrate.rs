@@ -16,6 +16,7 @@ use catoptric_model::{
     BeamEstimate, Calibration, Dataset, Deflection, MirrorPlane, Status, Summary, beam, calibration, mirror,
 };
 use nalgebra::{Unit, Vector3};
+use rayon::prelude::*;
 use std::borrow::Cow;
 
 /// Solved elements from which a facet's plane as built is taken.
@@ -45,7 +46,8 @@ pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result
     let prepared = prepare(dataset)?;
     let (mount, drawn) = (&prepared.mount, &prepared.drawn);
     let screen = Screen::new(dataset, &prepared.summaries, mount, &prepared.boards);
-    let candidates: Vec<Candidate> = (0..session.scanner.beams).map(|b| screen.classify(b)).collect();
+    let beams = (0..session.scanner.beams).into_par_iter();
+    let candidates: Vec<Candidate> = beams.map(|b| screen.classify(b)).collect();
     let work = prepared.workspace(dataset, method, options);
     // The drawing decides which boards an element can hit only until its neighbors tell how the facet was built.
     let by_batch = Workspace {
@@ -175,7 +177,7 @@ fn assigned(
             poses,
         })
     };
-    candidates.iter().zip(alone).filter_map(of_one).collect()
+    candidates.par_iter().zip(alone).filter_map(of_one).collect()
 }
 
 /// Replaces what elements found by themselves with what they find together.
@@ -360,5 +362,5 @@ fn estimates(work: &Workspace, candidates: &[Candidate], mirrors: &[MirrorPlane]
             }
         }
     };
-    candidates.iter().enumerate().map(of_one).collect()
+    candidates.par_iter().enumerate().map(of_one).collect()
 }

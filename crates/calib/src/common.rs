@@ -39,19 +39,31 @@ impl<'a> CommonErrors<'a> {
     ///
     /// A_a is uncertain with A_a + B_a, the error at normal incidence, held: its column is cos θ_N − 1.
     pub fn row(&self, range: f64, cos_incidence: f64, color: &str) -> RowDVector<f64> {
-        let beliefs = &self.session.believed;
-        let nodes = beliefs.bias.distance.range_m.len();
         let mut row = RowDVector::zeros(self.len());
-        for (node, weight) in beliefs.bias.distance.weights(range) {
-            if node < nodes {
-                row[node] += weight * beliefs.distance_bias_sd_mm * 1e-3;
-            }
-        }
-        row[nodes] = (cos_incidence - 1.0) * beliefs.angle_gain_sd_mm * 1e-3;
-        if let Some(place) = self.colors.iter().position(|c| *c == color) {
-            row[nodes + 1 + place] = beliefs.color_bias_sd_mm * 1e-3;
+        for (number, error) in self.entries(range, cos_incidence, self.place(color)) {
+            row[number] += error;
         }
         row
+    }
+
+    /// Where a color that a board has stands among the numbers.
+    pub(crate) fn place(&self, color: &str) -> Option<usize> {
+        let place = self.colors.iter().position(|c| *c == color)?;
+        Some(self.session.believed.bias.distance.range_m.len() + 1 + place)
+    }
+
+    /// The numbers that change a range, each with its error as in [`row`](Self::row); one that is named twice adds up.
+    pub(crate) fn entries(&self, range: f64, cos_incidence: f64, color: Option<usize>) -> [(usize, f64); 4] {
+        let beliefs = &self.session.believed;
+        let nodes = beliefs.bias.distance.range_m.len();
+        let [below, above] = beliefs
+            .bias
+            .distance
+            .weights(range)
+            .map(|(node, weight)| (node, weight * beliefs.distance_bias_sd_mm * 1e-3));
+        let gain = (cos_incidence - 1.0) * beliefs.angle_gain_sd_mm * 1e-3;
+        let color = color.map_or((nodes, 0.0), |place| (place, beliefs.color_bias_sd_mm * 1e-3));
+        [below, above, (nodes, gain), color]
     }
 
     /// Error of a bare distance that one standard deviation of each number causes, in metres: of what the scanner ranged

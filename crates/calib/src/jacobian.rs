@@ -64,16 +64,36 @@ impl OutgoingRay {
     /// The ray of a deflection.
     pub fn of(deflection: &Deflection, beam_azimuth: f64) -> Self {
         let base = beam::direction(beam_azimuth);
-        let (sin_a, cos_a) = libm_sincos(beam_azimuth + deflection.azimuth);
-        let (sin_e, cos_e) = libm_sincos(deflection.elevation);
+        Self::aimed(&base, beam_azimuth + deflection.azimuth, deflection.elevation)
+            .leaving_at(deflection.distance)
+    }
+
+    /// The ray of a beam in direction `base` that leaves the sensor's origin under an azimuth and an elevation.
+    pub(crate) fn aimed(base: &Unit<Vector3<f64>>, azimuth: f64, elevation: f64) -> Self {
+        let (sin_a, cos_a) = libm_sincos(azimuth);
+        let (sin_e, cos_e) = libm_sincos(elevation);
         Self {
-            origin: Point3::from(base.into_inner() * deflection.distance),
+            origin: Point3::origin(),
             direction: Unit::new_unchecked(Vector3::new(cos_e * cos_a, cos_e * sin_a, sin_e)),
-            base,
-            distance: deflection.distance,
+            base: *base,
+            distance: 0.0,
             by_azimuth: Vector3::new(-cos_e * sin_a, cos_e * cos_a, 0.0),
             by_elevation: Vector3::new(-sin_e * cos_a, -sin_e * sin_a, cos_e),
         }
+    }
+
+    /// The same, leaving a mirror at a distance d.
+    pub(crate) fn leaving_at(self, distance: f64) -> Self {
+        Self {
+            origin: Point3::from(self.base.into_inner() * distance),
+            distance,
+            ..self
+        }
+    }
+
+    /// cos φ.
+    pub(crate) fn cos_elevation(&self) -> f64 {
+        self.by_elevation.z
     }
 
     /// The range r to a board, Eq. (6), in metres; `None` if the ray does not meet its plane.

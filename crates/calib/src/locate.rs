@@ -7,6 +7,7 @@
 
 use crate::spread;
 use catoptric_model::{Dataset, PoseRecord, Summary, Window};
+use rayon::prelude::*;
 
 /// One beam in so many, those with most readings outside, does not count when it is asked how often that happens.
 const LEFT_OUT: usize = 4;
@@ -21,10 +22,10 @@ const FREE_PART: f64 = 0.05;
 /// Statistics of every beam in every stretch: of its main body, where it has one beside outliers.
 pub fn summaries(dataset: &Dataset) -> Vec<Vec<Summary>> {
     let noise = dataset.session.believed.range_noise_sd_mm * 1e-3;
-    let plain: Vec<Vec<Summary>> = dataset.poses.iter().map(PoseRecord::summarize).collect();
+    let plain: Vec<Vec<Summary>> = dataset.poses.par_iter().map(PoseRecord::summarize).collect();
     let robust: Vec<Vec<Option<Summary>>> = dataset
         .poses
-        .iter()
+        .par_iter()
         .zip(&plain)
         .map(|(record, plain)| {
             let strays = strays(record, plain, noise);

@@ -7,7 +7,8 @@ use crate::jacobian;
 use crate::jacobian::OutgoingRay;
 use crate::observations::Observation;
 use crate::options::{JacobianForm, Options};
-use catoptric_model::{CorrectedRange, Deflection, RangeBias, beam};
+use catoptric_model::bias::ColoredBias;
+use catoptric_model::{BoardPlane, CorrectedRange, Deflection, RangeBias, beam};
 use nalgebra::{Matrix2, SymmetricEigen, Unit, Vector2, Vector3};
 
 /// Lever arm, in metres per radian, below which a direction counts as undetermined within the iteration.
@@ -37,7 +38,14 @@ impl BareDistance {
     /// The normal m is along v − u, so |m·u| = √((1 − u·v)/2), here as |v − u|/2, which keeps its digits.
     #[doc(alias = "d")]
     pub fn to_mirror(&self, beam_azimuth: f64, exit: &Unit<Vector3<f64>>) -> f64 {
-        let facing = 0.5 * (exit.into_inner() - beam::direction(beam_azimuth).into_inner()).norm();
+        self.face_along(&beam::direction(beam_azimuth), exit)
+    }
+
+    fn face_along(&self, u: &Unit<Vector3<f64>>, exit: &Unit<Vector3<f64>>) -> f64 {
+        if self.thickness == 0.0 {
+            return self.distance;
+        }
+        let facing = 0.5 * (exit.into_inner() - u.into_inner()).norm();
         self.distance - self.thickness / facing.max(LEAST_FACING)
     }
 }
@@ -68,6 +76,13 @@ pub struct Solution {
     pub residuals: Vec<f64>,
 }
 
+/// What is the same at every estimate: the beam's direction, the biases of each board, and the number of readings.
+struct Known<'e> {
+    u: Unit<Vector3<f64>>,
+    biases: Vec<ColoredBias<'e>>,
+    readings: f64,
+}
+
 /// One board linearized at an estimate.
 pub(crate) struct Row {
     /// (∂r/∂θ_a, ∂r/∂φ).
@@ -95,41 +110,92 @@ impl Element<'_> {
         Deflection { distance, ..bare }
     }
 
-    /// The boards linearized at an estimate, one after the other; `None` for one that the ray misses.
-    pub(crate) fn linearized<'e>(
-        &'e self,
-        at: &'e Deflection,
-        options: &'e Options,
-    ) -> impl Iterator<Item = Option<Row>> + 'e {
-        let ray = OutgoingRay::of(at, self.azimuth);
-        self.observations.iter().map(move |o| {
-            let plane = &o.board.plane;
-            let (predicted, gradient) = match options.jacobian {
-                JacobianForm::Analytic => ray.range_and_angles(plane)?,
-                JacobianForm::CentralDifference => (
-                    ray.range(plane)?,
-                    jacobian::central(at, self.azimuth, plane)?.angles(),
-                ),
-            };
-            let bias = self
-                .bias
-                .terms(predicted, plane.cos_incidence(&ray.direction), o.board.color)
-                .total();
-            Some(Row {
-                gradient,
-                predicted,
-                bias,
-            })
+    /// What is the same at every estimate.
+    fn known(&self) -> Known<'_> {
+        Known {
+            u: beam::direction(self.azimuth),
+            biases: self
+                .observations
+                .iter()
+                .map(|o| self.bias.on(o.board.color))
+                .collect(),
+            readings: self.observations.iter().map(|o| o.board.count as f64).sum(),
+        }
+    }
+
+    /// An estimate with its distance, and its ray.
+    fn aim(&self, known: &Known, azimuth: f64, elevation: f64) -> (Deflection, OutgoingRay) {
+        let ray = OutgoingRay::aimed(&known.u, self.azimuth + azimuth, elevation);
+        let distance = self.distance.face_along(&known.u, &ray.direction);
+        let at = Deflection {
+            azimuth,
+            elevation,
+            distance,
+        };
+        (at, ray.leaving_at(distance))
+    }
+
+    /// One board linearized at an estimate; `None` if the ray misses it.
+    #[inline(always)]
+    fn row(
+        &self,
+        observed: (&Observation, &ColoredBias),
+        at: &Deflection,
+        ray: &OutgoingRay,
+        form: JacobianForm,
+    ) -> Option<Row> {
+        let plane = &observed.0.board.plane;
+        let (predicted, gradient) = match form {
+            JacobianForm::Analytic => ray.range_and_angles(plane)?,
+            JacobianForm::CentralDifference => self.by_differences(plane, at, ray)?,
+        };
+        let terms = observed.1.terms(predicted, plane.cos_incidence(&ray.direction));
+        Some(Row {
+            gradient,
+            predicted,
+            bias: terms.total(),
         })
     }
 
-    /// The same, all of them or `None`.
-    pub(crate) fn linearize(&self, at: &Deflection, options: &Options) -> Option<Vec<Row>> {
-        let mut rows = Vec::with_capacity(self.observations.len());
-        for row in self.linearized(at, options) {
-            rows.push(row?);
+    #[inline(never)]
+    fn by_differences(
+        &self,
+        plane: &BoardPlane,
+        at: &Deflection,
+        ray: &OutgoingRay,
+    ) -> Option<(f64, Vector2<f64>)> {
+        let angles = jacobian::central(at, self.azimuth, plane)?.angles();
+        Some((ray.range(plane)?, angles))
+    }
+
+    /// HᵀH and Hᵀ(z − r̂) at an estimate, each board weighted by its part of all readings.
+    fn normal(
+        &self,
+        known: &Known,
+        at: &Deflection,
+        ray: &OutgoingRay,
+        form: JacobianForm,
+    ) -> Option<(Matrix2<f64>, Vector2<f64>)> {
+        let ([mut aa, mut ae, mut ee], [mut a, mut e]) = ([0.0; 3], [0.0; 2]);
+        for (observed, bias) in self.observations.iter().zip(&known.biases) {
+            let row = self.row((observed, bias), at, ray, form)?;
+            let weight = observed.board.count as f64 / known.readings;
+            let by = row.gradient * weight;
+            let residual = observed.mean.0 - row.bias - row.predicted;
+            aa += by.x * row.gradient.x;
+            ae += by.x * row.gradient.y;
+            ee += by.y * row.gradient.y;
+            a += by.x * residual;
+            e += by.y * residual;
         }
-        Some(rows)
+        Some((Matrix2::new(aa, ae, ae, ee), Vector2::new(a, e)))
+    }
+
+    /// All boards linearized at an estimate; `None` if the ray misses one.
+    pub(crate) fn linearize(&self, at: &Deflection, options: &Options) -> Option<Vec<Row>> {
+        let ray = OutgoingRay::of(at, self.azimuth);
+        let row = |o: &Observation| self.row((o, &self.bias.on(o.board.color)), at, &ray, options.jacobian);
+        self.observations.iter().map(row).collect()
     }
 
     /// z − r̂ of each board at an estimate, with z corrected by Eq. (3), in metres; `None` if the ray misses one.
@@ -164,18 +230,12 @@ impl Element<'_> {
 /// the ray misses a board on the way.
 #[doc(alias = "RLS")]
 pub fn batch(element: &Element, start: &Deflection, options: &Options) -> Option<Solution> {
-    let mut at = element.place(start.azimuth, start.elevation);
+    let known = element.known();
+    let (mut at, mut ray) = element.aim(&known, start.azimuth, start.elevation);
     for iteration in 1..=options.max_iterations {
-        let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
-        for (row, o) in element.linearized(&at, options).zip(element.observations) {
-            let row = row?;
-            let weight = o.board.count as f64;
-            normal += row.gradient * row.gradient.transpose() * weight;
-            right += row.gradient * (weight * (o.mean.0 - row.bias - row.predicted));
-        }
-        let total: f64 = element.observations.iter().map(|o| o.board.count as f64).sum();
-        let step = determined_step(&(normal / total), &(right / total), libm_cos(at.elevation));
-        at = element.place(at.azimuth + step.x, at.elevation + step.y);
+        let (normal, right) = element.normal(&known, &at, &ray, options.jacobian)?;
+        let step = determined_step(&normal, &right, off_zero(ray.cos_elevation()));
+        (at, ray) = element.aim(&known, at.azimuth + step.x, at.elevation + step.y);
         if step.norm() < options.step_tolerance_rad {
             return element.finish(&at, iteration, true);
         }
@@ -224,5 +284,9 @@ pub fn levers(normal: &Matrix2<f64>, cos_elevation: f64) -> (Vector2<f64>, Matri
 
 /// cos φ of an elevation, the same on every machine; kept off zero, where azimuth means nothing.
 pub(crate) fn libm_cos(elevation: f64) -> f64 {
-    beam::direction(elevation).x.abs().max(1e-6)
+    off_zero(beam::direction(elevation).x)
+}
+
+fn off_zero(cos_elevation: f64) -> f64 {
+    cos_elevation.abs().max(1e-6)
 }

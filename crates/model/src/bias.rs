@@ -43,6 +43,25 @@ pub struct RangeBias {
     pub color: BTreeMap<String, ColorBias>,
 }
 
+/// The biases on targets of one color.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ColoredBias<'a> {
+    bias: &'a RangeBias,
+    color: Option<&'a ColorBias>,
+}
+
+impl ColoredBias<'_> {
+    /// The three terms for a target at `range` metres under a given incidence.
+    #[inline]
+    pub fn terms(&self, range: f64, cos_incidence: f64) -> BiasTerms {
+        BiasTerms {
+            distance: self.bias.distance.error(range),
+            angle: self.bias.angle.error(cos_incidence),
+            color: self.color.map_or(0.0, |c| c.error(range)),
+        }
+    }
+}
+
 /// E_r as a table over distance, interpolated linearly and constant outside (Cooper, Table 2).
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -174,14 +193,19 @@ impl ColorBias {
 }
 
 impl RangeBias {
+    /// The biases on targets of one color, for those who ask often.
+    #[inline]
+    pub fn on(&self, color: &str) -> ColoredBias<'_> {
+        ColoredBias {
+            bias: self,
+            color: self.color.get(color),
+        }
+    }
+
     /// The three terms for a target at `range` metres under a given incidence and color.
     #[inline]
     pub fn terms(&self, range: f64, cos_incidence: f64, color: &str) -> BiasTerms {
-        BiasTerms {
-            distance: self.distance.error(range),
-            angle: self.angle.error(cos_incidence),
-            color: self.color.get(color).map_or(0.0, |c| c.error(range)),
-        }
+        self.on(color).terms(range, cos_incidence)
     }
 
     /// The corrected range r − E_a − E_c − E_r — Eq. (3).

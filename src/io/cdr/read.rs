@@ -109,6 +109,17 @@ impl<'a> CdrReader<'a> {
         Ok(length)
     }
 
+    /// Reads a sequence of 32-bit numbers.
+    ///
+    /// # Errors
+    /// [`CdrError::Truncated`] past the end.
+    pub fn f32_sequence(&mut self) -> Result<impl ExactSizeIterator<Item = f32> + 'a, CdrError> {
+        // The length is aligned as they are.
+        let length = self.length(size_of::<f32>())?;
+        let (numbers, _) = self.take(length * size_of::<f32>())?.as_chunks();
+        Ok(numbers.iter().map(|bytes| f32::from_le_bytes(*bytes)))
+    }
+
     /// Reads a string.
     ///
     /// # Errors

@@ -3,8 +3,9 @@
 //! Given the other parameters x, an element's departure is normal about L(y − A·x) with L = τ²(I + τ²HᵀH)⁻¹Hᵀ. With C the
 //! covariance of x, that of the direction is (G − LA)·C·(G − LA)ᵀ + τ²(I + τ²HᵀH)⁻¹.
 
-use super::problem::{Element, FACET_PARAMETERS, Fan, Group, Joint, Linear};
-use crate::least_squares::{Information, Solution, State};
+use super::linear::{Boards, Linear};
+use super::problem::{Element, FACET_PARAMETERS, Group, Joint};
+use crate::least_squares::{GroupJacobian, Information, Solution, State};
 use crate::pose;
 use catoptric_model::calibration::{FacetEstimate, MountEstimate};
 use catoptric_model::{Deflection, PoseData, RangeBias, frame};
@@ -24,8 +25,6 @@ pub(super) struct Answer {
     pub(super) readings: usize,
     /// Root mean square residual, in metres.
     pub(super) rms: f64,
-    /// χ² of the element's rows, its departure included.
-    pub(super) chi_squared: f64,
     /// What it read of each board.
     pub(super) seen: Vec<Seen>,
 }
@@ -63,6 +62,15 @@ struct Spread {
     fitted: Vec<f64>,
 }
 
+/// A deflected element, with its group and its facet there, and derivatives of its predicted ranges.
+pub(super) struct Linearized<'g> {
+    pub(super) group: usize,
+    pub(super) facet: usize,
+    pub(super) element: &'g Element,
+    pub(super) linear: Linear,
+    pub(super) by: GroupJacobian,
+}
+
 /// What an element's direction along its tangent basis, and what is fitted to its sights, depend on.
 pub(super) struct Dependence {
     /// Covariance of the departure where all else is known.
@@ -85,39 +93,54 @@ impl Joint<'_> {
     }
 
     /// Every deflected element at a state, linearized, with its group and its facet.
-    pub(super) fn linearized<'g>(
-        &'g self,
-        state: &'g State,
-    ) -> impl Iterator<Item = (usize, usize, &'g Element, Fan, Linear)> + 'g {
+    pub(super) fn linearized<'g>(&'g self, state: &'g State) -> impl Iterator<Item = Linearized<'g>> + 'g {
         self.groups.iter().enumerate().flat_map(move |(number, group)| {
             let own = state.own(number);
             let boards = self.boards(group, &state.shared, own);
             group.elements.iter().filter_map(move |element| {
                 let facet = element.facet?;
-                let linear = self.element(group, element, &state.shared, own, boards.as_ref()?, true)?;
-                let fan = Fan::of(element, &Self::shape(own, facet)?, &self.flatness)?;
-                Some((number, facet, element, fan, linear))
+                let boards = boards.as_ref()?;
+                let linear = self.element(element, &state.shared, own, boards)?;
+                Some(Linearized {
+                    group: number,
+                    facet,
+                    element,
+                    by: self.derivatives(group, element, boards, &linear),
+                    linear,
+                })
             })
         })
+    }
+
+    /// Derivatives of one element's predicted ranges, over the standard deviations.
+    pub(super) fn derivatives(
+        &self,
+        group: &Group,
+        element: &Element,
+        boards: &Boards,
+        linear: &Linear,
+    ) -> GroupJacobian {
+        let rows = element.sights.len();
+        let mut by = GroupJacobian {
+            shared: DMatrix::zeros(rows, self.shared_dimension()),
+            own: DMatrix::zeros(rows, group.own_dimension()),
+        };
+        self.differentiate(group, element, boards, linear, &mut by, 0);
+        by
     }
 
     /// Every deflected element of the solution.
     pub(super) fn answers(&self, solution: &Solution) -> Vec<Answer> {
         self.linearized(&solution.state)
-            .map(|(number, facet, element, fan, linear)| {
-                let group = &self.groups[number];
-                let tau = self.flatness.tau;
-                let rest = &linear.y - &linear.h * linear.delta;
+            .map(|at| {
+                let (element, linear) = (at.element, &at.linear);
+                let group = &self.groups[at.group];
+                let rest = linear.rest();
                 let in_metres = rest.iter().zip(&element.sights).map(|(r, s)| (r * s.sd).powi(2));
                 let count = element.sights.len().max(1) as f64;
-                let departure = if tau > 0.0 {
-                    linear.delta.norm_squared() / (tau * tau)
-                } else {
-                    0.0
-                };
-                let spread = self.spread(&solution.information, number, facet, &fan, &linear);
+                let spread = self.spread(&solution.information, &at);
                 let seen = element.sights.iter().enumerate().map(|(i, sight)| Seen {
-                    group: number,
+                    group: at.group,
                     board: sight.board,
                     number: group.boards[sight.board].number,
                     sd: sight.sd,
@@ -126,10 +149,9 @@ impl Joint<'_> {
                 });
                 Answer {
                     beam: element.beam,
-                    facet: group.facets[facet].facet,
-                    deflection: Deflection::from_exit(element.azimuth, &linear.v, linear.distance),
+                    facet: group.facets[at.facet].facet,
+                    deflection: Deflection::from_exit(element.azimuth, &linear.v, linear.fan.distance),
                     rms: (in_metres.sum::<f64>() / count).sqrt(),
-                    chi_squared: rest.norm_squared() + departure,
                     seen: seen.collect(),
                     readings: element.sights.iter().map(|s| s.count).sum(),
                     covariance: spread.map(|s| s.direction),
@@ -145,26 +167,21 @@ impl Joint<'_> {
         information: &Information,
     ) -> Vec<(usize, f64, Option<Matrix2<f64>>)> {
         self.linearized(state)
-            .map(|(number, facet, element, fan, linear)| {
-                let at = Deflection::from_exit(element.azimuth, &linear.v, linear.distance);
-                let spread = self.spread(information, number, facet, &fan, &linear);
-                (element.beam, at.elevation, spread.map(|s| s.direction))
+            .map(|at| {
+                let (element, linear) = (at.element, &at.linear);
+                let exit = Deflection::from_exit(element.azimuth, &linear.v, linear.fan.distance);
+                let spread = self.spread(information, &at);
+                (element.beam, exit.elevation, spread.map(|s| s.direction))
             })
             .collect()
     }
 
     /// `None` where the direction is open.
-    fn spread(
-        &self,
-        information: &Information,
-        group: usize,
-        facet: usize,
-        fan: &Fan,
-        linear: &Linear,
-    ) -> Option<Spread> {
-        let by = self.dependence(facet, fan, linear)?;
+    fn spread(&self, information: &Information, at: &Linearized) -> Option<Spread> {
+        let linear = &at.linear;
+        let by = self.dependence(at.facet, linear, &at.by)?;
         let rows = linear.y.len();
-        let c = information.covariance_of(&self.among_all(information.dimension(), group, &by))?;
+        let c = information.covariance_within(at.group, &by.shared, &by.own)?;
         let direction = c.fixed_view::<2, 2>(0, 0) + by.turn * by.inner * by.turn.transpose();
         let departing = &linear.h * by.inner * linear.h.transpose();
         Some(Spread {
@@ -174,7 +191,7 @@ impl Joint<'_> {
     }
 
     /// How an element's direction and its fitted sights depend on the parameters.
-    pub(super) fn dependence(&self, facet: usize, fan: &Fan, linear: &Linear) -> Option<Dependence> {
+    pub(super) fn dependence(&self, facet: usize, linear: &Linear, by: &GroupJacobian) -> Option<Dependence> {
         let (across, up) = frame::tangent_basis(&linear.v);
         let tangent = [across, up];
         let tau2 = self.flatness.tau.powi(2);
@@ -182,16 +199,16 @@ impl Joint<'_> {
         let gain = inner * linear.h.transpose();
         let turn = Matrix2::from_fn(|i, j| tangent[i].dot(&linear.axes[j]));
         let rows = linear.y.len();
-        let by = |part: &DMatrix<f64>| {
+        let taken_up = |part: &DMatrix<f64>| {
             let taken = &gain * part;
             let mut all = DMatrix::zeros(2 + rows, part.ncols());
             all.rows_mut(0, 2).copy_from(&-(turn * &taken));
             all.rows_mut(2, rows).copy_from(&(part - &linear.h * taken));
             all
         };
-        let (shared, mut own) = (by(&linear.shared), by(&linear.own));
+        let (shared, mut own) = (taken_up(&by.shared), taken_up(&by.own));
         for (row, axis) in tangent.iter().enumerate() {
-            for (column, turned) in fan.directions() {
+            for (column, turned) in linear.fan.directions() {
                 own[(row, facet * FACET_PARAMETERS + column)] += axis.dot(&turned);
             }
         }
@@ -203,12 +220,17 @@ impl Joint<'_> {
         })
     }
 
-    /// A dependence with all parameters of the problem as columns.
-    pub(super) fn among_all(&self, dimension: usize, group: usize, by: &Dependence) -> DMatrix<f64> {
-        let mut all = DMatrix::zeros(by.own.nrows(), dimension);
-        all.columns_mut(0, by.shared.ncols()).copy_from(&by.shared);
-        all.columns_mut(self.offset(group), by.own.ncols())
-            .copy_from(&by.own);
+    /// A combination of the shared parameters and of a group's own as one of all parameters.
+    pub(super) fn among_all(
+        &self,
+        dimension: usize,
+        group: usize,
+        shared: &DVector<f64>,
+        own: &DVector<f64>,
+    ) -> DVector<f64> {
+        let mut all = DVector::zeros(dimension);
+        all.rows_mut(0, shared.len()).copy_from(shared);
+        all.rows_mut(self.offset(group), own.len()).copy_from(own);
         all
     }
 

@@ -7,10 +7,10 @@
 //! L(σ, τ) = ‖f‖² + ln det(JᵀJ) + Σ ln det(I + τ²HᵀH)      least at (σ̂, τ̂);  L(0, 0) − L(σ̂, τ̂) tests planeness
 //! ```
 
-use super::problem::{BOARD_ERRORS, FACET_BLOCKS, FIGURE, Flatness, Group, Joint};
-use crate::least_squares::{self, Block, Point, Prior, ProblemError, Solution, State, WithPriors};
+use super::problem::{BOARD_ERRORS, FACET_BLOCKS, FACET_PARAMETERS, FIGURE, Flatness, Group, Joint};
+use crate::least_squares::{self, Block, Point, Prior, ProblemError, Reduced, Solution, State, WithPriors};
 use catoptric_model::MirrorPlane;
-use nalgebra::{DVector, Matrix2};
+use nalgebra::DVector;
 
 /// Departures that are tried first, in radians: 0.003° to 1.8°.
 const TRIED: [f64; 7] = [5e-5, 1.5e-4, 5e-4, 1.5e-3, 5e-3, 1.5e-2, 3.2e-2];
@@ -21,6 +21,9 @@ const REFINEMENTS: usize = 4;
 /// Step in ln σ beyond the points tried, and one that is too short to learn from.
 const FURTHER: f64 = 1.1;
 const CLOSE: f64 = 0.1;
+
+/// Part by which one side of a point is wider than the other before it counts as such, where rounding decides no more.
+const TIE: f64 = 1e-6;
 
 /// A solution, and how plane the facets are.
 pub(super) struct Fit {
@@ -43,17 +46,20 @@ impl Joint<'_> {
     /// A problem in these parameters with what is believed of w, of the boards' errors and of the facets' figures, all in
     /// their own σ.
     pub(super) fn with_priors<'p, P>(&self, problem: &'p P) -> WithPriors<'p, P> {
-        let standard = |block: usize, mean: DVector<f64>| {
-            let sd = vec![1.0; mean.len()];
-            Prior::independent(block, Block::Vector(mean), &sd)
-        };
+        let mut all = self.without_figures(problem);
+        for (group, own) in self.groups.iter().zip(&mut all.own) {
+            own.extend(
+                (0..group.facets.len()).map(|f| standard(FACET_BLOCKS * f + 2, DVector::zeros(FIGURE))),
+            );
+        }
+        all
+    }
+
+    /// The same without what is believed of the figures.
+    fn without_figures<'p, P>(&self, problem: &'p P) -> WithPriors<'p, P> {
         let of_group = |group: &Group| {
-            let figures =
-                (0..group.facets.len()).map(|f| standard(FACET_BLOCKS * f + 2, DVector::zeros(FIGURE)));
             let boards = DVector::zeros(group.boards.len() * BOARD_ERRORS);
-            figures
-                .chain([standard(FACET_BLOCKS * group.facets.len(), boards)])
-                .collect()
+            vec![standard(FACET_BLOCKS * group.facets.len(), boards)]
         };
         WithPriors {
             problem,
@@ -70,21 +76,17 @@ impl Joint<'_> {
             ..exact
         };
         self.flatness = Flatness::default();
-        let state = self.solve(start, &rough)?.state;
-        let at = |joint: &mut Self, flatness: Flatness| {
-            joint.flatness = flatness;
-            joint.likelihood(&state)
-        };
-        let plane = at(self, Flatness::default())?;
-        let (figure, _) = search(plane, |figure| at(self, Flatness { figure, tau: 0.0 }))?;
-        let (tau, least) = {
-            let none = at(self, Flatness { figure, tau: 0.0 })?;
-            search(none, |tau| at(self, Flatness { figure, tau }))?
-        };
+        let state = self.without_figure(self.solve(start, &rough)?.state);
+        let at_plane = self.with_departures(0.0, &state)?;
+        let plane = at_plane.deviance(0.0);
+        let (figure, none) = search(plane, |figure| Ok(at_plane.deviance(figure)))?;
+        let (tau, least) = search(none, |tau| {
+            Ok(self.with_departures(tau, &state)?.deviance(figure))
+        })?;
         let (figure, least) = if tau > 0.0 {
             // What departs beam by beam is no longer taken for a figure.
-            let none = at(self, Flatness { figure: 0.0, tau })?;
-            search(none, |figure| at(self, Flatness { figure, tau }))?
+            let departing = self.with_departures(tau, &state)?;
+            search(departing.deviance(0.0), |figure| Ok(departing.deviance(figure)))?
         } else {
             (figure, least)
         };
@@ -95,25 +97,31 @@ impl Joint<'_> {
         })
     }
 
-    /// L at the minimum, as the problem linearized at a state has it.
-    fn likelihood(&self, state: &State) -> Result<f64, ProblemError> {
-        let linear = least_squares::linearize(&self.with_priors(self), state)?;
-        let mut sum = linear.least_sum_of_squares + linear.information.log_determinant();
-        for (number, group) in self.groups.iter().enumerate() {
-            let own = state.own(number);
-            let departing = group.elements.iter().filter(|e| self.departure(e) > 0.0);
-            let Some(boards) = self.boards(group, &state.shared, own) else {
-                continue;
-            };
-            for element in departing {
-                let tau = self.departure(element);
-                if let Some(linear) = self.element(group, element, &state.shared, own, &boards, false) {
-                    let inner = Matrix2::identity() + linear.h.transpose() * &linear.h * (tau * tau);
-                    sum += libm::log(inner.determinant());
-                }
+    /// A state with facets that are plane.
+    fn without_figure(&self, mut state: State) -> State {
+        for (group, own) in self.groups.iter().zip(&mut state.own) {
+            for facet in 0..group.facets.len() {
+                own.blocks[FACET_BLOCKS * facet + 2] = Block::Vector(DVector::zeros(FIGURE));
             }
         }
-        Ok(sum)
+        state
+    }
+
+    /// The problem with departures τ linearized at a state whose facets are plane, for any σ.
+    fn with_departures(&mut self, tau: f64, state: &State) -> Result<Departing, ProblemError> {
+        // Where there is no figure yet, its σ is but a factor of its columns.
+        self.flatness = Flatness { figure: 1.0, tau };
+        let mut figures = DVector::zeros(state.dimension());
+        for (number, group) in self.groups.iter().enumerate() {
+            for facet in 0..group.facets.len() {
+                let first = self.offset(number) + facet * FACET_PARAMETERS + FACET_PARAMETERS - FIGURE;
+                figures.rows_mut(first, FIGURE).fill(1.0);
+            }
+        }
+        Ok(Departing {
+            reduced: Reduced::new(&self.without_figures(&*self), state)?,
+            figures,
+        })
     }
 
     /// The state to begin with: the mounting as already found, boards as tracked, facets at the given planes.
@@ -125,6 +133,27 @@ impl Joint<'_> {
             own: self.groups.iter().map(|g| Self::start(g, planes)).collect(),
         }
     }
+}
+
+/// A problem with some τ.
+struct Departing {
+    reduced: Reduced,
+    /// 1 for each parameter of a figure, 0 for all others.
+    figures: DVector<f64>,
+}
+
+impl Departing {
+    /// L(σ, τ), as the problem linearized has it.
+    fn deviance(&self, figure: f64) -> f64 {
+        let factors = self.figures.map(|is| if is > 0.0 { figure } else { 1.0 });
+        self.reduced.changed(&factors, &self.figures).deviance()
+    }
+}
+
+/// A belief of independent standard normal numbers about a mean.
+fn standard(block: usize, mean: DVector<f64>) -> Prior {
+    let sd = vec![1.0; mean.len()];
+    Prior::independent(block, Block::Vector(mean), &sd)
 }
 
 /// The σ of least L and that L; 0 unless some σ beats `none`, L without it.
@@ -167,7 +196,8 @@ fn search(
             // The parabola has nothing to add: the wider side is halved.
             (Some(low), Some(high)) if near(next) => {
                 let (low, middle, high) = (seen[low].0, seen[best].0, high.0);
-                0.5 * (middle + if middle - low > high - middle { low } else { high })
+                let wider_below = middle - low > (high - middle) * (1.0 + TIE);
+                0.5 * (middle + if wider_below { low } else { high })
             }
             _ => next,
         };

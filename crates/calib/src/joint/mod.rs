@@ -7,8 +7,10 @@
 mod answer;
 mod assess;
 mod fit;
+mod gate;
 mod held;
 mod limit;
+mod linear;
 mod problem;
 mod reach;
 
@@ -38,12 +40,6 @@ const MOTIONS: usize = 6;
 /// Error that stands for none, in metres, so that everything has a weight.
 const LEAST_SD: f64 = 1e-6;
 
-/// χ² of an element's rows beyond which it is not what its facet and boards say: standard deviations of χ² above its mean.
-const GATE_SIGMAS: f64 = 7.0;
-
-/// Share of elements beyond the gate above which it is the model that is wrong, not the elements.
-const LARGEST_SHARE: f64 = 0.2;
-
 /// Rounds of leaving elements out.
 const ROUNDS: usize = 3;
 
@@ -72,7 +68,17 @@ pub(crate) fn calibrate(
     planes: &[MirrorPlane],
     assigned: Vec<Assigned>,
 ) -> Result<Outcome, ProblemError> {
-    let components = components(work.dataset.session.facets.len(), &assigned);
+    // Within the pool: groups are handed out over and over, and from outside each time would wake it.
+    rayon::scope(|_| within_pool(work, mount, planes, &assigned))
+}
+
+fn within_pool(
+    work: &Workspace,
+    mount: &Mount,
+    planes: &[MirrorPlane],
+    assigned: &[Assigned],
+) -> Result<Outcome, ProblemError> {
+    let components = components(work.dataset.session.facets.len(), assigned);
     if work.method == Method::Facet {
         let mut outcome = Outcome::default();
         for facets in components {
@@ -318,15 +324,10 @@ fn solve(
     } else {
         rigid(&joint, start)?
     };
-    let mut answers = joint.answers(&fit.solution);
     let mut left_out = false;
     for _ in 0..ROUNDS {
-        let strange: Vec<usize> = answers
-            .iter()
-            .filter(|a| a.is_strange())
-            .map(|a| a.beam)
-            .collect();
-        if strange.is_empty() || strange.len() as f64 > LARGEST_SHARE * answers.len() as f64 {
+        let strange = joint.strange(&fit.solution.state);
+        if strange.is_empty() {
             break;
         }
         for group in &mut joint.groups {
@@ -336,13 +337,12 @@ fn solve(
         }
         left_out = true;
         fit = rigid(&joint, fit.solution.state)?;
-        answers = joint.answers(&fit.solution);
     }
     if departing && left_out {
         // They had their part in how plane the facets seemed.
         fit = joint.fit(fit.solution.state)?;
-        answers = joint.answers(&fit.solution);
     }
+    let answers = joint.answers(&fit.solution);
     let solution = &fit.solution;
     let bent = joint.bent(solution);
     let mut assessment = departing.then(|| joint.assess(session, &fit, &answers));
@@ -372,12 +372,6 @@ fn solve(
 }
 
 impl Answer {
-    /// Whether its ranges are not those of a beam of its facet on its boards.
-    fn is_strange(&self) -> bool {
-        let freedom = self.seen.len() as f64;
-        self.chi_squared > freedom + GATE_SIGMAS * (2.0 * freedom).sqrt() + GATE_SIGMAS * GATE_SIGMAS
-    }
-
     /// What is said of the element; where its facet is `bent`, not what is known too badly for its covariance to hold.
     fn estimate(&self, facet: String, iterations: usize, bent: bool) -> BeamEstimate {
         let found = BeamEstimate {

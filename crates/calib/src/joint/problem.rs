@@ -9,15 +9,14 @@
 //! by δ ~ N(0, τ²) from its facet's plane; δ is eliminated beam by beam, which leaves (I + τ²HHᵀ)^(−½) as the weight of
 //! its rows.
 
+use super::linear::{Boards, Paint, Placed};
 use crate::common::CommonErrors;
 use crate::covariance::PlaneFit;
-use crate::jacobian;
-use crate::least_squares::{Block, GroupJacobian, GroupedProblem, Point};
+use crate::least_squares::{Block, GroupJacobian, GroupRows, GroupedProblem, Point};
 use crate::pose;
 use catoptric_model::{BoardPlane, Pose, RangeBias, frame, mirror};
 use nalgebra::{
-    DMatrix, DVector, Dyn, Matrix2, Matrix3, Matrix6, OMatrix, Point3, RowDVector, RowVector3, U2, U6, Unit,
-    Vector2, Vector3, Vector6,
+    DMatrix, DVector, Dyn, Matrix3, Matrix6, OMatrix, Point3, RowDVector, U6, Unit, Vector3, Vector6,
 };
 
 /// Own parameters of a board: drift, offset and two tilts of its plane.
@@ -37,13 +36,6 @@ pub(super) const FACET_PARAMETERS: usize = 3 + FIGURE;
 
 /// Blocks of a facet's parameters: normal, offset, figure.
 pub(super) const FACET_BLOCKS: usize = 3;
-
-/// Step of (range, cosine) over which a bias is differentiated: tables are linear over centimeters and degrees.
-const BIAS_STEP: f64 = 1e-4;
-
-/// Rounds in which a beam's own departure settles, and the change that ends them, in radians.
-const DEPARTURE_ROUNDS: usize = 8;
-const SETTLED: f64 = 1e-14;
 
 /// A board as tracked, once for each pose.
 #[derive(Debug, Clone, PartialEq)]
@@ -139,34 +131,6 @@ pub(super) struct Flatness {
     pub(super) figure: f64,
     /// Of a beam's direction from what its facet gives it, along each axis, in radians.
     pub(super) tau: f64,
-}
-
-/// A board in the sensor frame with its errors.
-struct Placed {
-    plane: BoardPlane,
-    fit: PlaneFit,
-    /// Height error of each of three unit errors, by (1, x, y).
-    errors: Matrix3<f64>,
-}
-
-/// An element linearized: prediction errors, and derivatives of the predicted range.
-pub(super) struct Linear {
-    /// z − r̂ + Hδ, over the sights, each over its standard deviation.
-    pub(super) y: DVector<f64>,
-    /// Derivatives along the two axes of the departure, over the standard deviations.
-    pub(super) h: OMatrix<f64, Dyn, U2>,
-    /// The departure that fits best.
-    pub(super) delta: Vector2<f64>,
-    /// The two axes.
-    pub(super) axes: [Vector3<f64>; 2],
-    /// Exit direction and distance.
-    pub(super) v: Unit<Vector3<f64>>,
-    pub(super) distance: f64,
-    /// Derivatives of each biased range with respect to the range and to the cosine of the incidence.
-    slopes: Vec<(f64, f64)>,
-    /// Derivatives over the standard deviations: of w, and of the group's own parameters.
-    pub(super) shared: DMatrix<f64>,
-    pub(super) own: DMatrix<f64>,
 }
 
 /// What an element's direction depends on: derivatives of v and d with respect to its facet's plane.
@@ -291,7 +255,7 @@ impl Joint<'_> {
         (pose, to_moved * &self.mounting.motion)
     }
 
-    fn placed(&self, board: &Board, rig_from_sensor: &Pose, b: &[f64]) -> Option<Placed> {
+    fn placed(&self, board: &Board, rig_from_sensor: &Pose, b: &[f64]) -> Option<Placed<'_>> {
         let sensor_from_board = rig_from_sensor.inverse() * board.rig_from_board;
         let tracked = BoardPlane::of_pose(&sensor_from_board);
         let markers: Vec<Point3<f64>> = board.markers.iter().map(|m| sensor_from_board * m).collect();
@@ -308,169 +272,13 @@ impl Joint<'_> {
             plane: BoardPlane::new(point, Unit::try_new(normal, f64::MIN_POSITIVE)?),
             fit,
             errors,
+            drift: self.drift_sd * b[0],
+            paint: Paint::of(self, &board.color),
         })
     }
 
-    /// Derivatives of the biased range with respect to the range and to the cosine of the incidence.
-    fn bias_slopes(&self, range: f64, cos: f64, color: &str) -> (f64, f64) {
-        let at = |range: f64, cos: f64| self.bias.terms(range, cos, color).total();
-        let slope = (at(range + BIAS_STEP, cos) - at(range - BIAS_STEP, cos)) / (2.0 * BIAS_STEP);
-        let (low, high) = ((cos - BIAS_STEP).max(0.0), (cos + BIAS_STEP).min(1.0));
-        (1.0 + slope, (at(range, high) - at(range, low)) / (high - low))
-    }
-
-    /// An element at a point, with the derivatives of the whole if they are wanted.
-    pub(super) fn element(
-        &self,
-        group: &Group,
-        element: &Element,
-        shared: &Point,
-        own: &Point,
-        boards: &Boards,
-        derivatives: bool,
-    ) -> Option<Linear> {
-        let w = shared.numbers(0)?;
-        let b = self.board_errors(group, own)?;
-        let fan = match element.facet {
-            Some(facet) => Fan::of(element, &Self::shape(own, facet)?, &self.flatness)?,
-            None => Fan {
-                v: element.u,
-                distance: 0.0,
-                turned: [Vector3::zeros(); 2],
-                moved: [0.0; 3],
-                orders: [0.0; FIGURE_ORDERS],
-            },
-        };
-        let origin = Point3::from(element.u.into_inner() * fan.distance);
-        let (across, up) = frame::tangent_basis(&fan.v);
-        let base = [across.into_inner(), up.into_inner()];
-        let rows = element.sights.len();
-        let tau = self.departure(element);
-        let mut delta = Vector2::<f64>::zeros();
-        let mut y = DVector::zeros(rows);
-        let mut h = OMatrix::<f64, Dyn, U2>::zeros(rows);
-        let (mut v, mut axes) = (fan.v, base);
-        // Slopes of the biases, which a departure does not change.
-        let mut slopes = vec![(1.0, 0.0); rows];
-        for round in 0..DEPARTURE_ROUNDS {
-            let q: Vector3<f64> = fan.v.into_inner() + base[0] * delta.x + base[1] * delta.y;
-            let length = q.norm();
-            v = Unit::new_unchecked(q / length);
-            axes = base.map(|a| (a - v.into_inner() * v.dot(&a)) / length);
-            for (row, sight) in element.sights.iter().enumerate() {
-                let board = &boards.placed[sight.board];
-                let color = &group.boards[sight.board].color;
-                let s = board.plane.distance_along(&origin, &v)?;
-                let closing = board.plane.normal.dot(&v);
-                let range = fan.distance + s;
-                let cos = closing.abs().min(1.0);
-                if round == 0 {
-                    slopes[row] = self.bias_slopes(range, cos, color);
-                }
-                let (by_range, by_cos) = slopes[row];
-                let raw = range + self.bias.terms(range, cos, color).total();
-                let common = self.common.row(range, cos, color);
-                let predicted = raw
-                    + (common * w.rows(self.first_common, self.common.len()))[0]
-                    + self.drift_sd * b[sight.board * BOARD_ERRORS];
-                for (column, axis) in axes.iter().enumerate() {
-                    let along = board.plane.normal.dot(axis);
-                    h[(row, column)] =
-                        (-by_range * s * along / closing + by_cos * closing.signum() * along) / sight.sd;
-                }
-                y[row] = (sight.mean - predicted) / sight.sd;
-            }
-            y += &h * delta;
-            if tau == 0.0 {
-                break;
-            }
-            let inner = Matrix2::identity() + h.transpose() * &h * (tau * tau);
-            let next = inner.try_inverse()? * (h.transpose() * &y) * (tau * tau);
-            let change = (next - delta).norm();
-            delta = next;
-            if change < SETTLED || round + 1 == DEPARTURE_ROUNDS {
-                break;
-            }
-        }
-        let mut linear = Linear {
-            y,
-            h,
-            delta,
-            axes,
-            v,
-            distance: fan.distance,
-            slopes,
-            shared: DMatrix::zeros(0, 0),
-            own: DMatrix::zeros(0, 0),
-        };
-        if derivatives {
-            self.differentiate(group, element, &fan, boards, &mut linear)?;
-        }
-        Some(linear)
-    }
-
-    fn differentiate(
-        &self,
-        group: &Group,
-        element: &Element,
-        fan: &Fan,
-        boards: &Boards,
-        linear: &mut Linear,
-    ) -> Option<()> {
-        let rows = element.sights.len();
-        let width = self.shared_dimension();
-        linear.shared = DMatrix::zeros(rows, width);
-        linear.own = DMatrix::zeros(rows, group.own_dimension());
-        let origin = Point3::from(element.u.into_inner() * fan.distance);
-        let v = linear.v;
-        for (row, sight) in element.sights.iter().enumerate() {
-            let board = &boards.placed[sight.board];
-            let color = &group.boards[sight.board].color;
-            let n = board.plane.normal;
-            let s = board.plane.distance_along(&origin, &v)?;
-            let closing = n.dot(&v);
-            let range = fan.distance + s;
-            let cos = closing.abs().min(1.0);
-            let (by_range, by_cos) = linear.slopes[row];
-            let by_closing = by_cos * closing.signum();
-            let weight = 1.0 / sight.sd;
-            let hit = origin + v.into_inner() * s;
-            let mut motion = jacobian::of_mount(&hit, &n, &v) * by_range;
-            let turn: RowVector3<f64> = -n.cross(&v).transpose() * by_closing;
-            for axis in 0..3 {
-                motion[3 + axis] += turn[axis];
-            }
-            let mut by_w = motion * &boards.motion;
-            let common = self.common.row(range, cos, color);
-            for (column, value) in common.iter().enumerate() {
-                by_w[self.first_common + column] += value;
-            }
-            linear.shared.set_row(row, &(by_w * weight));
-            if let Some(facet) = element.facet {
-                let first = facet * FACET_PARAMETERS;
-                let by_distance = by_range * (1.0 - n.dot(&element.u) / closing);
-                for (column, dv) in fan.directions() {
-                    let along = n.dot(&dv);
-                    linear.own[(row, first + column)] =
-                        (-by_range * s * along / closing + by_closing * along) * weight;
-                }
-                for (column, moved) in fan.moved.iter().enumerate() {
-                    linear.own[(row, first + column)] += by_distance * moved * weight;
-                }
-            }
-            let first = group.board_column(sight.board);
-            linear.own[(row, first)] = self.drift_sd * weight;
-            let a = board.fit.coordinates(&hit);
-            for column in 0..3 {
-                let height = a.dot(&board.errors.column(column));
-                linear.own[(row, first + 1 + column)] = by_range * height / closing * weight;
-            }
-        }
-        Some(())
-    }
-
     /// The boards of a group in the sensor frame.
-    pub(super) fn boards(&self, group: &Group, shared: &Point, own: &Point) -> Option<Boards> {
+    pub(super) fn boards(&self, group: &Group, shared: &Point, own: &Point) -> Option<Boards<'_>> {
         let (rig_from_sensor, motion) = self.mounted(shared.numbers(0)?);
         let b = self.board_errors(group, own)?;
         let placed = group
@@ -509,81 +317,58 @@ impl Joint<'_> {
     }
 }
 
-/// Boards of a group in the sensor frame, and how w moves the sensor.
-pub(super) struct Boards {
-    placed: Vec<Placed>,
-    motion: OMatrix<f64, U6, Dyn>,
+/// Residuals of a group at a point.
+struct At {
+    residuals: DVector<f64>,
+    /// If it is wanted.
+    jacobian: Option<GroupJacobian>,
+    /// Σ ln det(I + τ²HᵀH) over its elements.
+    log_departures: f64,
 }
 
-/// (I + τ²HHᵀ)^(−½) applied to the columns of m.
-pub(super) fn whiten(h: &OMatrix<f64, Dyn, U2>, tau: f64, m: &mut DMatrix<f64>) {
-    if tau == 0.0 {
-        return;
-    }
-    let eigen = (h.transpose() * h * (tau * tau)).symmetric_eigen();
-    // 1/√(1 + x) − 1 over x, without the difference of two near numbers.
-    let gain = eigen.eigenvalues.map(|x| {
-        let root = (1.0 + x.max(0.0)).sqrt();
-        -1.0 / (root * (1.0 + root))
-    });
-    let inner =
-        eigen.eigenvectors * Matrix2::from_diagonal(&gain) * eigen.eigenvectors.transpose() * (tau * tau);
-    let part = h * (inner * (h.transpose() * &*m));
-    *m += part;
-}
-
-impl GroupedProblem for Joint<'_> {
-    fn groups(&self) -> usize {
-        self.groups.len()
-    }
-
-    fn residuals(&self, group: usize, shared: &Point, own: &Point) -> Option<DVector<f64>> {
+impl Joint<'_> {
+    /// The rows of a group at a point: of its elements, then of its facets' distances.
+    fn at(&self, group: usize, shared: &Point, own: &Point, derivatives: bool) -> Option<At> {
         let group = &self.groups[group];
         let boards = self.boards(group, shared, own)?;
-        let mut rows = Vec::new();
-        for element in &group.elements {
-            let linear = self.element(group, element, shared, own, &boards, false)?;
-            let mut y = DMatrix::from_column_slice(linear.y.len(), 1, linear.y.as_slice());
-            whiten(&linear.h, self.departure(element), &mut y);
-            rows.extend(y.iter().map(|v| -v));
-        }
-        for (i, facet) in group.facets.iter().enumerate() {
-            if !facet.bare.distances.is_empty() {
-                let shape = Self::shape(own, i)?;
-                rows.push(self.bare(&facet.bare, &shape, shared.numbers(0)?)?.0);
-            }
-        }
-        Some(DVector::from_vec(rows))
-    }
-
-    fn jacobian(&self, group: usize, shared: &Point, own: &Point) -> Option<GroupJacobian> {
-        let group = &self.groups[group];
-        let boards = self.boards(group, shared, own)?;
-        let bare = group
-            .facets
-            .iter()
-            .filter(|f| !f.bare.distances.is_empty())
-            .count();
-        let rows = group.elements.iter().map(|e| e.sights.len()).sum::<usize>() + bare;
-        let mut jacobian = GroupJacobian {
-            shared: DMatrix::zeros(rows, self.shared_dimension()),
-            own: DMatrix::zeros(rows, group.own_dimension()),
+        let bare = || {
+            let facets = group.facets.iter().enumerate();
+            facets.filter(|(_, f)| !f.bare.distances.is_empty())
         };
-        let mut row = 0;
+        let count = group.elements.iter().map(|e| e.sights.len()).sum::<usize>() + bare().count();
+        let mut residuals = DVector::zeros(count);
+        let mut jacobian = derivatives.then(|| GroupJacobian {
+            shared: DMatrix::zeros(count, self.shared_dimension()),
+            own: DMatrix::zeros(count, group.own_dimension()),
+        });
+        let (mut row, mut log_departures) = (0, 0.0);
         for element in &group.elements {
-            let mut linear = self.element(group, element, shared, own, &boards, true)?;
-            let tau = self.departure(element);
-            whiten(&linear.h, tau, &mut linear.shared);
-            whiten(&linear.h, tau, &mut linear.own);
-            let count = element.sights.len();
-            jacobian.shared.rows_mut(row, count).copy_from(&linear.shared);
-            jacobian.own.rows_mut(row, count).copy_from(&linear.own);
-            row += count;
+            let linear = self.element(element, shared, own, &boards)?;
+            let rows = row..row + element.sights.len();
+            let weight = linear.weight(self.departure(element));
+            residuals.as_mut_slice()[rows.clone()].copy_from_slice((-&linear.y).as_slice());
+            if let Some(weight) = &weight {
+                weight.apply(&mut residuals.as_mut_slice()[rows.clone()]);
+                log_departures += weight.log_determinant;
+            }
+            if let Some(jacobian) = &mut jacobian {
+                self.differentiate(group, element, &boards, &linear, jacobian, row);
+                if let Some(weight) = &weight {
+                    let matrices = [&mut jacobian.shared, &mut jacobian.own];
+                    for column in matrices
+                        .into_iter()
+                        .flat_map(|m| m.as_mut_slice().chunks_exact_mut(count))
+                    {
+                        weight.apply(&mut column[rows.clone()]);
+                    }
+                }
+            }
+            row = rows.end;
         }
-        for (i, facet) in group.facets.iter().enumerate() {
-            if !facet.bare.distances.is_empty() {
-                let shape = Self::shape(own, i)?;
-                let (_, derivative) = self.bare(&facet.bare, &shape, shared.numbers(0)?)?;
+        for (i, facet) in bare() {
+            let (residual, derivative) = self.bare(&facet.bare, &Self::shape(own, i)?, shared.numbers(0)?)?;
+            residuals[row] = residual;
+            if let Some(jacobian) = &mut jacobian {
                 let by_common = &facet.bare.common / facet.bare.sd;
                 jacobian
                     .shared
@@ -592,10 +377,37 @@ impl GroupedProblem for Joint<'_> {
                 for (column, value) in derivative.iter().enumerate() {
                     jacobian.own[(row, i * FACET_PARAMETERS + column)] = *value;
                 }
-                row += 1;
             }
+            row += 1;
         }
-        Some(jacobian)
+        Some(At {
+            residuals,
+            jacobian,
+            log_departures,
+        })
+    }
+}
+
+impl GroupedProblem for Joint<'_> {
+    fn groups(&self) -> usize {
+        self.groups.len()
+    }
+
+    fn residuals(&self, group: usize, shared: &Point, own: &Point) -> Option<DVector<f64>> {
+        Some(self.at(group, shared, own, false)?.residuals)
+    }
+
+    fn jacobian(&self, group: usize, shared: &Point, own: &Point) -> Option<GroupJacobian> {
+        self.at(group, shared, own, true)?.jacobian
+    }
+
+    fn linearized(&self, group: usize, shared: &Point, own: &Point) -> Option<GroupRows> {
+        let at = self.at(group, shared, own, true)?;
+        Some(GroupRows {
+            residuals: at.residuals,
+            jacobian: at.jacobian?,
+            log_covariance: at.log_departures,
+        })
     }
 }
 

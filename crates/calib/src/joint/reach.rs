@@ -6,7 +6,8 @@
 //! Applications", 1988, section 6.1): it rises by k² over k standard deviations as far as the problem is linear, and by
 //! k²(1 ± 1/q)² where it bends, with q = δ̂ over the standard deviation.
 
-use super::problem::{Element, Fan, Joint, Linear};
+use super::linear::Linear;
+use super::problem::{Element, Joint};
 use crate::least_squares::{self, GroupJacobian, GroupedProblem, Point, Solution};
 use catoptric_model::frame;
 use nalgebra::{DVector, Matrix2, Vector2, Vector3};
@@ -74,15 +75,13 @@ impl Joint<'_> {
     fn weakest<'a>(&'a self, solution: &'a Solution) -> BTreeMap<(usize, usize), Weakest<'a>> {
         let information = &solution.information;
         let mut weakest: BTreeMap<(usize, usize), Weakest> = BTreeMap::new();
-        for (group, facet, element, fan, linear) in self.linearized(&solution.state) {
-            let Some(by) = self.dependence(facet, &fan, &linear) else {
+        for at in self.linearized(&solution.state) {
+            let (group, facet, linear) = (at.group, at.facet, &at.linear);
+            let Some(by) = self.dependence(facet, linear, &at.by) else {
                 continue;
             };
-            let rows = self
-                .among_all(information.dimension(), group, &by)
-                .rows(0, 2)
-                .into_owned();
-            let Some(c) = information.covariance_of(&rows) else {
+            let (by_shared, by_own) = (by.shared.rows(0, 2).into_owned(), by.own.rows(0, 2).into_owned());
+            let Some(c) = information.covariance_within(group, &by_shared, &by_own) else {
                 continue;
             };
             let eigen = Matrix2::new(c[(0, 0)], c[(0, 1)], c[(1, 0)], c[(1, 1)]).symmetric_eigen();
@@ -95,10 +94,15 @@ impl Joint<'_> {
                 weakest.insert(
                     place,
                     Weakest {
-                        element,
+                        element: at.element,
                         sd,
                         axis: across.into_inner() * along[0] + up.into_inner() * along[1],
-                        combination: rows.transpose() * along,
+                        combination: self.among_all(
+                            information.dimension(),
+                            group,
+                            &by_shared.tr_mul(&along),
+                            &by_own.tr_mul(&along),
+                        ),
                     },
                 );
             }
@@ -124,16 +128,16 @@ impl Joint<'_> {
 }
 
 impl Moved<'_> {
-    /// The element linearized, and how far from where it is to be, in parts of how closely it is held.
-    fn row(&self, shared: &Point, own: &Point) -> Option<(Linear, f64)> {
+    /// The element linearized, with the derivatives of its rows, and how far it is from where it is to be, in parts of how
+    /// closely it is held.
+    fn row(&self, shared: &Point, own: &Point) -> Option<(Linear, GroupJacobian, f64)> {
         let group = &self.joint.groups[self.group];
         let boards = self.joint.boards(group, shared, own)?;
-        let linear = self
-            .joint
-            .element(group, self.element, shared, own, &boards, true)?;
+        let linear = self.joint.element(self.element, shared, own, &boards)?;
+        let by = self.joint.derivatives(group, self.element, &boards, &linear);
         let angle = libm::asin(linear.v.dot(&self.axis).clamp(-1.0, 1.0));
         let off = (angle - self.to) / self.held;
-        Some((linear, off))
+        Some((linear, by, off))
     }
 }
 
@@ -147,7 +151,7 @@ impl GroupedProblem for Moved<'_> {
         if group != self.group {
             return Some(residuals);
         }
-        let (_, off) = self.row(shared, own)?;
+        let (.., off) = self.row(shared, own)?;
         Some(residuals.push(off))
     }
 
@@ -156,10 +160,8 @@ impl GroupedProblem for Moved<'_> {
         if group != self.group {
             return Some(jacobian);
         }
-        let (linear, _) = self.row(shared, own)?;
-        let facet = self.element.facet?;
-        let fan = Fan::of(self.element, &Joint::shape(own, facet)?, &self.joint.flatness)?;
-        let by = self.joint.dependence(facet, &fan, &linear)?;
+        let (linear, by, _) = self.row(shared, own)?;
+        let by = self.joint.dependence(self.element.facet?, &linear, &by)?;
         let (across, up) = frame::tangent_basis(&linear.v);
         let cos = (1.0 - linear.v.dot(&self.axis).powi(2)).sqrt();
         let along = Vector2::new(across.dot(&self.axis), up.dot(&self.axis)) / (cos * self.held);

@@ -8,8 +8,10 @@
 //! Columns are first brought to length 1, so one threshold tells dependence in any units. A damped problem, with rows
 //! √μ·D below, starts from the triangles and not from J: its cost does not depend on the number of residuals.
 
-use super::qr::PivotedQr;
+use super::problem::{GroupJacobian, ProblemError};
+use super::qr::{PivotedQr, dot};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// Rows of one group: own columns, shared columns, right side.
 #[derive(Debug, Clone)]
@@ -17,6 +19,44 @@ pub(super) struct Rows {
     pub(super) own: DMatrix<f64>,
     pub(super) shared: DMatrix<f64>,
     pub(super) right: DVector<f64>,
+}
+
+impl Rows {
+    /// Rows of residuals f and their derivatives, as many columns as there are shared and own parameters.
+    pub(super) fn of_group(
+        group: usize,
+        f: &DVector<f64>,
+        jacobian: Option<GroupJacobian>,
+        [shared, own]: [usize; 2],
+    ) -> Result<Self, ProblemError> {
+        let part = jacobian
+            .filter(|j| is_finite(&j.shared) && is_finite(&j.own))
+            .ok_or(ProblemError::Undefined {
+                group,
+                place: "point reached",
+            })?;
+        for (parameters, matrix, columns) in [("shared", &part.shared, shared), ("own", &part.own, own)] {
+            if matrix.shape() != (f.len(), columns) {
+                return Err(ProblemError::Shape {
+                    group,
+                    parameters,
+                    rows: f.len(),
+                    columns,
+                    found_rows: matrix.nrows(),
+                    found_columns: matrix.ncols(),
+                });
+            }
+        }
+        Ok(Self {
+            own: part.own,
+            shared: part.shared,
+            right: -f,
+        })
+    }
+}
+
+fn is_finite(matrix: &DMatrix<f64>) -> bool {
+    matrix.iter().all(|v| v.is_finite())
 }
 
 /// The eliminated problem. Coordinates: shared, then each group's own.
@@ -48,75 +88,67 @@ impl Elimination {
     /// Eliminates; columns shorter than `threshold`, in parts of their whole length, count as dependent.
     pub(super) fn new(mut rows: Vec<Rows>, shared_width: usize, threshold: f64) -> Self {
         let scale = column_lengths(&rows, shared_width).map(|s| if s > 0.0 { s } else { 1.0 });
+        let shorten: Vec<f64> = scale.iter().map(|s| 1.0 / s).collect();
         let mut from = shared_width;
         for group in &mut rows {
-            divide(&mut group.shared, &scale.as_slice()[..shared_width]);
             let to = from + group.own.ncols();
-            divide(&mut group.own, &scale.as_slice()[from..to]);
+            scale_columns(&mut group.shared, &shorten[..shared_width]);
+            scale_columns(&mut group.own, &shorten[from..to]);
             from = to;
         }
-        Self::scaled(rows, &[], scale, shared_width, threshold)
+        Self::scaled(rows, scale, shared_width, threshold)
     }
 
     /// The problem with rows √μ·D of right side 0 added.
     pub(super) fn damped(&self, mu: f64, d: &DVector<f64>) -> Self {
-        let damping = d.component_div(&self.scale) * mu.sqrt();
-        let width = self.shared.width();
-        let mut from = width;
-        let rows = self
-            .groups
-            .iter()
-            .map(|group| {
-                let (count, rank) = (group.own.width(), group.own.rank);
-                let mut own = group.own.rows_in_order().resize_vertically(rank + count, 0.0);
-                for i in 0..count {
-                    own[(rank + i, i)] = damping[from + i];
-                }
-                from += count;
-                Rows {
-                    own,
-                    shared: group.coupling.clone().resize_vertically(rank + count, 0.0),
-                    right: group.right.clone().resize_vertically(rank + count, 0.0),
-                }
-            })
-            .collect();
-        let rank = self.shared.rank;
-        let mut below = self.shared.rows_in_order().resize_vertically(rank + width, 0.0);
-        for i in 0..width {
-            below[(rank + i, i)] = damping[i];
-        }
-        let right = self.shared_right.clone().resize_vertically(rank + width, 0.0);
-        Self::scaled(rows, &[(below, right)], self.scale.clone(), width, 0.0)
+        let same = DVector::from_element(d.len(), 1.0);
+        let rows = self.triangles(&same, &(d.component_div(&self.scale) * mu.sqrt()));
+        Self::scaled(rows, self.scale.clone(), self.shared.width(), 0.0)
     }
 
-    fn scaled(
-        rows: Vec<Rows>,
-        more: &[(DMatrix<f64>, DVector<f64>)],
-        scale: DVector<f64>,
-        shared_width: usize,
-        threshold: f64,
-    ) -> Self {
-        let mut groups = Vec::with_capacity(rows.len());
-        let mut rest = Vec::with_capacity(rows.len() + more.len());
-        for group in rows {
-            let (height, columns) = (group.own.nrows(), group.own.ncols());
-            let mut carried = group.shared.resize_horizontally(shared_width + 1, 0.0);
-            carried.set_column(shared_width, &group.right);
-            let (own, carried) = Triangle::of(group.own, carried, threshold);
-            debug_assert_eq!(own.width(), columns);
-            let (rank, left) = (own.rank, height - own.rank);
-            groups.push(Eliminated {
-                coupling: carried.view((0, 0), (rank, shared_width)).into_owned(),
-                right: carried.view((0, shared_width), (rank, 1)).column(0).into_owned(),
+    /// The problem with its columns multiplied by factors, and with a row of right side 0 for each weight that is not 0.
+    pub(super) fn changed(&self, factors: &DVector<f64>, weights: &DVector<f64>, threshold: f64) -> Self {
+        let rows = self.triangles(factors, &weights.component_div(&self.scale));
+        let mut changed = Self::new(rows, self.shared.width(), threshold);
+        changed.scale.component_mul_assign(&self.scale);
+        changed
+    }
+
+    /// The triangles as rows of a problem in scaled parameters, changed as [`changed`](Self::changed) says; last those of
+    /// the shared parameters, as a group that owns nothing.
+    fn triangles(&self, factors: &DVector<f64>, weights: &DVector<f64>) -> Vec<Rows> {
+        let width = self.shared.width();
+        let (factors, weights) = (factors.as_slice(), weights.as_slice());
+        let mut from = width;
+        let mut all = Vec::with_capacity(self.groups.len() + 1);
+        for group in &self.groups {
+            let to = from + group.own.width();
+            let own = group.own.rows_in_order(&factors[from..to], &weights[from..to]);
+            let mut coupling = group.coupling.clone();
+            scale_columns(&mut coupling, &factors[..width]);
+            all.push(Rows {
+                shared: coupling.resize_vertically(own.nrows(), 0.0),
+                right: group.right.clone().resize_vertically(own.nrows(), 0.0),
                 own,
             });
-            rest.push(carried.rows(rank, left).into_owned());
+            from = to;
         }
-        for (matrix, right) in more {
-            let mut both = matrix.clone().resize_horizontally(shared_width + 1, 0.0);
-            both.set_column(shared_width, right);
-            rest.push(both);
-        }
+        let shared = self.shared.rows_in_order(&factors[..width], &weights[..width]);
+        all.push(Rows {
+            own: DMatrix::zeros(shared.nrows(), 0),
+            right: self.shared_right.clone().resize_vertically(shared.nrows(), 0.0),
+            shared,
+        });
+        all
+    }
+
+    fn scaled(rows: Vec<Rows>, scale: DVector<f64>, shared_width: usize, threshold: f64) -> Self {
+        let eliminate = |group: Rows| Eliminated::of(group, shared_width, threshold);
+        let (groups, rest): (Vec<_>, Vec<_>) = if rows.len() < 2 {
+            rows.into_iter().map(eliminate).unzip()
+        } else {
+            rows.into_par_iter().with_max_len(1).map(eliminate).unzip()
+        };
         let height = rest.iter().map(DMatrix::nrows).sum();
         let mut all = DMatrix::zeros(height, shared_width + 1);
         let mut row = 0;
@@ -173,13 +205,45 @@ impl Elimination {
         let mut from = self.shared.width();
         for group in &self.groups {
             let width = group.own.width();
-            let part = group.own.solve_transposed(&g.rows(from, width).into_owned());
-            rest -= group.coupling.transpose() * &part;
-            z.extend_from_slice(part.as_slice());
+            let of_group = &g.as_slice()[from..from + width];
+            if of_group.iter().all(|v| *v == 0.0) {
+                z.resize(z.len() + group.own.rank, 0.0);
+            } else {
+                let part = group.own.solve_transposed(of_group);
+                rest -= group.coupling.tr_mul(&part);
+                z.extend_from_slice(part.as_slice());
+            }
             from += width;
         }
-        z.extend_from_slice(self.shared.solve_transposed(&rest).as_slice());
+        z.extend_from_slice(self.shared.solve_transposed(rest.as_slice()).as_slice());
         DVector::from_vec(z)
+    }
+
+    /// The part of z of [`half_solve`](Self::half_solve) that is not 0 for a g of shared and one group's own parameters: that
+    /// of the group, then that of what is shared.
+    pub(super) fn half_solve_within(&self, group: usize, shared: &[f64], own: &[f64]) -> DVector<f64> {
+        let width = self.shared.width();
+        let from = width + self.own_widths().take(group).sum::<usize>();
+        let scaled = |g: &[f64], from: usize| {
+            let lengths = &self.scale.as_slice()[from..];
+            DVector::from_iterator(g.len(), g.iter().zip(lengths).map(|(g, s)| g / s))
+        };
+        let group = &self.groups[group];
+        let part = group.own.solve_transposed(scaled(own, from).as_slice());
+        let rest = scaled(shared, 0) - group.coupling.tr_mul(&part);
+        let mut z = part.as_slice().to_vec();
+        z.extend_from_slice(self.shared.solve_transposed(rest.as_slice()).as_slice());
+        DVector::from_vec(z)
+    }
+
+    /// Number of own parameters of each group.
+    pub(super) fn own_widths(&self) -> impl Iterator<Item = usize> + '_ {
+        self.groups.iter().map(|g| g.own.width())
+    }
+
+    /// Number of shared parameters.
+    pub(super) fn shared_width(&self) -> usize {
+        self.shared.width()
     }
 
     /// (JᵀJ)⁻¹g from z of [`half_solve`](Self::half_solve), with 0 for dependent columns.
@@ -251,6 +315,23 @@ impl Elimination {
     }
 }
 
+impl Eliminated {
+    /// The group without its own parameters, and the rows that are left of it: shared columns, right side.
+    fn of(group: Rows, shared_width: usize, threshold: f64) -> (Self, DMatrix<f64>) {
+        let height = group.own.nrows();
+        let mut carried = group.shared.resize_horizontally(shared_width + 1, 0.0);
+        carried.set_column(shared_width, &group.right);
+        let (own, carried) = Triangle::of(group.own, carried, threshold);
+        let rank = own.rank;
+        let eliminated = Self {
+            coupling: carried.view((0, 0), (rank, shared_width)).into_owned(),
+            right: carried.view((0, shared_width), (rank, 1)).column(0).into_owned(),
+            own,
+        };
+        (eliminated, carried.rows(rank, height - rank).into_owned())
+    }
+}
+
 impl Triangle {
     fn of(matrix: DMatrix<f64>, carried: DMatrix<f64>, threshold: f64) -> (Self, DMatrix<f64>) {
         let qr = PivotedQr::new(matrix, carried);
@@ -267,20 +348,35 @@ impl Triangle {
         self.order.len()
     }
 
-    /// R with its columns in the order of the matrix.
-    fn rows_in_order(&self) -> DMatrix<f64> {
-        let mut rows = DMatrix::zeros(self.rank, self.width());
+    /// R with its columns in the order of the matrix, multiplied by factors, and below a row for each weight that is not 0.
+    fn rows_in_order(&self, factors: &[f64], weights: &[f64]) -> DMatrix<f64> {
+        let weighted = weights.iter().enumerate().filter(|(_, w)| **w != 0.0);
+        let mut rows = DMatrix::zeros(self.rank + weighted.clone().count(), self.width());
         for (place, column) in self.order.iter().enumerate() {
-            rows.set_column(*column, &self.r.column(place));
+            let part = self.r.column(place) * factors[*column];
+            rows.view_mut((0, *column), (self.rank, 1)).copy_from(&part);
+        }
+        for (i, (column, weight)) in weighted.enumerate() {
+            rows[(self.rank + i, column)] = *weight;
         }
         rows
     }
 
+    /// The columns of the square part of R, which are those of as many independent parameters.
+    fn columns(&self) -> impl DoubleEndedIterator<Item = &[f64]> + ExactSizeIterator {
+        // A rank of 0 has no columns, yet chunks must not be empty.
+        self.r.as_slice().chunks_exact(self.rank.max(1)).take(self.rank)
+    }
+
     fn back_substitute(&self, right: &DVector<f64>) -> DVector<f64> {
         let mut x = right.clone();
-        for i in (0..self.rank).rev() {
-            let sum: f64 = (i + 1..self.rank).map(|j| self.r[(i, j)] * x[j]).sum();
-            x[i] = (x[i] - sum) / self.r[(i, i)];
+        let x_of = x.as_mut_slice();
+        for (i, column) in self.columns().enumerate().rev() {
+            x_of[i] /= column[i];
+            let known = x_of[i];
+            for (x, r) in x_of[..i].iter_mut().zip(column) {
+                *x -= known * r;
+            }
         }
         x
     }
@@ -293,11 +389,11 @@ impl Triangle {
         x
     }
 
-    fn solve_transposed(&self, g: &DVector<f64>) -> DVector<f64> {
+    fn solve_transposed(&self, g: &[f64]) -> DVector<f64> {
         let mut z = DVector::zeros(self.rank);
-        for i in 0..self.rank {
-            let sum: f64 = (0..i).map(|j| self.r[(j, i)] * z[j]).sum();
-            z[i] = (g[self.order[i]] - sum) / self.r[(i, i)];
+        let z_of = z.as_mut_slice();
+        for (i, column) in self.columns().enumerate() {
+            z_of[i] = (g[self.order[i]] - dot(&column[..i], &z_of[..i])) / column[i];
         }
         z
     }
@@ -329,8 +425,8 @@ fn column_lengths(rows: &[Rows], shared_width: usize) -> DVector<f64> {
     DVector::from_vec(shared.chain(own).collect())
 }
 
-fn divide(matrix: &mut DMatrix<f64>, lengths: &[f64]) {
-    for (mut column, length) in matrix.column_iter_mut().zip(lengths) {
-        column /= *length;
+fn scale_columns(matrix: &mut DMatrix<f64>, factors: &[f64]) {
+    for (mut column, factor) in matrix.column_iter_mut().zip(factors) {
+        column *= *factor;
     }
 }

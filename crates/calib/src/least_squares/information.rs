@@ -107,6 +107,52 @@ impl Information {
         Some(DMatrix::from_fn(count, count, |i, j| halves[i].dot(&halves[j])))
     }
 
+    /// [`covariance_of`](Self::covariance_of) combinations of the shared parameters and of one group's own: the same without
+    /// the zeros of all other groups.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such group, or the columns are not its.
+    pub fn covariance_within(
+        &self,
+        group: usize,
+        shared: &DMatrix<f64>,
+        own: &DMatrix<f64>,
+    ) -> Option<DMatrix<f64>> {
+        assert_eq!(
+            shared.ncols(),
+            self.linear.shared_width(),
+            "one column for each shared parameter"
+        );
+        assert_eq!(
+            Some(own.ncols()),
+            self.linear.own_widths().nth(group),
+            "one column for each own parameter"
+        );
+        if self.rank() < self.dimension() && self.opens(group, shared, own) {
+            return None;
+        }
+        let (shared, own) = (shared.transpose(), own.transpose());
+        let halves: Vec<_> = shared
+            .column_iter()
+            .zip(own.column_iter())
+            .map(|(s, o)| self.linear.half_solve_within(group, s.as_slice(), o.as_slice()))
+            .collect();
+        let count = halves.len();
+        Some(DMatrix::from_fn(count, count, |i, j| halves[i].dot(&halves[j])))
+    }
+
+    /// Whether one of the combinations is open.
+    fn opens(&self, group: usize, shared: &DMatrix<f64>, own: &DMatrix<f64>) -> bool {
+        let from = shared.ncols() + self.linear.own_widths().take(group).sum::<usize>();
+        let mut all = DVector::zeros(self.dimension());
+        (0..own.nrows()).any(|row| {
+            all.rows_mut(0, shared.ncols()).tr_copy_from(&shared.row(row));
+            all.rows_mut(from, own.ncols()).tr_copy_from(&own.row(row));
+            self.is_open(&all)
+        })
+    }
+
     /// The likeliest change of all parameters that changes g·x by one standard deviation: (JᵀJ)⁻¹g/√(gᵀ(JᵀJ)⁻¹g).
     ///
     /// ‖J·step‖ = 1. `None` if g·x is open, or g is zero.

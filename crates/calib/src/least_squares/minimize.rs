@@ -9,6 +9,7 @@ use super::information::Information;
 use super::problem::{GroupedProblem, ProblemError, State};
 use super::trust_region;
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 /// Columns shorter than this part of their length are left out of a step.
 const STEP_THRESHOLD: f64 = 1e-14;
@@ -132,39 +133,6 @@ pub fn minimize<P: GroupedProblem>(
         stop,
         iterations: search.iterations,
         evaluations: search.evaluations,
-        information: Information::new(linear),
-    })
-}
-
-/// A problem linearized at a state.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Linearized {
-    /// The step to the linear problem's minimum: Gauss and Newton's.
-    pub step: DVector<f64>,
-    /// ‖f + J·step‖².
-    pub least_sum_of_squares: f64,
-    /// JᵀJ at the state.
-    pub information: Information,
-}
-
-/// Linearizes at a state, without moving.
-///
-/// # Errors
-///
-/// As [`minimize`], of the state.
-pub fn linearize<P: GroupedProblem>(problem: &P, state: &State) -> Result<Linearized, ProblemError> {
-    let residuals = evaluate(problem, state).map_err(|group| ProblemError::Undefined {
-        group,
-        place: "point reached",
-    })?;
-    let rows = rows(problem, state, &residuals)?;
-    let linear = Elimination::new(rows, state.shared.dimension(), Options::default().rank_threshold);
-    let step = linear.solve();
-    // Perpendicular to what the step explains.
-    let least_sum_of_squares = (norm(&residuals).powi(2) - linear.image_norm(&step).powi(2)).max(0.0);
-    Ok(Linearized {
-        step,
-        least_sum_of_squares,
         information: Information::new(linear),
     })
 }
@@ -312,20 +280,30 @@ impl Slope {
     }
 }
 
-fn norm(residuals: &[DVector<f64>]) -> f64 {
+pub(super) fn norm(residuals: &[DVector<f64>]) -> f64 {
     residuals.iter().map(|r| r.norm_squared()).sum::<f64>().sqrt()
+}
+
+/// Something of each group, side by side; of several errors that of the first group.
+pub(super) fn of_groups<T: Send, E: Send>(
+    groups: usize,
+    one: impl Fn(usize) -> Result<T, E> + Send + Sync,
+) -> Result<Vec<T>, E> {
+    if groups < 2 {
+        return (0..groups).map(one).collect();
+    }
+    let all: Vec<Result<T, E>> = (0..groups).into_par_iter().with_max_len(1).map(one).collect();
+    all.into_iter().collect()
 }
 
 /// Residuals of all groups, or the group where they are undefined or not finite.
 fn evaluate<P: GroupedProblem>(problem: &P, state: &State) -> Result<Vec<DVector<f64>>, usize> {
-    (0..problem.groups())
-        .map(|group| {
-            problem
-                .residuals(group, &state.shared, state.own(group))
-                .filter(|r| r.norm_squared().is_finite())
-                .ok_or(group)
-        })
-        .collect()
+    of_groups(problem.groups(), |group| {
+        problem
+            .residuals(group, &state.shared, state.own(group))
+            .filter(|r| r.norm_squared().is_finite())
+            .ok_or(group)
+    })
 }
 
 /// Rows of all groups, with −f on the right.
@@ -334,37 +312,10 @@ fn rows<P: GroupedProblem>(
     state: &State,
     residuals: &[DVector<f64>],
 ) -> Result<Vec<Rows>, ProblemError> {
-    let shared_columns = state.shared.dimension();
-    let mut all = Vec::with_capacity(residuals.len());
-    for (group, f) in residuals.iter().enumerate() {
+    of_groups(residuals.len(), |group| {
         let own = state.own(group);
-        let part = problem
-            .jacobian(group, &state.shared, own)
-            .filter(|j| j.shared.iter().chain(j.own.iter()).all(|v| v.is_finite()))
-            .ok_or(ProblemError::Undefined {
-                group,
-                place: "point reached",
-            })?;
-        for (parameters, matrix, columns) in [
-            ("shared", &part.shared, shared_columns),
-            ("own", &part.own, own.dimension()),
-        ] {
-            if matrix.shape() != (f.len(), columns) {
-                return Err(ProblemError::Shape {
-                    group,
-                    parameters,
-                    rows: f.len(),
-                    columns,
-                    found_rows: matrix.nrows(),
-                    found_columns: matrix.ncols(),
-                });
-            }
-        }
-        all.push(Rows {
-            own: part.own,
-            shared: part.shared,
-            right: -f,
-        });
-    }
-    Ok(all)
+        let jacobian = problem.jacobian(group, &state.shared, own);
+        let columns = [state.shared.dimension(), own.dimension()];
+        Rows::of_group(group, &residuals[group], jacobian, columns)
+    })
 }

@@ -38,6 +38,7 @@
 
 mod elimination;
 mod information;
+mod linearized;
 mod loss;
 mod manifold;
 mod minimize;
@@ -48,10 +49,11 @@ mod robust;
 mod trust_region;
 
 pub use information::Information;
+pub use linearized::{Linearized, Reduced, linearize};
 pub use loss::{Loss, gate};
 pub use manifold::{Block, Point};
-pub use minimize::{Linearized, Options, Solution, Stop, linearize, minimize};
+pub use minimize::{Options, Solution, Stop, minimize};
 pub use prior::{Prior, WithPriors};
-pub use problem::{Flat, GroupJacobian, GroupedProblem, Problem, ProblemError, State};
+pub use problem::{Flat, GroupJacobian, GroupRows, GroupedProblem, Problem, ProblemError, State};
 pub use qr::PivotedQr;
 pub use robust::{RobustOptions, RobustSolution, Surrogate, minimize_graduated, minimize_robust};

@@ -1,7 +1,7 @@
 //! Gaussian priors as rows: L·(x ⊟ x̄), LᵀL the inverse covariance of a block about its mean.
 
 use super::manifold::{Block, Point};
-use super::problem::{GroupJacobian, GroupedProblem};
+use super::problem::{GroupJacobian, GroupRows, GroupedProblem};
 use nalgebra::{DMatrix, DVector};
 
 /// What is believed of one block before any residual.
@@ -91,6 +91,19 @@ impl<P> WithPriors<'_, P> {
     fn own(&self, group: usize) -> &[Prior] {
         self.own.get(group).map_or(&[], Vec::as_slice)
     }
+
+    /// What is measured of a group, with its priors as the last rows.
+    fn residuals_below(&self, group: usize, own: &Point, measured: DVector<f64>) -> DVector<f64> {
+        let priors = self.own(group).iter().map(|p| p.residuals(own));
+        stacked(std::iter::once(measured).chain(priors))
+    }
+
+    fn jacobian_below(&self, group: usize, own: &Point, measured: GroupJacobian) -> GroupJacobian {
+        let priors = self.own(group).iter().map(|p| p.jacobian(own));
+        let own = below(own.dimension(), std::iter::once(measured.own).chain(priors));
+        let shared = measured.shared.resize_vertically(own.nrows(), 0.0);
+        GroupJacobian { shared, own }
+    }
 }
 
 impl<P: GroupedProblem> GroupedProblem for WithPriors<'_, P> {
@@ -102,9 +115,7 @@ impl<P: GroupedProblem> GroupedProblem for WithPriors<'_, P> {
         if group == self.problem.groups() {
             return Some(stacked(self.shared.iter().map(|p| p.residuals(shared))));
         }
-        let measured = self.problem.residuals(group, shared, own)?;
-        let priors = self.own(group).iter().map(|p| p.residuals(own));
-        Some(stacked(std::iter::once(measured).chain(priors)))
+        Some(self.residuals_below(group, own, self.problem.residuals(group, shared, own)?))
     }
 
     fn jacobian(&self, group: usize, shared: &Point, own: &Point) -> Option<GroupJacobian> {
@@ -113,11 +124,23 @@ impl<P: GroupedProblem> GroupedProblem for WithPriors<'_, P> {
             let own = DMatrix::zeros(all.nrows(), own.dimension());
             return Some(GroupJacobian { shared: all, own });
         }
-        let measured = self.problem.jacobian(group, shared, own)?;
-        let priors = self.own(group).iter().map(|p| p.jacobian(own));
-        let own = below(own.dimension(), std::iter::once(measured.own).chain(priors));
-        let shared = measured.shared.resize_vertically(own.nrows(), 0.0);
-        Some(GroupJacobian { shared, own })
+        Some(self.jacobian_below(group, own, self.problem.jacobian(group, shared, own)?))
+    }
+
+    fn linearized(&self, group: usize, shared: &Point, own: &Point) -> Option<GroupRows> {
+        if group == self.problem.groups() {
+            return Some(GroupRows {
+                residuals: self.residuals(group, shared, own)?,
+                jacobian: self.jacobian(group, shared, own)?,
+                log_covariance: 0.0,
+            });
+        }
+        let measured = self.problem.linearized(group, shared, own)?;
+        Some(GroupRows {
+            residuals: self.residuals_below(group, own, measured.residuals),
+            jacobian: self.jacobian_below(group, own, measured.jacobian),
+            log_covariance: measured.log_covariance,
+        })
     }
 
     fn measured_rows(&self, group: usize, rows: usize) -> usize {

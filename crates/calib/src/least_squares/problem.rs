@@ -11,7 +11,7 @@ use thiserror::Error;
 ///
 /// Residuals are best given in units of their standard deviations: then covariances need no further factor. A residual
 /// function that is undefined at a point (a ray that misses its board) returns `None`; the solver then tries nearer.
-pub trait Problem {
+pub trait Problem: Sync {
     /// f(x), m numbers; the same m at every point.
     fn residuals(&self, at: &Point) -> Option<DVector<f64>>;
     /// ∂f(x ⊞ δ)/∂δ at δ = 0, m × n, with n the dimension of the point's tangent space.
@@ -27,16 +27,36 @@ pub struct GroupJacobian {
     pub own: DMatrix<f64>,
 }
 
+/// One group of residuals linearized.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupRows {
+    /// f, m numbers.
+    pub residuals: DVector<f64>,
+    /// Its derivatives.
+    pub jacobian: GroupJacobian,
+    /// ln det of the covariance that the residuals were divided by the root of, 0 for one that is never compared with
+    /// another.
+    pub log_covariance: f64,
+}
+
 /// Residuals in groups, each depending on the shared parameters and on the group's own.
 ///
-/// Every [`Problem`] is one: a single group that owns nothing.
-pub trait GroupedProblem {
+/// Every [`Problem`] is one: a single group that owns nothing. Groups are worked at side by side, in any order.
+pub trait GroupedProblem: Sync {
     /// Number of groups.
     fn groups(&self) -> usize;
     /// Residuals of one group; see [`Problem::residuals`].
     fn residuals(&self, group: usize, shared: &Point, own: &Point) -> Option<DVector<f64>>;
     /// Derivatives of one group; see [`Problem::jacobian`].
     fn jacobian(&self, group: usize, shared: &Point, own: &Point) -> Option<GroupJacobian>;
+    /// Both at a point.
+    fn linearized(&self, group: usize, shared: &Point, own: &Point) -> Option<GroupRows> {
+        Some(GroupRows {
+            residuals: self.residuals(group, shared, own)?,
+            jacobian: self.jacobian(group, shared, own)?,
+            log_covariance: 0.0,
+        })
+    }
     /// How many rows of a group, counted from its first, are measurements that a robust loss may doubt.
     ///
     /// The others (priors, by convention the last) always keep their full weight.

@@ -116,12 +116,27 @@ fn reflect(column: &mut [f64]) -> Option<Reflection> {
 
 impl Reflection {
     fn apply(&self, v: &[f64], other: &mut [f64]) {
-        let product: f64 = v.iter().zip(other.iter()).map(|(a, b)| a * b).sum();
-        let factor = product / self.gamma;
+        let factor = dot(v, other) / self.gamma;
         for (o, v) in other.iter_mut().zip(v) {
             *o -= factor * v;
         }
     }
+}
+
+/// Sums that a product is added up in side by side: one sum has to wait for each addition before the next.
+const SUMS: usize = 8;
+
+/// a·b.
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<SUMS>(), b.as_chunks::<SUMS>());
+    let mut sums = [0.0; SUMS];
+    for (a, b) in a.iter().zip(b) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
+    }
+    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f64>() + rest
 }
 
 fn longest(lengths: &[f64], from: usize) -> usize {
@@ -134,11 +149,17 @@ fn longest(lengths: &[f64], from: usize) -> usize {
     best
 }
 
+/// Largest elements of a vector whose squares neither overflow nor lose what matters of their sum.
+const SQUARED_SAFELY: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
+
 /// Length of a vector that neither overflows nor loses what is small.
 fn norm(values: &[f64]) -> f64 {
     let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     if largest == 0.0 || !largest.is_finite() {
         return largest;
+    }
+    if SQUARED_SAFELY.contains(&largest) {
+        return dot(values, values).sqrt();
     }
     largest * values.iter().map(|v| (v / largest).powi(2)).sum::<f64>().sqrt()
 }

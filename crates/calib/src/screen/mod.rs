@@ -6,10 +6,10 @@ mod near;
 mod tally;
 
 use crate::common::CommonErrors;
-use crate::covariance::MountUncertainty;
 use crate::observations::BoardInSensor;
 use crate::pose::Mount;
 use catoptric_model::{Dataset, Pose, Summary};
+use nalgebra::Matrix6;
 
 pub use near::{EDGE_BEAMS, facets_near};
 
@@ -28,7 +28,8 @@ pub enum Candidate {
 pub struct Screen<'a> {
     dataset: &'a Dataset,
     summaries: &'a [Vec<Summary>],
-    mount: &'a MountUncertainty,
+    /// Covariance of the mounting.
+    mount: Matrix6<f64>,
     common: CommonErrors<'a>,
     boards: &'a [Option<BoardInSensor>],
     rooms_from_sensor: Vec<Pose>,
@@ -45,7 +46,7 @@ impl<'a> Screen<'a> {
         Self {
             dataset,
             summaries,
-            mount: &mount.uncertainty,
+            mount: mount.uncertainty.total(),
             common: CommonErrors::of(&dataset.session),
             boards,
             rooms_from_sensor: dataset

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use num_dual::{Dual64, DualNumCopy};
 
 /// Residuals as a function that does not care what kind of number it is given.
-pub(crate) trait Formula {
+pub(crate) trait Formula: Sync {
     fn residuals<D: DualNumCopy<Primitive = f64>>(&self, b: &[D]) -> Vec<D>;
 }
 

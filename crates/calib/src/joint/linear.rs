@@ -1,0 +1,273 @@
+//! One element at a point: what it should read of its boards, how far it departs from its facet, and how that changes.
+
+use super::problem::{BOARD_ERRORS, Element, FACET_PARAMETERS, FIGURE_ORDERS, Fan, Group, Joint};
+use crate::covariance::PlaneFit;
+use crate::jacobian;
+use crate::least_squares::{GroupJacobian, Point};
+use catoptric_model::bias::ColoredBias;
+use catoptric_model::{BoardPlane, frame};
+use nalgebra::{DVector, Dyn, Matrix2, Matrix3, OMatrix, Point3, U2, U6, Unit, Vector2, Vector3};
+
+/// Step of (range, cosine) over which a bias is differentiated: tables are linear over centimeters and degrees.
+const BIAS_STEP: f64 = 1e-4;
+
+/// Rounds in which a beam's own departure settles, and the change that ends them, in radians.
+const DEPARTURE_ROUNDS: usize = 8;
+const SETTLED: f64 = 1e-14;
+
+/// Boards of a group in the sensor frame, and how w moves the sensor.
+pub(super) struct Boards<'j> {
+    pub(super) placed: Vec<Placed<'j>>,
+    pub(super) motion: OMatrix<f64, U6, Dyn>,
+}
+
+/// A board in the sensor frame with its errors.
+pub(super) struct Placed<'j> {
+    pub(super) plane: BoardPlane,
+    pub(super) fit: PlaneFit,
+    /// Height error of each of three unit errors, by (1, x, y).
+    pub(super) errors: Matrix3<f64>,
+    /// Drift, in metres.
+    pub(super) drift: f64,
+    pub(super) paint: Paint<'j>,
+}
+
+/// The believed biases on one color.
+pub(super) struct Paint<'j> {
+    bias: ColoredBias<'j>,
+    /// Where the color stands among the common errors.
+    place: Option<usize>,
+}
+
+/// An element linearized: prediction errors, and derivatives of the predicted range.
+pub(super) struct Linear {
+    /// z − r̂ + Hδ, over the sights, each over its standard deviation.
+    pub(super) y: DVector<f64>,
+    /// Derivatives along the two axes of the departure, over the standard deviations.
+    pub(super) h: OMatrix<f64, Dyn, U2>,
+    /// The departure that fits best.
+    pub(super) delta: Vector2<f64>,
+    /// The two axes.
+    pub(super) axes: [Vector3<f64>; 2],
+    /// Exit direction.
+    pub(super) v: Unit<Vector3<f64>>,
+    /// What the facet makes of the beam.
+    pub(super) fan: Fan,
+    sightlines: Vec<Sightline>,
+}
+
+/// One board as the beam meets it.
+#[derive(Clone, Copy, Default)]
+struct Sightline {
+    /// Distance from the mirror to the board, and the cosine with its sign.
+    s: f64,
+    closing: f64,
+    /// Derivatives of the biased range with respect to the range and to that cosine; a departure does not change them.
+    by_range: f64,
+    by_closing: f64,
+    /// What one standard deviation of each common error adds.
+    common: [(usize, f64); 4],
+}
+
+/// (I + τ²HHᵀ)^(−½), the weight of the rows of an element that departs from its facet.
+pub(super) struct Weight<'l> {
+    h: &'l OMatrix<f64, Dyn, U2>,
+    inner: Matrix2<f64>,
+    /// ln det(I + τ²HᵀH).
+    pub(super) log_determinant: f64,
+}
+
+impl<'j> Paint<'j> {
+    pub(super) fn of(joint: &'j Joint, color: &str) -> Self {
+        Self {
+            bias: joint.bias.on(color),
+            place: joint.common.place(color),
+        }
+    }
+
+    /// Derivatives of the biased range with respect to the range and to the cosine of the incidence.
+    fn slopes(&self, range: f64, cos: f64) -> (f64, f64) {
+        let at = |range: f64, cos: f64| self.bias.terms(range, cos).total();
+        let slope = (at(range + BIAS_STEP, cos) - at(range - BIAS_STEP, cos)) / (2.0 * BIAS_STEP);
+        let (low, high) = ((cos - BIAS_STEP).max(0.0), (cos + BIAS_STEP).min(1.0));
+        (1.0 + slope, (at(range, high) - at(range, low)) / (high - low))
+    }
+}
+
+impl Linear {
+    /// Prediction errors that the departure leaves, over the standard deviations.
+    pub(super) fn rest(&self) -> DVector<f64> {
+        &self.y - &self.h * self.delta
+    }
+
+    /// The weight for departures of 1σ τ; `None` without any.
+    pub(super) fn weight(&self, tau: f64) -> Option<Weight<'_>> {
+        (tau > 0.0).then(|| {
+            let squares = self.h.tr_mul(&self.h) * (tau * tau);
+            let eigen = squares.symmetric_eigen();
+            // 1/√(1 + x) − 1 over x, without the difference of two near numbers.
+            let gain = eigen.eigenvalues.map(|x| {
+                let root = (1.0 + x.max(0.0)).sqrt();
+                -1.0 / (root * (1.0 + root))
+            });
+            let gain = Matrix2::from_diagonal(&gain);
+            Weight {
+                h: &self.h,
+                inner: eigen.eigenvectors * gain * eigen.eigenvectors.transpose() * (tau * tau),
+                log_determinant: libm::log((Matrix2::identity() + squares).determinant()),
+            }
+        })
+    }
+}
+
+impl Weight<'_> {
+    /// Weighs one column of the element's rows.
+    pub(super) fn apply(&self, column: &mut [f64]) {
+        let (across, up) = self.h.as_slice().split_at(column.len());
+        let product = |axis: &[f64]| -> f64 { axis.iter().zip(&*column).map(|(h, m)| h * m).sum() };
+        let part = self.inner * Vector2::new(product(across), product(up));
+        for ((m, a), u) in column.iter_mut().zip(across).zip(up) {
+            *m += a * part.x + u * part.y;
+        }
+    }
+}
+
+impl Joint<'_> {
+    /// An element at a point; `None` where it meets none of its boards.
+    pub(super) fn element(
+        &self,
+        element: &Element,
+        shared: &Point,
+        own: &Point,
+        boards: &Boards,
+    ) -> Option<Linear> {
+        let w = &shared.numbers(0)?.as_slice()[self.first_common..];
+        let fan = match element.facet {
+            Some(facet) => Fan::of(element, &Self::shape(own, facet)?, &self.flatness)?,
+            None => Fan {
+                v: element.u,
+                distance: 0.0,
+                turned: [Vector3::zeros(); 2],
+                moved: [0.0; 3],
+                orders: [0.0; FIGURE_ORDERS],
+            },
+        };
+        let origin = Point3::from(element.u.into_inner() * fan.distance);
+        let (across, up) = frame::tangent_basis(&fan.v);
+        let base = [across.into_inner(), up.into_inner()];
+        let rows = element.sights.len();
+        let tau = self.departure(element);
+        let mut delta = Vector2::<f64>::zeros();
+        let mut y = DVector::zeros(rows);
+        let mut h = OMatrix::<f64, Dyn, U2>::zeros(rows);
+        let (mut v, mut axes) = (fan.v, base);
+        let mut sightlines = vec![Sightline::default(); rows];
+        for round in 0..DEPARTURE_ROUNDS {
+            let q: Vector3<f64> = fan.v.into_inner() + base[0] * delta.x + base[1] * delta.y;
+            let length = q.norm();
+            v = Unit::new_unchecked(q / length);
+            axes = base.map(|a| (a - v.into_inner() * v.dot(&a)) / length);
+            for (row, (sight, line)) in element.sights.iter().zip(&mut sightlines).enumerate() {
+                let Placed {
+                    plane, paint, drift, ..
+                } = &boards.placed[sight.board];
+                line.s = plane.distance_along(&origin, &v)?;
+                line.closing = plane.normal.dot(&v);
+                let range = fan.distance + line.s;
+                let cos = line.closing.abs().min(1.0);
+                if round == 0 {
+                    let (by_range, by_cos) = paint.slopes(range, cos);
+                    line.by_range = by_range;
+                    line.by_closing = by_cos * line.closing.signum();
+                }
+                line.common = self.common.entries(range, cos, paint.place);
+                let common: f64 = line.common.iter().map(|(i, c)| c * w[*i]).sum();
+                let predicted = range + paint.bias.terms(range, cos).total() + common + drift;
+                let lever = line.lever() / sight.sd;
+                for (column, axis) in axes.iter().enumerate() {
+                    h[(row, column)] = lever * plane.normal.dot(axis);
+                }
+                y[row] = (sight.mean - predicted) / sight.sd;
+            }
+            y += &h * delta;
+            if tau == 0.0 {
+                break;
+            }
+            let inner = Matrix2::identity() + h.tr_mul(&h) * (tau * tau);
+            let next = inner.try_inverse()? * h.tr_mul(&y) * (tau * tau);
+            let change = (next - delta).norm();
+            delta = next;
+            if change < SETTLED || round + 1 == DEPARTURE_ROUNDS {
+                break;
+            }
+        }
+
+        Some(Linear {
+            y,
+            h,
+            delta,
+            axes,
+            v,
+            fan,
+            sightlines,
+        })
+    }
+
+    /// Derivatives of an element's predicted ranges over the standard deviations, written into as many rows of those of its
+    /// group, which are 0 so far.
+    pub(super) fn differentiate(
+        &self,
+        group: &Group,
+        element: &Element,
+        boards: &Boards,
+        linear: &Linear,
+        into: &mut GroupJacobian,
+        first_row: usize,
+    ) {
+        let Linear { fan, v, .. } = linear;
+        let origin = Point3::from(element.u.into_inner() * fan.distance);
+        for (i, (sight, line)) in element.sights.iter().zip(&linear.sightlines).enumerate() {
+            let row = first_row + i;
+            let board = &boards.placed[sight.board];
+            let n = board.plane.normal;
+            let weight = 1.0 / sight.sd;
+            let hit = origin + v.into_inner() * line.s;
+            let mut motion = jacobian::of_mount(&hit, &n, v) * line.by_range;
+            let turn: Vector3<f64> = -n.cross(v) * line.by_closing;
+            for axis in 0..3 {
+                motion[3 + axis] += turn[axis];
+            }
+            for (column, by_w) in boards.motion.column_iter().enumerate() {
+                into.shared[(row, column)] = motion.tr_dot(&by_w) * weight;
+            }
+            for (column, value) in &line.common {
+                into.shared[(row, self.first_common + column)] += value * weight;
+            }
+            if let Some(facet) = element.facet {
+                let first = facet * FACET_PARAMETERS;
+                let lever = line.lever();
+                for (column, dv) in fan.directions() {
+                    into.own[(row, first + column)] = lever * n.dot(&dv) * weight;
+                }
+                let by_distance = line.by_range * (1.0 - n.dot(&element.u) / line.closing);
+                for (column, moved) in fan.moved.iter().enumerate() {
+                    into.own[(row, first + column)] += by_distance * moved * weight;
+                }
+            }
+            let first = group.board_column(sight.board);
+            into.own[(row, first)] = self.drift_sd * weight;
+            let a = board.fit.coordinates(&hit);
+            for column in 0..BOARD_ERRORS - 1 {
+                let height = a.dot(&board.errors.column(column));
+                into.own[(row, first + 1 + column)] = line.by_range * height / line.closing * weight;
+            }
+        }
+    }
+}
+
+impl Sightline {
+    /// Change of the biased range with what a turn of the beam adds to the cosine.
+    fn lever(&self) -> f64 {
+        self.by_closing - self.by_range * self.s / self.closing
+    }
+}
