@@ -91,8 +91,8 @@ impl<const R: usize> Apart<R> {
             let (d, o) = (whole(simd, direction, row), whole(simd, &apart.offset, row));
             most = most.max(size(&o));
             let moment = cross(&d, &o);
-            for k in 0..3 {
-                moment[k].store_slice(&mut apart.moment[k].0[row]);
+            for (moment, rows) in moment.iter().zip(&mut apart.moment) {
+                moment.store_slice(&mut rows.0[row]);
             }
         }
         apart.spread = 1.001 * most.reduce_max();

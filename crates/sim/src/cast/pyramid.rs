@@ -166,8 +166,8 @@ impl Pyramid {
         let mut put = inlined(
             #[inline(always)]
             |place: usize, sign: f32, normal: [f32; 3]| {
-                for k in 0..3 {
-                    self.normal[k][place] = sign * normal[k];
+                for (row, coordinate) in self.normal.iter_mut().zip(normal) {
+                    row[place] = sign * coordinate;
                 }
             },
         );
@@ -189,8 +189,8 @@ impl Pyramid {
             },
         );
         let corners = [corner(0), corner(1), corner(2)];
-        for k in 0..3 {
-            corners[k].store_slice(&mut self.corners[k]);
+        for (corner, row) in corners.iter().zip(&mut self.corners) {
+            corner.store_slice(row);
         }
         let mut unbounded = [false; 3];
         for (axis, a, b) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {

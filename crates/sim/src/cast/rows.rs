@@ -86,10 +86,10 @@ impl<const R: usize> Rays<R> {
     /// Directions in f32.
     #[inline(always)]
     pub(super) fn narrow<S: Simd>(&self, simd: S, narrow: &mut Vectors<f32, R>) {
-        for k in 0..3 {
-            for row in 0..R {
-                let [low, high] = halves(simd, &self.direction[k].0[row]);
-                low.narrow(high).store_slice(&mut narrow[k].0[row]);
+        for (wide, narrow) in self.direction.iter().zip(narrow) {
+            for (wide, narrow) in wide.0.iter().zip(&mut narrow.0) {
+                let [low, high] = halves(simd, wide);
+                low.narrow(high).store_slice(narrow);
             }
         }
     }

@@ -53,15 +53,15 @@ impl World {
 
     /// What is no narrow cone may be two.
     fn cast_some(&self, level: Level, rays: &[Ray], left: Option<usize>, hits: &mut [Option<Hit>]) {
-        let done = match rays.len() {
-            0 => true,
-            1 => {
-                hits[0] = self.cast(&rays[0], left);
+        let done = match rays {
+            [] => true,
+            [ray] => {
+                hits[0] = self.cast(ray, left);
                 true
             }
-            ..=LANES => self.cast_in_rows::<1>(level, rays, left, hits),
-            ..=TWO_ROWS => self.cast_in_rows::<2>(level, rays, left, hits),
-            ..=FOUR_ROWS => self.cast_in_rows::<4>(level, rays, left, hits),
+            _ if rays.len() <= LANES => self.cast_in_rows::<1>(level, rays, left, hits),
+            _ if rays.len() <= TWO_ROWS => self.cast_in_rows::<2>(level, rays, left, hits),
+            _ if rays.len() <= FOUR_ROWS => self.cast_in_rows::<4>(level, rays, left, hits),
             _ => self.cast_in_rows::<ROWS>(level, rays, left, hits),
         };
         if !done {

@@ -105,15 +105,15 @@ impl Triangles {
 
     /// What is no narrow cone may be two.
     fn nearest_of_some(&self, level: Level, rays: &[Ray], met: &mut [Option<Met>]) {
-        let done = match rays.len() {
-            0 => true,
-            1 => {
-                met[0] = self.nearest_at(level, &rays[0]);
+        let done = match rays {
+            [] => true,
+            [ray] => {
+                met[0] = self.nearest_at(level, ray);
                 true
             }
-            ..=LANES => self.nearest_in_rows::<1>(level, rays, met),
-            ..=TWO_ROWS => self.nearest_in_rows::<2>(level, rays, met),
-            ..=FOUR_ROWS => self.nearest_in_rows::<4>(level, rays, met),
+            _ if rays.len() <= LANES => self.nearest_in_rows::<1>(level, rays, met),
+            _ if rays.len() <= TWO_ROWS => self.nearest_in_rows::<2>(level, rays, met),
+            _ if rays.len() <= FOUR_ROWS => self.nearest_in_rows::<4>(level, rays, met),
             _ => self.nearest_in_rows::<ROWS>(level, rays, met),
         };
         if !done {
