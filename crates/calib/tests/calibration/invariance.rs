@@ -18,6 +18,19 @@ fn shuffle<T>(list: &mut [T], draw: &mut Draw) {
 }
 
 #[test]
+fn the_number_of_threads_does_not_matter() {
+    let made = World::noisy(8).make();
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let solve = || calibrate(&made.dataset, Method::Joint, &Options::default());
+        pool.expect("threads are to be had")
+            .install(solve)
+            .expect("a sound dataset")
+    };
+    assert_eq!(with(1), with(3));
+}
+
+#[test]
 fn the_order_of_poses_and_facets_does_not_matter() {
     let mut made = World::noisy(7).make();
     let straight = solve(&made.dataset);

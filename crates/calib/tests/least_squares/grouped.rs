@@ -2,7 +2,8 @@
 
 use super::sample::Sample;
 use catoptric_calib::least_squares::{
-    Block, Flat, GroupJacobian, GroupedProblem, Options, Point, Prior, Problem, State, WithPriors, minimize,
+    Block, Flat, GroupJacobian, GroupedProblem, Options, Point, Prior, Problem, Reduced, State, WithPriors,
+    linearize, minimize,
 };
 use catoptric_model::Pose;
 use nalgebra::{DMatrix, DVector, Translation3, Unit, UnitQuaternion, Vector3};
@@ -196,6 +197,65 @@ fn the_step_along_a_combination_is_the_likeliest_that_changes_it_by_one_sd() {
     assert!((g.dot(&step) / sd - 1.0).abs() < 1e-9);
     assert!((step - &covariance * &g / sd).norm() < 1e-9 * (&covariance * &g / sd).norm());
     assert_eq!(found.information.step_along(&DVector::zeros(g.len())), None);
+}
+
+#[test]
+fn a_covariance_within_a_group_is_that_among_all() {
+    let (boards, truth) = Boards::simulated(6, 12, &mut Sample::new(13));
+    let mut sample = Sample::new(14);
+    let shared = DMatrix::from_fn(3, truth.shared.dimension(), |_, _| sample.normal());
+    let own = DMatrix::from_fn(3, 4, |_, _| sample.normal());
+    let problem = boards.with_priors();
+    let found = minimize(&problem, start(&truth), &Options::default()).expect("it is defined");
+    for group in 0..boards.boards.len() {
+        let mut all = DMatrix::zeros(3, truth.dimension());
+        all.columns_mut(0, shared.ncols()).copy_from(&shared);
+        all.columns_mut(shared.ncols() + 4 * group, 4).copy_from(&own);
+        let among = found.information.covariance_of(&all).expect("priors hold all");
+        let within = found
+            .information
+            .covariance_within(group, &shared, &own)
+            .expect("priors hold all");
+        assert!((within - &among).norm() < 1e-12 * among.norm(), "group {group}");
+    }
+    // Without priors each drift is its board's offset and the bias.
+    let options = Options {
+        max_evaluations: 1,
+        rank_threshold: 1e-8,
+        ..Options::default()
+    };
+    let open = minimize(&boards, truth, &options).expect("it is defined");
+    assert_eq!(open.information.covariance_within(0, &shared, &own), None);
+}
+
+#[test]
+fn a_reduced_problem_changes_as_the_whole_one_does() {
+    let (boards, truth) = Boards::simulated(6, 12, &mut Sample::new(15));
+    // The boards are where their priors have them.
+    let at = start(&truth);
+    let whole = linearize(&boards.with_priors(), &at).expect("it is defined");
+    let without = WithPriors {
+        own: Vec::new(),
+        ..boards.with_priors()
+    };
+    let reduced = Reduced::new(&without, &at).expect("it is defined");
+    let mut weights = DVector::zeros(at.dimension());
+    for (i, weight) in weights.iter_mut().skip(at.shared.dimension()).enumerate() {
+        *weight = 1.0 / [0.0005, 0.001, 0.001, 0.001][i % 4];
+    }
+    // In other units a prior is in them as well, and nothing but the units changes.
+    let factors = DVector::from_fn(at.dimension(), |i, _| 0.5 + (i % 3) as f64);
+    let changed = reduced.changed(&factors, &weights.component_mul(&factors));
+    let units: f64 = factors.iter().map(|f| 2.0 * libm::log(*f)).sum();
+    assert!((changed.deviance() - units - whole.deviance()).abs() < 1e-9 * whole.deviance().abs());
+    let step = changed.step.component_mul(&factors);
+    assert!((&step - &whole.step).norm() < 1e-8 * whole.step.norm());
+    let sd = |d: Vec<Option<f64>>| DVector::from_iterator(d.len(), d.into_iter().map(|s| s.unwrap_or(-1.0)));
+    let whole_sd = sd(whole.information.standard_deviations());
+    let ratio = sd(changed.information.standard_deviations())
+        .component_mul(&factors)
+        .component_div(&whole_sd);
+    assert!(whole_sd.iter().all(|s| *s > 0.0) && ratio.iter().all(|r| (r - 1.0).abs() < 1e-8));
 }
 
 #[test]
