@@ -26,7 +26,7 @@ HERE = Path(__file__).resolve().parent
 ROOM = (11.0, 9.0, 3.2)
 BEAMS, SUB_RAYS, POSES = 1081, 16, 48
 SIZES = {"lab": 40, "10k": 10_000, "100k": 100_000, "1m": 1_000_000, "5m": 5_000_000}
-OURS = ["beam64", "beam16", "single", "polygons64"]
+OURS = ["beam128", "beam16", "single", "polygons128", "polygons16"]
 PEERS = ["embree16", "embree1", "open3d", "mitsuba", "parry"]
 
 

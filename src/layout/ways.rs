@@ -81,6 +81,9 @@ impl Layout {
     }
 
     /// What it sees, loses and allows.
+    ///
+    /// # Errors
+    /// As [`Layout::new`], though one that was made has none.
     pub fn analysis(&self) -> Result<Analysis, SimError> {
         let traced: Vec<&Traced> = self.beams.iter().map(|beam| &beam.traced).collect();
         let footprints: Vec<&Footprint> = self.beams.iter().flat_map(|beam| &beam.footprints).collect();

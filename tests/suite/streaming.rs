@@ -340,9 +340,11 @@ fn flights_within_a_mesh_are_those_without_the_compiled_rig() {
     let structure = Structure::as_built(&scene, 3).unwrap();
     let bare = Setting::new(&scene, &structure, Mirrors::Attached, Vec::new()).unwrap();
     let rig = laboratory.sensor().compile(&bare);
-    let sight = laboratory.sight(0).unwrap();
+    let number = laboratory.stretches() - 1;
+    let sight = laboratory.sight(number).unwrap();
+    assert!(sight.flies());
     assert!(rig.holds_in(sight.setting()));
-    let ends = laboratory.scans_of(0) - 1;
+    let ends = laboratory.scans_of(number) - 1;
     let gone = sight.setting().seen_from(&Pose::translation(0.6, 0.0, 1.45));
     assert!(!rig.holds_in(&gone));
     for scan in [0, ends] {

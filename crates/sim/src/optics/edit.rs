@@ -102,9 +102,15 @@ impl Edit {
 fn passes(leg: &Ray, length: f64, (low, high): &(Point3<f64>, Point3<f64>)) -> bool {
     let (mut enters, mut leaves) = (-SLACK, length + SLACK);
     for k in 0..3 {
-        let per = 1.0 / leg.direction[k];
-        let (a, b) = ((low[k] - leg.origin[k]) * per, (high[k] - leg.origin[k]) * per);
-        // A product that is no number says nothing, and minimum and maximum leave it out.
+        let (from, per) = (leg.origin[k], 1.0 / leg.direction[k]);
+        if per.is_infinite() {
+            // Along the sides: beside them or between them all the way.
+            if from < low[k] || from > high[k] {
+                return false;
+            }
+            continue;
+        }
+        let (a, b) = ((low[k] - from) * per, (high[k] - from) * per);
         enters = enters.max(a.min(b));
         leaves = leaves.min(a.max(b));
     }
