@@ -96,6 +96,9 @@ pub struct World {
 /// Farthest distance at which anything is looked for, in metres: beyond any scanner's range.
 const FARTHEST: f64 = 1e4;
 
+/// Rays that [`World::cast_beam`] and [`Triangles::nearest_of_beam`] take at once.
+pub const BUNDLE: usize = rows::MOST;
+
 /// Slack at a polygon's edge, in metres: two polygons that share an edge leave no gap between them, and the slack is
 /// smaller than any distance that matters by six orders of magnitude.
 const EDGE_SLACK: f64 = 1e-12;

@@ -11,6 +11,7 @@ pub use part::Parts;
 pub use report::{Chance, MAX_ECHOES};
 pub use sub_ray::{Light as SubRayLight, Stop, SubRayEnd};
 
+use crate::cast::Hit;
 use crate::color;
 use crate::detect;
 use crate::echo::Receiver;
@@ -231,17 +232,36 @@ impl Sensor {
         self.receive(setting, parts.as_slice())
     }
 
-    /// The same to the last bit, with the structure's part already followed; `rig` must [hold](Rig::holds_in) in the
-    /// setting.
+    /// What neighboring beams from `first` on bring home: the same to the last bit, with the structure's part already
+    /// followed and the room's for all of them together.
+    ///
+    /// Every beam has a setting of its own: the same one, or what is seen of it from elsewhere; `rig` must
+    /// [hold](Rig::holds_in) in all of them.
     pub fn observe_over(
         &self,
         rig: &Rig,
-        setting: &Setting<'_>,
-        beam: usize,
+        settings: &[Setting<'_>],
+        first: usize,
         parts: &mut Parts,
-    ) -> Option<Return> {
-        self.illuminate_over(rig, setting, beam, parts);
-        self.receive(setting, parts.as_slice())
+    ) -> Vec<Option<Return>> {
+        let mut beyond = std::mem::take(&mut parts.beyond);
+        beyond.clear();
+        for (setting, beam) in settings.iter().zip(first..) {
+            setting.leave(rig.ways(beam).leaving(), &mut beyond);
+        }
+        if let Some(any) = settings.first() {
+            any.cast_into_room(&mut beyond);
+        }
+        let mut hits = beyond.hits.as_slice();
+        let found = settings.iter().zip(first..).map(|(setting, beam)| {
+            let (own, others) = hits.split_at(rig.ways(beam).leaving().len());
+            hits = others;
+            self.illuminate_over(rig, setting, beam, own, parts);
+            self.receive(setting, parts.as_slice())
+        });
+        let found = found.collect();
+        parts.beyond = beyond;
+        found
     }
 
     /// What the detector makes of a beam's light.
@@ -375,12 +395,18 @@ impl Sensor {
         }
     }
 
-    /// [`Sensor::illuminate`] from where the sub-rays depart from the structure.
-    fn illuminate_over(&self, rig: &Rig, setting: &Setting<'_>, beam: usize, parts: &mut Parts) {
+    /// [`Sensor::illuminate`] from where the sub-rays depart from the structure, with what those that leave it hit.
+    fn illuminate_over(
+        &self,
+        rig: &Rig,
+        setting: &Setting<'_>,
+        beam: usize,
+        hits: &[Option<Hit>],
+        parts: &mut Parts,
+    ) {
         parts.begin();
         let ways = rig.ways(beam);
-        let mut beyond = std::mem::take(&mut parts.beyond);
-        let mut in_room = setting.cast_into_room(ways.leaving(), &mut beyond);
+        let mut in_room = setting.met_in_room(ways.leaving(), hits);
         for (sub_ray, departure) in self.sub_rays.iter().zip(ways.departures()) {
             let end = match departure.then {
                 Then::Leaves => match in_room.next().flatten() {
@@ -419,8 +445,6 @@ impl Sensor {
                 parts.add((arrival.surface, facets), power, share, place, cosines, chief);
             }
         }
-        drop(in_room);
-        parts.beyond = beyond;
         if self.lacks_chief() {
             Self::add_chief(parts, &self.chief_path(setting, beam));
         }

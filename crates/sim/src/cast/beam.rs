@@ -95,26 +95,28 @@ impl<const R: usize> Found<R> {
         }
     }
 
-    /// The nearest triangle of every ray, and the distance to it.
+    /// Tells of every ray the nearest triangle, and the distance to it.
     #[inline(always)]
     pub(super) fn finish<S: Simd>(
         &self,
         simd: S,
         bundle: &Bundle<R>,
         judge: &Judge<'_>,
-        met: &mut [Option<Met>],
+        mut tell: impl FnMut(usize, Option<Met>),
     ) {
+        let count = bundle.rays.count;
         let mut last = NONE;
         let mut plane = Plane::default();
         let mut common = f64x8::splat(simd, 0.0);
-        for (row, met) in met.chunks_mut(LANES).enumerate() {
+        for row in 0..count.div_ceil(LANES) {
+            let lanes = LANES.min(count - row * LANES);
             let numbers = &self.triangle.0[row];
             let triangles = u32x16::simd_from(simd, *numbers);
             let some = !triangles.simd_eq(u32x16::splat(simd, NONE)).to_bitmask();
             let mut ways = [f64x8::splat(simd, 0.0); 2];
             let mut sure = 0;
             // Rays of the same triangle, one triangle after the other.
-            let mut open = some & ((1 << met.len()) - 1);
+            let mut open = some & ((1 << lanes) - 1);
             while open != 0 {
                 let triangle = numbers[open.trailing_zeros() as usize & (LANES - 1)];
                 let alike = triangles.simd_eq(u32x16::splat(simd, triangle));
@@ -141,14 +143,15 @@ impl<const R: usize> Found<R> {
             let mut distances = [0.0; LANES];
             ways[0].store_slice(&mut distances[..HALF]);
             ways[1].store_slice(&mut distances[HALF..]);
-            for (lane, met) in met.iter_mut().enumerate() {
+            for lane in 0..lanes {
                 let triangle = numbers[lane];
                 let distance = if (sure | !some) >> lane & 1 == 1 {
                     distances[lane]
                 } else {
                     judge.way(row * LANES + lane, triangle)
                 };
-                *met = (triangle != NONE).then_some(Met { triangle, distance });
+                let met = (triangle != NONE).then_some(Met { triangle, distance });
+                tell(row * LANES + lane, met);
             }
         }
     }

@@ -9,7 +9,7 @@ use super::exact::product;
 use super::lanes::{inlined, less};
 use super::rows::{FOUR_ROWS, HALF, LANES, MOST, ROWS, Rows, TWO_ROWS, half};
 use super::wide::Walk;
-use super::{EDGE_SLACK, FARTHEST, Hit, Polygon, Shape, World};
+use super::{EDGE_SLACK, FARTHEST, Hit, Met, Polygon, Shape, World};
 use crate::footprint::Ray;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use fearless_simd::{f64x4, f64x8};
@@ -117,13 +117,15 @@ impl World {
             match &self.shapes[surface] {
                 Shape::Polygon(polygon) => nearest.polygon(simd, bundle, surface, polygon),
                 Shape::Mesh(mesh) => {
-                    let mut met = [None; MOST];
-                    mesh.nearest_of_bundle(simd, bundle, rays, &mut met[..rays.len()]);
-                    for (i, met) in met.iter().enumerate() {
-                        if let Some(met) = met {
-                            nearest.take(i, met.distance, surface, met.triangle);
-                        }
-                    }
+                    let take = inlined(
+                        #[inline(always)]
+                        |ray: usize, met: Option<Met>| {
+                            if let Some(met) = met {
+                                nearest.take(ray, met.distance, surface, met.triangle);
+                            }
+                        },
+                    );
+                    mesh.nearest_of_bundle(simd, bundle, rays, take);
                     nearest.set_limit(simd);
                 }
                 other => {

@@ -7,6 +7,7 @@
 use super::beam;
 use super::bundle::Bundle;
 use super::exact::Judge;
+use super::lanes::inlined;
 use super::rows::{FOUR_ROWS, LANES, MOST, ROWS, TWO_ROWS};
 use super::single;
 use super::wide::Wide;
@@ -130,23 +131,23 @@ impl Triangles {
             let mut bundle = Bundle::<R>::blank();
             let narrow = bundle.fill(simd, rays, self.wide.reach);
             if narrow {
-                self.nearest_of_bundle(simd, &bundle, rays, met);
+                self.nearest_of_bundle(simd, &bundle, rays, inlined(#[inline(always)] |ray, of_ray| met[ray] = of_ray));
             }
             narrow
         })
     }
 
-    /// What the rays of a bundle meet; it may be made for things that reach farther than the mesh.
+    /// Tells what each ray of a bundle meets; it may be made for things that reach farther than the mesh.
     #[inline(always)]
     pub(super) fn nearest_of_bundle<S: Simd, const R: usize>(
         &self,
         simd: S,
         bundle: &Bundle<R>,
         rays: &[Ray],
-        met: &mut [Option<Met>],
+        tell: impl FnMut(usize, Option<Met>),
     ) {
         let judge = self.judge(rays);
-        beam::follow(simd, &self.wide, bundle, &judge).finish(simd, bundle, &judge, met);
+        beam::follow(simd, &self.wide, bundle, &judge).finish(simd, bundle, &judge, tell);
     }
 
     /// Normal of a triangle, for a ray that meets it.

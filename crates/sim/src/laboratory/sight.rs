@@ -4,6 +4,7 @@
 //! is as where nothing moves. Every scan is a function of the scene, the seed and its number alone.
 
 use super::{Laboratory, Returns, wall_targets};
+use crate::cast::BUNDLE;
 use crate::color;
 use crate::error::SimError;
 use crate::optics::{Mirrors, Rig, Setting};
@@ -25,7 +26,7 @@ pub struct Sight<'a> {
 }
 
 /// Fewest beams of a scan that are worth another thread.
-const BEAMS_AT_ONCE: usize = 64;
+const BEAMS_OF_A_THREAD: usize = 64;
 
 impl Laboratory {
     /// What the sensor sees during a stretch.
@@ -126,38 +127,42 @@ impl Sight<'_> {
     /// What every beam of a scan meets; the same as for the scan before unless [`Sight::changes_at`] says otherwise.
     pub fn returns(&self, scan: usize) -> Returns {
         let sensor = &self.laboratory.sensor;
-        let beams = (0..beam::COUNT).into_par_iter().with_min_len(BEAMS_AT_ONCE);
-        let observe = |parts: &mut Parts, setting: &Setting<'_>, b| match self.rig {
-            rig if rig.holds_in(setting) => sensor.observe_over(rig, setting, b, parts),
-            _ => sensor.observe(setting, b),
+        // Neighbors go together as far as the caster takes their rays at once.
+        let together = (BUNDLE / sensor.sub_rays().max(1)).clamp(1, BEAMS_OF_A_THREAD);
+        let observe = |parts: &mut Parts, first: usize| {
+            let beams = first..(first + together).min(beam::COUNT);
+            let settings: Vec<_> = beams.clone().map(|beam| self.around(scan, beam)).collect();
+            if settings.iter().all(|setting| self.rig.holds_in(setting)) {
+                return sensor.observe_over(self.rig, &settings, first, parts);
+            }
+            let each = settings.iter().zip(beams);
+            each.map(|(setting, beam)| sensor.observe(setting, beam))
+                .collect()
         };
-        beams
-            .map_init(Parts::default, |parts, b| {
-                self.seen_by(scan, b, |setting| observe(parts, setting, b))
-            })
+        (0..beam::COUNT.div_ceil(together))
+            .into_par_iter()
+            .with_min_len(BEAMS_OF_A_THREAD / together)
+            .map_init(Parts::default, |parts, group| observe(parts, group * together))
+            .flatten_iter()
             .collect()
     }
 
     /// The ways of a beam's sub-rays in a scan, in the sensor frame of its time.
     pub fn sub_ray_ends(&self, scan: usize, beam: usize) -> Vec<SubRayEnd> {
-        self.seen_by(scan, beam, |setting| {
-            self.laboratory.sensor.sub_ray_ends(setting, beam)
-        })
+        let around = self.around(scan, beam);
+        self.laboratory.sensor.sub_ray_ends(&around, beam)
     }
 
-    /// Looks from where the sensor is when it reads a beam of a scan.
-    fn seen_by<T>(&self, scan: usize, beam: usize, look: impl FnOnce(&Setting<'_>) -> T) -> T {
-        match self.trajectory {
-            None => look(match &self.after {
-                Some((from, setting)) if scan >= *from => setting,
-                _ => &self.setting,
-            }),
-            Some(trajectory) => {
-                let elapsed_s = self.laboratory.elapsed_s(scan, beam);
-                let moved = self.start_from_sensor(trajectory, elapsed_s);
-                look(&self.setting.seen_from(&moved))
-            }
+    /// What is around the sensor when it reads a beam of a scan.
+    fn around(&self, scan: usize, beam: usize) -> Setting<'_> {
+        let moved = self.trajectory.map_or_else(Pose::identity, |trajectory| {
+            self.start_from_sensor(trajectory, self.laboratory.elapsed_s(scan, beam))
+        });
+        match &self.after {
+            Some((from, setting)) if scan >= *from => setting,
+            _ => &self.setting,
         }
+        .seen_from(&moved)
     }
 
     /// Where the sensor is in the frame that it had at the start; exactly there while the rig has not moved.

@@ -14,11 +14,11 @@ pub(super) fn placed(ray: &Ray, other_from_ray: &Pose) -> Ray {
     }
 }
 
-/// Rays moved into another frame: what [`placed`] makes of each of them, to the bit.
+/// Appends rays moved into another frame: what [`placed`] makes of each of them, to the bit.
 pub(super) fn place_all(rays: &[Ray], other_from_ray: &Pose, out: &mut Vec<Ray>) {
-    out.clear();
+    let first = out.len();
     out.extend_from_slice(rays);
-    let (groups, rest) = out.as_chunks_mut::<LANES>();
+    let (groups, rest) = out[first..].as_chunks_mut::<LANES>();
     dispatch!(Level::new(), simd => place(simd, groups, other_from_ray));
     for ray in rest {
         *ray = placed(ray, other_from_ray);
@@ -113,6 +113,7 @@ mod tests {
         let mut out = Vec::new();
         for count in [0, 1, 7, 8, 9, 19, 64] {
             let rays: Vec<Ray> = (0..count).map(ray).collect();
+            out.clear();
             place_all(&rays, &pose, &mut out);
             let each: Vec<Ray> = rays.iter().map(|ray| placed(ray, &pose)).collect();
             assert_eq!(out, each, "{count} rays");

@@ -117,6 +117,13 @@ pub enum Mirrors {
     Removed,
 }
 
+impl Beyond {
+    pub(crate) fn clear(&mut self) {
+        self.rays.clear();
+        self.hits.clear();
+    }
+}
+
 /// What a leg beyond the structure meets.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Met {
@@ -127,11 +134,11 @@ pub(crate) struct Met {
     pub(crate) reflects: bool,
 }
 
-/// Room for the legs of a beam in the frame of the room, and for what they meet.
+/// Room for the legs of some beams in the frame of the room, and for what they meet.
 #[derive(Debug, Default)]
 pub(crate) struct Beyond {
     rays: Vec<Ray>,
-    hits: Vec<Option<Hit>>,
+    pub(crate) hits: Vec<Option<Hit>>,
 }
 
 /// A painted surface in the sensor frame: a board or a wall.
@@ -255,28 +262,33 @@ impl<'a> Setting<'a> {
             .all(|e| e.is_beyond(&sensor, distance))
     }
 
-    /// The nearest surface of the room alone along every ray of a beam, given in the sensor frame.
-    pub(crate) fn cast_into_room<'b>(
+    /// Adds the legs of a beam, given in the sensor frame, to those that are to be cast into the room.
+    pub(crate) fn leave(&self, rays: &[Ray], beyond: &mut Beyond) {
+        match &self.start_from_sensor {
+            None => beyond.rays.extend_from_slice(rays),
+            Some(pose) => place_all(rays, pose, &mut beyond.rays),
+        }
+    }
+
+    /// Casts all legs into the room, those of neighboring beams together.
+    pub(crate) fn cast_into_room(&self, beyond: &mut Beyond) {
+        beyond.hits.clear();
+        beyond.hits.resize(beyond.rays.len(), None);
+        if let Some(room) = &self.contents.room {
+            room.cast_beam(&beyond.rays, None, &mut beyond.hits);
+        }
+    }
+
+    /// What the legs of a beam meet in the room, from where they were cast to.
+    pub(crate) fn met_in_room<'b>(
         &'b self,
         rays: &'b [Ray],
-        beyond: &'b mut Beyond,
+        hits: &'b [Option<Hit>],
     ) -> impl Iterator<Item = Option<Met>> + 'b {
-        beyond.hits.clear();
-        beyond.hits.resize(rays.len(), None);
         let moved = self.start_from_sensor.as_ref();
-        if let Some(room) = &self.contents.room {
-            let in_room = match moved {
-                None => rays,
-                Some(pose) => {
-                    place_all(rays, pose, &mut beyond.rays);
-                    &beyond.rays
-                }
-            };
-            room.cast_beam(in_room, None, &mut beyond.hits);
-        }
         // Rays of a beam mostly meet one plane: its normal is turned once.
         let mut turned: Option<[Unit<Vector3<f64>>; 2]> = None;
-        rays.iter().zip(&beyond.hits).map(move |(ray, hit)| {
+        rays.iter().zip(hits).map(move |(ray, hit)| {
             let mut hit = (*hit)?;
             hit.surface += self.contents.first_of_room;
             let normal = match (moved, turned) {
