@@ -243,7 +243,8 @@ impl Sensor {
         settings: &[Setting<'_>],
         first: usize,
         parts: &mut Parts,
-    ) -> Vec<Option<Return>> {
+        returns: &mut [Option<Return>],
+    ) {
         let mut beyond = std::mem::take(&mut parts.beyond);
         beyond.clear();
         for (setting, beam) in settings.iter().zip(first..) {
@@ -253,15 +254,13 @@ impl Sensor {
             any.cast_into_room(&mut beyond);
         }
         let mut hits = beyond.hits.as_slice();
-        let found = settings.iter().zip(first..).map(|(setting, beam)| {
+        for ((setting, beam), place) in settings.iter().zip(first..).zip(returns) {
             let (own, others) = hits.split_at(rig.ways(beam).leaving().len());
             hits = others;
             self.illuminate_over(rig, setting, beam, own, parts);
-            self.receive(setting, parts.as_slice())
-        });
-        let found = found.collect();
+            *place = self.receive(setting, parts.as_slice());
+        }
         parts.beyond = beyond;
-        found
     }
 
     /// What the detector makes of a beam's light.

@@ -8,7 +8,7 @@ use crate::cast::BUNDLE;
 use crate::color;
 use crate::error::SimError;
 use crate::optics::{Mirrors, Rig, Setting};
-use crate::reading::{Parts, SubRayEnd};
+use crate::reading::{Parts, Return, SubRayEnd};
 use crate::stage::Stage;
 use crate::trajectory::Trajectory;
 use catoptric_model::{Pose, PoseKind, beam};
@@ -129,22 +129,27 @@ impl Sight<'_> {
         let sensor = &self.laboratory.sensor;
         // Neighbors go together as far as the caster takes their rays at once.
         let together = (BUNDLE / sensor.sub_rays().max(1)).clamp(1, BEAMS_OF_A_THREAD);
-        let observe = |parts: &mut Parts, first: usize| {
-            let beams = first..(first + together).min(beam::COUNT);
+        let observe = |parts: &mut Parts, first: usize, returns: &mut [Option<Return>]| {
+            let beams = first..first + returns.len();
             let settings: Vec<_> = beams.clone().map(|beam| self.around(scan, beam)).collect();
             if settings.iter().all(|setting| self.rig.holds_in(setting)) {
-                return sensor.observe_over(self.rig, &settings, first, parts);
+                sensor.observe_over(self.rig, &settings, first, parts, returns);
+            } else {
+                for ((setting, beam), place) in settings.iter().zip(beams).zip(returns) {
+                    *place = sensor.observe(setting, beam);
+                }
             }
-            let each = settings.iter().zip(beams);
-            each.map(|(setting, beam)| sensor.observe(setting, beam))
-                .collect()
         };
-        (0..beam::COUNT.div_ceil(together))
-            .into_par_iter()
+        let mut returns = Vec::new();
+        returns.resize_with(beam::COUNT, || None);
+        returns
+            .par_chunks_mut(together)
+            .enumerate()
             .with_min_len(BEAMS_OF_A_THREAD / together)
-            .map_init(Parts::default, |parts, group| observe(parts, group * together))
-            .flatten_iter()
-            .collect()
+            .for_each_init(Parts::default, |parts, (group, returns)| {
+                observe(parts, group * together, returns);
+            });
+        returns
     }
 
     /// The ways of a beam's sub-rays in a scan, in the sensor frame of its time.
