@@ -33,7 +33,7 @@ pub(super) struct Found<const R: usize> {
     /// Bounds of the nearest way.
     low: Rows<f32, R>,
     high: Rows<f32, R>,
-    pub(super) triangle: Rows<u32, R>,
+    triangle: Rows<u32, R>,
     /// Greatest of the upper bounds.
     limit: f32,
 }

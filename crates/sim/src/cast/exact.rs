@@ -72,30 +72,23 @@ impl Plane {
     #[inline(always)]
     fn new([a, b, c]: &[Point3<f64>; 3]) -> Self {
         let (p, q) = (b - a, c - a);
-        let normal = Vector3::new(
-            p.y * q.z - p.z * q.y,
-            p.z * q.x - p.x * q.z,
-            p.x * q.y - p.y * q.x,
-        );
         let long = p.abs().sum().max(q.abs().sum());
         Self {
             corner: *a,
-            normal,
+            normal: p.cross(&q),
             least: STEEP * long * long,
         }
     }
 
     /// How far a ray goes to the plane; `None` where that is not good ([`STEEP`]).
     fn way(&self, ray: &Ray) -> Option<f64> {
-        let (n, d) = (&self.normal, &ray.direction);
-        let closing = n.x * d.x + n.y * d.y + n.z * d.z;
+        let closing = self.normal.dot(&ray.direction);
         (closing.abs() > self.least).then(|| self.height(&ray.origin) / closing)
     }
 
     /// N·(A − O).
     pub(super) fn height(&self, origin: &Point3<f64>) -> f64 {
-        let (n, seen) = (&self.normal, self.corner - origin);
-        n.x * seen.x + n.y * seen.y + n.z * seen.z
+        self.normal.dot(&(self.corner - origin))
     }
 
     /// [`Plane::way`] of eight rays, and where it is good.
@@ -124,7 +117,7 @@ impl Plane {
 }
 
 /// Distance at which a ray meets a triangle, from either side; its edges and corners belong to it.
-pub(super) fn meet(ray: &Ray, corners: &[Point3<f64>; 3]) -> Option<f64> {
+fn meet(ray: &Ray, corners: &[Point3<f64>; 3]) -> Option<f64> {
     let d = ray.direction.into_inner();
     let [kx, ky, kz] = axes(ray);
     let shear = Vector3::new(d[kx] / d[kz], d[ky] / d[kz], 1.0 / d[kz]);

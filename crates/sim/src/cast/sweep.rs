@@ -4,10 +4,10 @@
 //! bit. Where the whole pyramid around the rays passes inside the polygon, or outside, its edges need not be tried.
 
 use super::build::upwards;
-use super::bundle::Bundle;
+use super::bundle::{Bundle, Caster, cast_all};
 use super::exact::product;
 use super::lanes::{inlined, less};
-use super::rows::{FOUR_ROWS, HALF, LANES, MOST, ROWS, Rows, TWO_ROWS, half};
+use super::rows::{HALF, LANES, Rows, half};
 use super::wide::Walk;
 use super::{EDGE_SLACK, FARTHEST, Hit, Met, Polygon, Shape, World};
 use crate::footprint::Ray;
@@ -37,6 +37,33 @@ struct Nearest<const R: usize> {
     limit: f32,
 }
 
+/// A world without the surface that the rays left, with what the machine has.
+struct InWorld<'a> {
+    world: &'a World,
+    level: Level,
+    left: Option<usize>,
+}
+
+impl Caster<Option<Hit>> for InWorld<'_> {
+    fn cast(&self, ray: &Ray) -> Option<Hit> {
+        self.world.cast(ray, self.left)
+    }
+
+    fn cast_rows<const R: usize>(&self, rays: &[Ray], hits: &mut [Option<Hit>]) -> bool {
+        dispatch!(self.level, simd => {
+            let mut bundle = Bundle::<R>::blank();
+            let narrow = bundle.fill(simd, rays, self.world.reach);
+            if narrow {
+                let nearest = self.world.sweep(simd, &bundle, rays, self.left);
+                for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
+                    *hit = self.world.hit(ray, nearest.surface.get(i), nearest.triangle.get(i), nearest.distance.get(i));
+                }
+            }
+            narrow
+        })
+    }
+}
+
 impl World {
     pub(super) fn cast_beam_at(
         &self,
@@ -45,52 +72,8 @@ impl World {
         left: Option<usize>,
         hits: &mut [Option<Hit>],
     ) {
-        assert_eq!(rays.len(), hits.len(), "every ray has its place");
-        for (rays, hits) in rays.chunks(MOST).zip(hits.chunks_mut(MOST)) {
-            self.cast_some(level, rays, left, hits);
-        }
-    }
-
-    /// What is no narrow cone may be two.
-    fn cast_some(&self, level: Level, rays: &[Ray], left: Option<usize>, hits: &mut [Option<Hit>]) {
-        let done = match rays {
-            [] => true,
-            [ray] => {
-                hits[0] = self.cast(ray, left);
-                true
-            }
-            _ if rays.len() <= LANES => self.cast_in_rows::<1>(level, rays, left, hits),
-            _ if rays.len() <= TWO_ROWS => self.cast_in_rows::<2>(level, rays, left, hits),
-            _ if rays.len() <= FOUR_ROWS => self.cast_in_rows::<4>(level, rays, left, hits),
-            _ => self.cast_in_rows::<ROWS>(level, rays, left, hits),
-        };
-        if !done {
-            let middle = rays.len() / 2;
-            let (first, second) = hits.split_at_mut(middle);
-            self.cast_some(level, &rays[..middle], left, first);
-            self.cast_some(level, &rays[middle..], left, second);
-        }
-    }
-
-    /// Whether the rays are a narrow cone; then also what they meet.
-    fn cast_in_rows<const R: usize>(
-        &self,
-        level: Level,
-        rays: &[Ray],
-        left: Option<usize>,
-        hits: &mut [Option<Hit>],
-    ) -> bool {
-        dispatch!(level, simd => {
-            let mut bundle = Bundle::<R>::blank();
-            let narrow = bundle.fill(simd, rays, self.reach);
-            if narrow {
-                let nearest = self.sweep(simd, &bundle, rays, left);
-                for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
-                    *hit = self.hit(ray, nearest.surface.get(i), nearest.triangle.get(i), nearest.distance.get(i));
-                }
-            }
-            narrow
-        })
+        let world = self;
+        cast_all(&InWorld { world, level, left }, rays, hits);
     }
 
     #[inline(always)]

@@ -5,10 +5,9 @@
 //! very same distance the first counts.
 
 use super::beam;
-use super::bundle::Bundle;
+use super::bundle::{Bundle, Caster, cast_all};
 use super::exact::Judge;
 use super::lanes::inlined;
-use super::rows::{FOUR_ROWS, LANES, MOST, ROWS, TWO_ROWS};
 use super::single;
 use super::wide::Wide;
 use crate::footprint::Ray;
@@ -98,43 +97,7 @@ impl Triangles {
     }
 
     pub(super) fn nearest_of_beam_at(&self, level: Level, rays: &[Ray], met: &mut [Option<Met>]) {
-        assert_eq!(rays.len(), met.len(), "every ray has its place");
-        for (rays, met) in rays.chunks(MOST).zip(met.chunks_mut(MOST)) {
-            self.nearest_of_some(level, rays, met);
-        }
-    }
-
-    /// What is no narrow cone may be two.
-    fn nearest_of_some(&self, level: Level, rays: &[Ray], met: &mut [Option<Met>]) {
-        let done = match rays {
-            [] => true,
-            [ray] => {
-                met[0] = self.nearest_at(level, ray);
-                true
-            }
-            _ if rays.len() <= LANES => self.nearest_in_rows::<1>(level, rays, met),
-            _ if rays.len() <= TWO_ROWS => self.nearest_in_rows::<2>(level, rays, met),
-            _ if rays.len() <= FOUR_ROWS => self.nearest_in_rows::<4>(level, rays, met),
-            _ => self.nearest_in_rows::<ROWS>(level, rays, met),
-        };
-        if !done {
-            let middle = rays.len() / 2;
-            let (first, second) = met.split_at_mut(middle);
-            self.nearest_of_some(level, &rays[..middle], first);
-            self.nearest_of_some(level, &rays[middle..], second);
-        }
-    }
-
-    /// Whether the rays are a narrow cone; then also what they meet.
-    fn nearest_in_rows<const R: usize>(&self, level: Level, rays: &[Ray], met: &mut [Option<Met>]) -> bool {
-        dispatch!(level, simd => {
-            let mut bundle = Bundle::<R>::blank();
-            let narrow = bundle.fill(simd, rays, self.wide.reach);
-            if narrow {
-                self.nearest_of_bundle(simd, &bundle, rays, inlined(#[inline(always)] |ray, of_ray| met[ray] = of_ray));
-            }
-            narrow
-        })
+        cast_all(&InMesh { mesh: self, level }, rays, met);
     }
 
     /// Tells what each ray of a bundle meets; it may be made for things that reach farther than the mesh.
@@ -161,6 +124,29 @@ impl Triangles {
     pub(super) fn cast(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
         let met = self.nearest(ray)?;
         Some((met.distance, self.normal(met.triangle, ray)))
+    }
+}
+
+/// A mesh, with what the machine has.
+struct InMesh<'a> {
+    mesh: &'a Triangles,
+    level: Level,
+}
+
+impl Caster<Option<Met>> for InMesh<'_> {
+    fn cast(&self, ray: &Ray) -> Option<Met> {
+        self.mesh.nearest_at(self.level, ray)
+    }
+
+    fn cast_rows<const R: usize>(&self, rays: &[Ray], met: &mut [Option<Met>]) -> bool {
+        dispatch!(self.level, simd => {
+            let mut bundle = Bundle::<R>::blank();
+            let narrow = bundle.fill(simd, rays, self.mesh.wide.reach);
+            if narrow {
+                self.mesh.nearest_of_bundle(simd, &bundle, rays, inlined(#[inline(always)] |ray, of_ray| met[ray] = of_ray));
+            }
+            narrow
+        })
     }
 }
 

@@ -117,13 +117,6 @@ pub enum Mirrors {
     Removed,
 }
 
-impl Beyond {
-    pub(crate) fn clear(&mut self) {
-        self.rays.clear();
-        self.hits.clear();
-    }
-}
-
 /// What a leg beyond the structure meets.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Met {
@@ -139,6 +132,12 @@ pub(crate) struct Met {
 pub(crate) struct Beyond {
     rays: Vec<Ray>,
     pub(crate) hits: Vec<Option<Hit>>,
+}
+
+impl Beyond {
+    pub(crate) fn clear(&mut self) {
+        self.rays.clear();
+    }
 }
 
 /// A painted surface in the sensor frame: a board or a wall.
@@ -264,9 +263,14 @@ impl<'a> Setting<'a> {
 
     /// Adds the legs of a beam, given in the sensor frame, to those that are to be cast into the room.
     pub(crate) fn leave(&self, rays: &[Ray], beyond: &mut Beyond) {
+        self.place_in_room(rays, &mut beyond.rays);
+    }
+
+    /// Appends rays of the sensor frame, in the frame that the room is kept in.
+    fn place_in_room(&self, rays: &[Ray], in_room: &mut Vec<Ray>) {
         match &self.start_from_sensor {
-            None => beyond.rays.extend_from_slice(rays),
-            Some(pose) => place_all(rays, pose, &mut beyond.rays),
+            None => in_room.extend_from_slice(rays),
+            Some(pose) => place_all(rays, pose, in_room),
         }
     }
 
@@ -405,10 +409,7 @@ impl<'a> Setting<'a> {
             return;
         };
         let mut in_room = Vec::new();
-        match &self.start_from_sensor {
-            None => in_room.extend_from_slice(rays),
-            Some(pose) => place_all(rays, pose, &mut in_room),
-        }
+        self.place_in_room(rays, &mut in_room);
         let mut past = vec![None; rays.len()];
         room.cast_beam(&in_room, left.and_then(|l| l.checked_sub(first)), &mut past);
         let pairs = own.into_iter().zip(rays).zip(past.into_iter().zip(&in_room));
