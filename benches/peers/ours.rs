@@ -1,7 +1,7 @@
 //! Our side of the comparison with other ray casters: closest hits on meshes that `compare.py` made.
 //!
 //! `cargo bench --bench peers -- FOLDER MESH ENGINE RAYS THREADS SECONDS` prints one line of JSON and writes the
-//! distances beside the inputs. Engines are `beam` (so many rays as one beam), `single`, `polygons`
+//! distances beside the inputs. Engines are `beam` (so many rays as one beam), `single` (each by itself), `polygons`
 //! (every triangle a polygon of a world, so many rays as one beam) and `parry` (in f64).
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
@@ -97,11 +97,16 @@ fn main() {
     let parry;
     let way = |met: Option<Met>| met.map_or(f64::INFINITY, |m| m.distance);
     let cast: Caster<'_> = match engine.as_str() {
-        "single" => Box::new(|rays, ways| {
-            for (ray, place) in rays.iter().zip(ways) {
-                *place = way(placed.nearest(ray));
-            }
-        }),
+        "single" => {
+            let placed = &placed;
+            Box::new(move |rays, ways| {
+                let mut met = vec![None; rays.len()];
+                placed.nearest_of_each(rays, &mut met);
+                for (place, met) in ways.iter_mut().zip(&met) {
+                    *place = way(*met);
+                }
+            })
+        }
         "parry" => {
             let points = vertices
                 .iter()

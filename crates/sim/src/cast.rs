@@ -10,6 +10,7 @@ mod beam_tests;
 mod build;
 mod bundle;
 mod cylinder;
+mod each;
 mod exact;
 mod lanes;
 mod pyramid;

@@ -167,7 +167,9 @@ pub(super) fn follow<S: Simd, const R: usize>(
 ) -> Found<R> {
     let mut found = Found::new(bundle.rays.count);
     let mut walk = Walk::new();
-    while let Some(child) = walk.next(found.limit) {
+    let mut next = Some(walk.start());
+    while let Some(child) = next {
+        let mut nearer = None;
         if child.is_leaf() {
             leaf(
                 simd,
@@ -181,8 +183,9 @@ pub(super) fn follow<S: Simd, const R: usize>(
         } else {
             let node = &wide.nodes[child.number()];
             let (met, near) = bundle.pyramid.boxes(simd, &node.bounds, found.limit);
-            walk.push(node, met, near);
+            nearer = walk.enter(node, met, near);
         }
+        next = nearer.or_else(|| walk.next(found.limit));
     }
     found
 }

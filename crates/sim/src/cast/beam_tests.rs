@@ -123,10 +123,9 @@ fn beams_and_rays_find_what_trying_all_finds_with_any_lanes() {
                 let mut met = vec![None; rays.len()];
                 mesh.nearest_of_beam_at(level, &rays, &mut met);
                 assert_eq!(met, expected, "seed {seed}, shot {shot}, a beam at {level:?}");
-                for (ray, expected) in rays.iter().zip(&expected) {
-                    let met = mesh.nearest_at(level, ray);
-                    assert_eq!(met, *expected, "seed {seed}, shot {shot}, a ray at {level:?}");
-                }
+                let mut met = vec![None; rays.len()];
+                mesh.nearest_of_each_at(level, &rays, &mut met);
+                assert_eq!(met, expected, "seed {seed}, shot {shot}, each ray at {level:?}");
             }
         }
         hits

@@ -3,7 +3,7 @@
 use super::build::{downwards, upwards};
 use super::lanes::{cross, size};
 use super::pyramid::{Pyramid, Start};
-use super::rows::{FOUR_ROWS, LANES, MOST, Origin, ROWS, Rays, Rows, TWO_ROWS, Vectors, halves, whole};
+use super::rows::{FOUR_ROWS, HALF, LANES, MOST, Origin, ROWS, Rays, Rows, TWO_ROWS, Vectors, halves, whole};
 use crate::footprint::Ray;
 use fearless_simd::{Simd, f32x16, f64x8, prelude::*};
 
@@ -100,10 +100,10 @@ impl<const R: usize> Apart<R> {
     }
 }
 
-/// What rays can be cast into, alone or as a bundle of so many rows.
+/// What rays can be cast into, each by itself or as a bundle of so many rows.
 pub(super) trait Caster<T> {
-    /// What a ray meets.
-    fn cast(&self, ray: &Ray) -> T;
+    /// What each of some rays meets.
+    fn cast_each(&self, rays: &[Ray], found: &mut [T]);
 
     /// Whether rays are a narrow cone; then also what each of them meets.
     fn cast_rows<const R: usize>(&self, rays: &[Ray], found: &mut [T]) -> bool;
@@ -117,20 +117,21 @@ pub(super) fn cast_all<T>(caster: &impl Caster<T>, rays: &[Ray], found: &mut [T]
     }
 }
 
-/// What is no narrow cone may be two.
+/// What is no narrow cone may be two, unless it is few rays.
 fn cast_some<T>(caster: &impl Caster<T>, rays: &[Ray], found: &mut [T]) {
-    let done = match rays {
-        [] => true,
-        [ray] => {
-            found[0] = caster.cast(ray);
-            true
-        }
+    let narrow = match rays {
+        [] | [_] => false,
         _ if rays.len() <= LANES => caster.cast_rows::<1>(rays, found),
         _ if rays.len() <= TWO_ROWS => caster.cast_rows::<2>(rays, found),
         _ if rays.len() <= FOUR_ROWS => caster.cast_rows::<4>(rays, found),
         _ => caster.cast_rows::<ROWS>(rays, found),
     };
-    if !done {
+    if narrow {
+        return;
+    }
+    if rays.len() <= HALF {
+        caster.cast_each(rays, found);
+    } else {
         let middle = rays.len() / 2;
         let (first, second) = found.split_at_mut(middle);
         cast_some(caster, &rays[..middle], first);

@@ -8,7 +8,7 @@
 //! changed is found from the exact products (fused multiply-add). The distance is that to the triangle's plane.
 
 use super::FARTHEST;
-use super::lanes::less;
+use super::lanes::{inlined, less, size};
 use crate::footprint::Ray;
 use fearless_simd::{Simd, prelude::*};
 use fearless_simd::{f64x8, mask64x8};
@@ -50,6 +50,56 @@ impl Judge<'_> {
             Some(way) => way,
             None => meet(ray, &corners).unwrap_or(FARTHEST),
         }
+    }
+
+    /// [`Judge::way`] of eight rays to a triangle each.
+    #[inline(always)]
+    pub(super) fn ways<S: Simd>(&self, simd: S, found: &[(usize, u32); 8]) -> [f64; 8] {
+        let [mut a, mut b, mut c, mut origin, mut direction] = [[[0.0; 8]; 3]; 5];
+        for (lane, &(ray, triangle)) in found.iter().enumerate() {
+            let (ray, corners) = (&self.rays[ray], self.corners(triangle));
+            for k in 0..3 {
+                a[k][lane] = corners[0][k];
+                b[k][lane] = corners[1][k];
+                c[k][lane] = corners[2][k];
+                origin[k][lane] = ray.origin[k];
+                direction[k][lane] = ray.direction[k];
+            }
+        }
+        let load = inlined(
+            #[inline(always)]
+            |v: &[[f64; 8]; 3]| {
+                [
+                    f64x8::simd_from(simd, v[0]),
+                    f64x8::simd_from(simd, v[1]),
+                    f64x8::simd_from(simd, v[2]),
+                ]
+            },
+        );
+        let a = load(&a);
+        let (p, q) = (less(&load(&b), &a), less(&load(&c), &a));
+        // As for a ray alone, in the same order and not fused.
+        let long = size(&p).max(size(&q));
+        let normal = [
+            p[1] * q[2] - p[2] * q[1],
+            p[2] * q[0] - p[0] * q[2],
+            p[0] * q[1] - p[1] * q[0],
+        ];
+        let along = inlined(
+            #[inline(always)]
+            |v: &[f64x8<S>; 3]| normal[0] * v[0] + normal[1] * v[1] + normal[2] * v[2],
+        );
+        let closing = along(&load(&direction));
+        let least = f64x8::splat(simd, STEEP) * long * long;
+        let sure = closing.abs().simd_gt(least).to_bitmask();
+        let mut ways = [0.0; 8];
+        (along(&less(&a, &load(&origin))) / closing).store_slice(&mut ways);
+        for (lane, (way, &(ray, triangle))) in ways.iter_mut().zip(found).enumerate() {
+            if sure >> lane & 1 == 0 {
+                *way = self.way(ray, triangle);
+            }
+        }
+        ways
     }
 
     #[inline(always)]

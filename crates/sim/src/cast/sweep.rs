@@ -45,8 +45,10 @@ struct InWorld<'a> {
 }
 
 impl Caster<Option<Hit>> for InWorld<'_> {
-    fn cast(&self, ray: &Ray) -> Option<Hit> {
-        self.world.cast(ray, self.left)
+    fn cast_each(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = self.world.cast(ray, self.left);
+        }
     }
 
     fn cast_rows<const R: usize>(&self, rays: &[Ray], hits: &mut [Option<Hit>]) -> bool {
@@ -86,42 +88,53 @@ impl World {
     ) -> Nearest<R> {
         let mut nearest = Nearest::new(rays.len());
         let mut walk = Walk::new();
-        while let Some(child) = walk.next(nearest.limit) {
+        let mut next = Some(walk.start());
+        while let Some(child) = next {
+            let mut nearer = None;
             if !child.is_leaf() {
                 let node = &self.nodes[child.number()];
                 let (met, near) = bundle.pyramid.boxes(simd, &node.bounds, nearest.limit);
-                walk.push(node, met, near);
-                continue;
+                nearer = walk.enter(node, met, near);
+            } else if left != Some(child.number()) {
+                self.meet(simd, bundle, rays, child.number(), &mut nearest);
             }
-            let surface = child.number();
-            if left == Some(surface) {
-                continue;
-            }
-            match &self.shapes[surface] {
-                Shape::Polygon(polygon) => nearest.polygon(simd, bundle, surface, polygon),
-                Shape::Mesh(mesh) => {
-                    let take = inlined(
-                        #[inline(always)]
-                        |ray: usize, met: Option<Met>| {
-                            if let Some(met) = met {
-                                nearest.take(ray, met.distance, surface, met.triangle);
-                            }
-                        },
-                    );
-                    mesh.nearest_of_bundle(simd, bundle, rays, take);
-                    nearest.set_limit(simd);
-                }
-                other => {
-                    for (i, ray) in rays.iter().enumerate() {
-                        if let Some(distance) = other.distance(ray) {
-                            nearest.take(i, distance, surface, NONE);
-                        }
-                    }
-                    nearest.set_limit(simd);
-                }
-            }
+            next = nearer.or_else(|| walk.next(nearest.limit));
         }
         nearest
+    }
+
+    #[inline(always)]
+    fn meet<S: Simd, const R: usize>(
+        &self,
+        simd: S,
+        bundle: &Bundle<R>,
+        rays: &[Ray],
+        surface: usize,
+        nearest: &mut Nearest<R>,
+    ) {
+        match &self.shapes[surface] {
+            Shape::Polygon(polygon) => nearest.polygon(simd, bundle, surface, polygon),
+            Shape::Mesh(mesh) => {
+                let take = inlined(
+                    #[inline(always)]
+                    |ray: usize, met: Option<Met>| {
+                        if let Some(met) = met {
+                            nearest.take(ray, met.distance, surface, met.triangle);
+                        }
+                    },
+                );
+                mesh.nearest_of_bundle(simd, bundle, rays, take);
+                nearest.set_limit(simd);
+            }
+            other => {
+                for (i, ray) in rays.iter().enumerate() {
+                    if let Some(distance) = other.distance(ray) {
+                        nearest.take(i, distance, surface, NONE);
+                    }
+                }
+                nearest.set_limit(simd);
+            }
+        }
     }
 
     /// What there is to know of a surface that a ray meets at a distance.

@@ -6,9 +6,9 @@
 
 use super::beam;
 use super::bundle::{Bundle, Caster, cast_all};
+use super::each;
 use super::exact::Judge;
 use super::lanes::inlined;
-use super::single;
 use super::wide::Wide;
 use crate::footprint::Ray;
 use crate::mesh::Mesh;
@@ -80,12 +80,25 @@ impl Triangles {
 
     /// The nearest triangle along a ray.
     pub fn nearest(&self, ray: &Ray) -> Option<Met> {
-        self.nearest_at(Level::new(), ray)
+        let mut met = [None];
+        self.nearest_of_each(std::slice::from_ref(ray), &mut met);
+        met[0]
     }
 
-    pub(super) fn nearest_at(&self, level: Level, ray: &Ray) -> Option<Met> {
-        let judge = self.judge(std::slice::from_ref(ray));
-        dispatch!(level, simd => single::follow(simd, &self.wide, ray, &judge))
+    /// The nearest triangle along each of some rays that have nothing in common.
+    ///
+    /// # Panics
+    /// If there are not as many places for what they meet.
+    pub fn nearest_of_each(&self, rays: &[Ray], met: &mut [Option<Met>]) {
+        self.nearest_of_each_at(Level::new(), rays, met);
+    }
+
+    pub(super) fn nearest_of_each_at(&self, level: Level, rays: &[Ray], met: &mut [Option<Met>]) {
+        assert_eq!(rays.len(), met.len(), "every ray has its place");
+        let judge = self.judge(rays);
+        dispatch!(level, simd => {
+            each::follow(simd, &self.wide, &judge, inlined(#[inline(always)] |ray: usize, of_ray| met[ray] = of_ray));
+        });
     }
 
     /// The nearest triangle along each of some rays: fast if they are a narrow cone, from nearly one point.
@@ -134,8 +147,8 @@ struct InMesh<'a> {
 }
 
 impl Caster<Option<Met>> for InMesh<'_> {
-    fn cast(&self, ray: &Ray) -> Option<Met> {
-        self.mesh.nearest_at(self.level, ray)
+    fn cast_each(&self, rays: &[Ray], met: &mut [Option<Met>]) {
+        self.mesh.nearest_of_each_at(self.level, rays, met);
     }
 
     fn cast_rows<const R: usize>(&self, rays: &[Ray], met: &mut [Option<Met>]) -> bool {

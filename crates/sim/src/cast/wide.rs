@@ -99,8 +99,6 @@ impl Node {
 
 /// What is still to be looked into, the nearest on top.
 pub(super) struct Walk {
-    /// What comes next, aside of the stack: most nodes have one child that is met.
-    next: Entry,
     stack: [Entry; STACK],
     height: usize,
 }
@@ -109,60 +107,55 @@ pub(super) struct Walk {
 type Entry = (f32, Child);
 
 impl Walk {
-    const NOTHING: Entry = (f32::INFINITY, Child::NONE);
-
-    /// From the root.
     #[inline(always)]
     pub(super) fn new() -> Self {
         Self {
-            next: (0.0, Child::node(0)),
-            stack: [Self::NOTHING; STACK],
+            stack: [(f32::INFINITY, Child::NONE); STACK],
             height: 0,
         }
+    }
+
+    /// The root; nothing else is left.
+    #[inline(always)]
+    pub(super) fn start(&mut self) -> Child {
+        self.height = 0;
+        Child::node(0)
     }
 
     /// The nearest thing before `limit` that is left.
     #[inline(always)]
     pub(super) fn next(&mut self, limit: f32) -> Option<Child> {
-        let mut entry = std::mem::replace(&mut self.next, Self::NOTHING);
-        while entry.0 > limit {
+        loop {
             self.height = self.height.checked_sub(1)?;
-            entry = self.stack[self.height];
+            let (near, child) = self.stack[self.height];
+            if near <= limit {
+                return Some(child);
+            }
         }
-        Some(entry.1)
     }
 
-    /// Puts the children of a node that are met on the stack.
+    /// The nearest of the children that are met; the others are left for later.
     #[inline(always)]
-    pub(super) fn push<S: Simd>(&mut self, node: &Node, mut met: u32, near: f32x8<S>) {
+    pub(super) fn enter<S: Simd>(&mut self, node: &Node, mut met: u32, near: f32x8<S>) -> Option<Child> {
+        const LANE: usize = WIDTH - 1;
         if met == 0 {
-            return;
+            return None;
+        }
+        // Most nodes have one.
+        if met & (met - 1) == 0 {
+            return Some(node.children[met.trailing_zeros() as usize & LANE]);
         }
         let mut nears = [0.0; WIDTH];
         near.store_slice(&mut nears);
         let mut take = || {
-            let lane = met.trailing_zeros() as usize & (WIDTH - 1);
+            let lane = met.trailing_zeros() as usize & LANE;
             met &= met - 1;
             ((nears[lane], node.children[lane]), met == 0)
         };
-        let (first, last) = take();
-        if last {
-            self.next = first;
-            return;
-        }
-        let (second, last) = take();
-        let (mut nearest, far) = if first.0 <= second.0 {
-            (first, second)
-        } else {
-            (second, first)
-        };
+        let (mut nearest, _) = take();
         let bottom = self.height;
-        self.stack[self.height] = far;
-        self.height += 1;
-        let mut done = last;
-        while !done {
+        loop {
             let (mut entry, last) = take();
-            done = last;
             if entry.0 < nearest.0 {
                 std::mem::swap(&mut entry, &mut nearest);
             }
@@ -173,8 +166,10 @@ impl Walk {
             }
             self.stack[place] = entry;
             self.height += 1;
+            if last {
+                return Some(nearest.1);
+            }
         }
-        self.next = nearest;
     }
 }
 
