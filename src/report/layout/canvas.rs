@@ -1,6 +1,6 @@
 //! Triangles and lines against a depth buffer, several samples to a pixel.
 
-use image::RgbaImage;
+use super::picture::Picture;
 use plotters::style::RGBColor;
 
 /// Size of the picture, in pixels.
@@ -87,10 +87,12 @@ impl Canvas {
     }
 
     /// The mean of each pixel's samples; what shows nothing is transparent.
-    pub(super) fn picture(&self) -> RgbaImage {
+    pub(super) fn picture(&self) -> Picture {
         let samples = SAMPLES as usize;
-        RgbaImage::from_fn(SIZE[0], SIZE[1], |x, y| {
-            let (column, row) = (x as usize * samples, y as usize * samples);
+        let [columns, rows] = SIZE.map(|s| s as usize);
+        let mut bytes = Vec::with_capacity(4 * columns * rows);
+        for (y, x) in (0..rows).flat_map(|y| (0..columns).map(move |x| (y, x))) {
+            let (column, row) = (x * samples, y * samples);
             let mut sum = [0_u32; 3];
             let mut count = 0_u32;
             for i in 0..samples {
@@ -110,8 +112,13 @@ impl Canvas {
             let mean = |value: u32| (value / count.max(1)) as u8;
             #[allow(clippy::cast_possible_truncation)]
             let alpha = (255 * count / (SAMPLES * SAMPLES)) as u8;
-            image::Rgba([mean(sum[0]), mean(sum[1]), mean(sum[2]), alpha])
-        })
+            bytes.extend([mean(sum[0]), mean(sum[1]), mean(sum[2]), alpha]);
+        }
+        Picture {
+            size: SIZE,
+            color: png::ColorType::Rgba,
+            bytes,
+        }
     }
 }
 
@@ -139,7 +146,8 @@ mod tests {
         canvas.triangle(corners(2.0), red);
         canvas.triangle(corners(1.0), blue);
         let picture = canvas.picture();
-        assert_eq!(picture.get_pixel(10, 10).0, [255, 0, 0, 255]);
-        assert_eq!(picture.get_pixel(40, 40).0[3], 0);
+        let pixel = |at: usize| &picture.bytes[4 * (at * SIZE[0] as usize + at)..][..4];
+        assert_eq!(pixel(10), [255, 0, 0, 255]);
+        assert_eq!(pixel(40)[3], 0);
     }
 }

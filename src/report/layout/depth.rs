@@ -2,9 +2,9 @@
 
 use super::Drawn;
 use super::perspective::base64;
+use super::picture::Picture;
 use super::views;
 use crate::report::figure::{css, round_numbers, tick};
-use image::ImageEncoder;
 use plotters::style::RGBColor;
 
 /// Size of the picture, and of the map in it with its upper left corner, in pixels.
@@ -97,18 +97,12 @@ fn room(drawn: &Drawn, part: impl Fn(f64) -> f64) -> Vec<u8> {
         None => [255, 0],
         Some(range) => [(near + (far - near) * part(*range)).round() as u8, 255],
     };
-    let pixels: Vec<u8> = depth.room_m.iter().flat_map(pixel).collect();
-    let mut png = Vec::new();
-    let encoder = image::codecs::png::PngEncoder::new(&mut png);
-    let size = [depth.columns, depth.rows].map(|s| u32::try_from(s).unwrap_or(0));
-    // Writing to memory, of the size the picture has, cannot fail.
-    if encoder
-        .write_image(&pixels, size[0], size[1], image::ExtendedColorType::La8)
-        .is_err()
-    {
-        png.clear();
+    Picture {
+        size: [depth.columns, depth.rows].map(|s| u32::try_from(s).unwrap_or(0)),
+        color: png::ColorType::GrayscaleAlpha,
+        bytes: depth.room_m.iter().flat_map(pixel).collect(),
     }
-    png
+    .encoded()
 }
 
 /// Color of a place on the scale, 0 near and 1 far.

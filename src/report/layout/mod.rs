@@ -3,6 +3,7 @@
 mod canvas;
 mod depth;
 mod perspective;
+mod picture;
 mod sides;
 mod tables;
 mod views;

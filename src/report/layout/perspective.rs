@@ -7,7 +7,6 @@ use crate::layout::center;
 use crate::report::figure::{color, css};
 use crate::report::page::escape;
 use catoptric_model::beam;
-use image::ImageEncoder;
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 use plotters::style::RGBColor;
 
@@ -138,19 +137,7 @@ pub(super) fn perspective(drawn: &Drawn) -> Perspective {
     }
     let mut words = axes(&camera, &mut canvas);
     add_names(drawn, &camera, radius, &mut words);
-    let mut png = Vec::new();
-    let picture = canvas.picture();
-    let encoder = image::codecs::png::PngEncoder::new(&mut png);
-    // Writing to memory, of the size the picture has, cannot fail.
-    let written = encoder.write_image(
-        picture.as_raw(),
-        SIZE[0],
-        SIZE[1],
-        image::ExtendedColorType::Rgba8,
-    );
-    if written.is_err() {
-        png.clear();
-    }
+    let png = canvas.picture().encoded();
     Perspective { png, words }
 }
 
