@@ -232,14 +232,17 @@ pub(super) fn index(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Wide {
             found.push((first, count));
         }
     }
+    // All that is left of the items is their order.
+    let numbers: Vec<u32> = items.iter().map(|item| item.number).collect();
+    drop(items);
     let leaf = |&(first, count): &(usize, usize)| {
         let mut leaf = Leaf {
             corners: [[[0.0; WIDTH]; 3]; 3],
             triangles: [u32::MAX; WIDTH],
         };
-        for (lane, item) in items[first..first + count].iter().enumerate() {
-            leaf.triangles[lane] = item.number;
-            for (corner, &vertex) in leaf.corners.iter_mut().zip(&triangles[item.number as usize]) {
+        for (lane, &number) in numbers[first..first + count].iter().enumerate() {
+            leaf.triangles[lane] = number;
+            for (corner, &vertex) in leaf.corners.iter_mut().zip(&triangles[number as usize]) {
                 for (row, coordinate) in corner.iter_mut().zip(vertices[vertex as usize].iter()) {
                     row[lane] = rounded(*coordinate);
                 }
@@ -282,6 +285,7 @@ fn sorted(items: &mut [Item], leaf: usize) -> Vec<Node> {
     }
     let mut nodes = Vec::new();
     node(items, all, (0, leaf), &mut nodes);
+    nodes.shrink_to_fit();
     nodes
 }
 
