@@ -12,7 +12,7 @@ use std::ops::Range;
 #[derive(Debug, Clone)]
 pub struct Rig {
     beams: Vec<Ways>,
-    /// No way leaves the ball of this radius around the sensor before it departs, in metres.
+    /// No way leaves the ball of this radius around the sensor before it departs, in metres; 0 if all depart at once.
     reach: f64,
     /// Whether a mirror on any way has a glass that makes ghosts.
     ghosts: bool,
@@ -84,7 +84,7 @@ impl Rig {
     /// Whether these ways are those of a setting: nothing of its room comes near enough, and there are no ghosts, whose
     /// ways are others.
     pub fn holds_in(&self, setting: &Setting<'_>) -> bool {
-        !self.ghosts && setting.is_clear(self.reach)
+        !self.ghosts && (self.reach == 0.0 || setting.is_clear(self.reach))
     }
 }
 
@@ -93,8 +93,7 @@ impl Ways {
         let rays: Vec<Ray> = rays.collect();
         let mut ways = Self::default();
         let mut bounces: Vec<(usize, usize, Meeting)> = Vec::new();
-        let starts = rays.iter().map(|ray| ray.origin.coords.norm());
-        let mut reach = starts.fold(0.0, f64::max);
+        let mut reach: f64 = 0.0;
         let courses = bare.follow_beam(&rays, bare.contents.max_bounces, |ray, bounce| {
             bounces.push((ray, bounce.facet, bounce.meeting));
             let places = [bounce.point, bounce.after.origin];
@@ -110,7 +109,11 @@ impl Ways {
         ways.meetings = bounces.iter().map(|(.., meeting)| *meeting).collect();
         ways.departures.reserve_exact(courses.len());
         let mut first = 0;
-        for course in &courses {
+        for (ray, course) in rays.iter().zip(&courses) {
+            // What leaves at once is cast into the room from where it starts, whatever is near.
+            if course.count > 0 || !matches!(course.end, End::Escaped) {
+                reach = reach.max(ray.origin.coords.norm());
+            }
             let then = match course.end {
                 End::Escaped => {
                     ways.leaving.push(course.last);
