@@ -126,6 +126,13 @@ impl Sight<'_> {
 
     /// What every beam of a scan meets; the same as for the scan before unless [`Sight::changes_at`] says otherwise.
     pub fn returns(&self, scan: usize) -> Returns {
+        let mut returns = Vec::new();
+        self.look(scan, &mut returns);
+        returns
+    }
+
+    /// The same, in the place of what another scan met.
+    pub fn look(&self, scan: usize, returns: &mut Returns) {
         let sensor = &self.laboratory.sensor;
         // Neighbors go together as far as the caster takes their rays at once.
         let together = (BUNDLE / sensor.sub_rays().max(1)).clamp(1, BEAMS_OF_A_THREAD);
@@ -140,7 +147,6 @@ impl Sight<'_> {
                 }
             }
         };
-        let mut returns = Vec::new();
         returns.resize_with(beam::COUNT, || None);
         returns
             .par_chunks_mut(together)
@@ -149,7 +155,6 @@ impl Sight<'_> {
             .for_each_init(Parts::default, |parts, (group, returns)| {
                 observe(parts, group * together, returns);
             });
-        returns
     }
 
     /// The ways of a beam's sub-rays in a scan, in the sensor frame of its time.
