@@ -4,7 +4,7 @@
 //! side by side, linked in order between the two, and encoded on the thread that recorded them.
 
 use super::error::CliError;
-use super::truth_tables::{rows_of_readings, rows_of_returns};
+use super::truth_tables::{ReturnRows, rows_of_readings};
 use catoptric::io::recording::{Encoded, RecordingEncoder};
 use catoptric::model::Pose;
 use catoptric::sim::laboratory::{Drawn, Memory, Returns, Sight};
@@ -147,6 +147,7 @@ impl<'a> Stream<'a> {
             segments = open.seen.iter().map(|(_, seen)| segments_of(seen)).sum();
         }
         let mut recorder = laboratory.excerpt_recorder(drawn);
+        let mut return_rows = ReturnRows::new(laboratory);
         let (mut returns_text, mut readings_text) = (String::new(), String::new());
         // What a scan of a flight sees is needed no longer than for that scan.
         let mut flown = Returns::new();
@@ -166,7 +167,7 @@ impl<'a> Stream<'a> {
             clock.add(&mut sample);
             if wanted(Table::Returns) && (moves || scan == 0) {
                 let scan = if moves { scan.to_string() } else { String::new() };
-                returns_text.push_str(&rows_of_returns(laboratory, number, seen, &scan));
+                return_rows.add(number, seen, &scan, &mut returns_text);
             }
             if wanted(Table::Readings) {
                 let chances = laboratory.scan_chances(drawn, scan);
