@@ -139,7 +139,7 @@ impl Sight<'_> {
         let observe = |parts: &mut Parts, first: usize, returns: &mut [Option<Return>]| {
             let beams = first..first + returns.len();
             let settings: Vec<_> = beams.clone().map(|beam| self.around(scan, beam)).collect();
-            if settings.iter().all(|setting| self.rig.holds_in(setting)) {
+            if self.rig.holds_in(&settings) {
                 sensor.observe_over(self.rig, &settings, first, parts, returns);
             } else {
                 for ((setting, beam), place) in settings.iter().zip(beams).zip(returns) {

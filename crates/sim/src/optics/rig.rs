@@ -119,10 +119,19 @@ impl Rig {
         }
     }
 
-    /// Whether these ways are those of a setting: nothing of its room comes near enough, and there are no ghosts, whose
-    /// ways are others.
-    pub fn holds_in(&self, setting: &Setting<'_>) -> bool {
-        !self.ghosts && (self.reach == 0.0 || setting.is_clear(self.reach))
+    /// Whether these ways are those of settings that are one, seen from places near each other: nothing of its room comes
+    /// near enough, and there are no ghosts, whose ways are others.
+    pub fn holds_in(&self, settings: &[Setting<'_>]) -> bool {
+        let Some(first) = settings.first() else {
+            return true;
+        };
+        let others = settings.iter().map(|other| other.distance_from(first));
+        let spread = others.fold(0.0, f64::max);
+        let is_clear = || {
+            // A ball that holds those around all places is mostly clear as well.
+            first.is_clear(self.reach + spread) || settings.iter().all(|s| s.is_clear(self.reach))
+        };
+        !self.ghosts && (self.reach == 0.0 || is_clear())
     }
 }
 

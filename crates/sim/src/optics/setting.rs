@@ -243,13 +243,22 @@ impl<'a> Setting<'a> {
 
     /// Whether nothing of the room is within a distance of the sensor, in metres.
     pub(super) fn is_clear(&self, distance: f64) -> bool {
-        let sensor = self
-            .start_from_sensor
-            .map_or_else(Point3::origin, |pose| Point3::from(pose.translation.vector));
+        let sensor = self.sensor();
         self.contents
             .extents
             .iter()
             .all(|e| e.is_beyond(&sensor, distance))
+    }
+
+    /// How far the sensor is from where another setting has it, in metres.
+    pub(super) fn distance_from(&self, other: &Self) -> f64 {
+        (self.sensor() - other.sensor()).norm()
+    }
+
+    /// Where the sensor is in the frame that the room is kept in.
+    fn sensor(&self) -> Point3<f64> {
+        self.start_from_sensor
+            .map_or_else(Point3::origin, |pose| Point3::from(pose.translation.vector))
     }
 
     /// Adds the legs of a beam, given in the sensor frame, to those that are to be cast into the room.

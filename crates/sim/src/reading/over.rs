@@ -35,7 +35,7 @@ impl Sensor {
     /// followed and the room's for all of them together.
     ///
     /// Every beam has a setting of its own: the same one, or what is seen of it from elsewhere; `rig` must
-    /// [hold](Rig::holds_in) in all of them.
+    /// [hold](Rig::holds_in) in them.
     pub fn observe_over(
         &self,
         rig: &Rig,
@@ -54,13 +54,13 @@ impl Sensor {
         }
         let mut from = 0;
         for ((setting, beam), place) in settings.iter().zip(first..).zip(returns) {
-            let leaving = rig.ways(beam).leaving;
-            let hits = &beyond.hits[from..from + leaving.len()];
-            from += leaving.len();
+            let ways = rig.ways(beam);
+            let hits = &beyond.hits[from..from + ways.leaving.len()];
+            from += ways.leaving.len();
             beyond.cosines.clear();
-            setting.incidences(leaving, hits, &mut beyond.cosines);
+            setting.incidences(ways.leaving, hits, &mut beyond.cosines);
             let cosines = &beyond.cosines;
-            self.illuminate_over(rig.ways(beam), setting, beam, &InRoom { hits, cosines }, parts);
+            self.illuminate_over(ways, setting, beam, &InRoom { hits, cosines }, parts);
             *place = self.receive(setting, parts.as_slice());
         }
         parts.beyond = beyond;
