@@ -93,7 +93,9 @@ impl Laboratory {
             return Ok(rig);
         }
         let bare = Setting::new(&self.scene, &self.structure, mirrors, Vec::new())?;
-        Ok(kept.get_or_init(|| self.sensor.compile(&bare)))
+        // Outside of the lock: a thread that waits for others to compile may take up another stretch and come here again.
+        let rig = self.sensor.compile(&bare);
+        Ok(kept.get_or_init(|| rig))
     }
 
     /// Time at which a beam of a scan is read, in seconds since its stretch began.
