@@ -4,9 +4,9 @@
 //! side by side, linked in order between the two, and encoded on the thread that recorded them.
 
 use super::error::CliError;
-use super::truth_tables::{rows_of_readings, rows_of_returns};
+use super::truth_tables::{ReturnRows, rows_of_readings};
 use catoptric::io::recording::{Encoded, RecordingEncoder};
-use catoptric::model::{Pose, beam};
+use catoptric::model::Pose;
 use catoptric::sim::laboratory::{Drawn, Memory, Returns, Sight};
 use catoptric::sim::reading::Return;
 use catoptric::sim::{Laboratory, SimError};
@@ -139,49 +139,53 @@ impl<'a> Stream<'a> {
 
     fn make(&self, open: Arc<Open<'a>>, drawn: &Drawn) -> Result<Made<'a>, CliError> {
         let (laboratory, number, scans) = (self.laboratory, drawn.number(), drawn.scans());
-        let begin = Instant::now();
-        let flown: Vec<Returns> = if open.seen.is_empty() {
-            scans.clone().map(|scan| open.sight.returns(scan)).collect()
-        } else {
-            Vec::new()
-        };
-        let mut trace = begin.elapsed();
-        let mut segments = flown.iter().map(segments_of).sum();
+        let wanted = |table| self.tables.contains(&table);
+        let moves = open.sight.moves();
+        let (mut trace, mut sample, mut encode, mut segments) = Default::default();
         if scans.start == 0 {
-            trace += open.trace;
-            segments += open.seen.iter().map(|(_, seen)| segments_of(seen)).sum::<usize>();
+            trace = open.trace;
+            segments = open.seen.iter().map(|(_, seen)| segments_of(seen)).sum();
         }
-        let begin = Instant::now();
-        let returns = |scan: usize| match open.seen.iter().rfind(|(from, _)| *from <= scan) {
-            Some((_, seen)) => seen,
-            None => &flown[scan - scans.start],
-        };
-        let excerpt = laboratory.excerpt(drawn, &open.first_seen, returns);
-        let sample = begin.elapsed();
-        let begin = Instant::now();
-        let encoded = self.encoder.encode_excerpt(&excerpt)?;
-        let mut texts = Vec::new();
-        for table in &self.tables {
-            texts.extend(match table {
-                Table::Returns if open.sight.moves() => Some(
-                    scans
-                        .clone()
-                        .map(|scan| rows_of_returns(laboratory, number, returns(scan), &scan.to_string()))
-                        .collect(),
-                ),
-                Table::Returns if scans.start > 0 => Some(String::new()),
-                Table::Returns => Some(rows_of_returns(laboratory, number, returns(0), "")),
-                Table::Readings => {
-                    let readings = excerpt.part.ranges.chunks(beam::COUNT);
-                    let rows = scans.clone().zip(readings).map(|(scan, readings)| {
-                        let chances = laboratory.scan_chances(drawn, scan);
-                        rows_of_readings(laboratory, (number, scan), returns(scan), &chances, readings)
-                    });
-                    Some(rows.collect())
+        let mut recorder = laboratory.excerpt_recorder(drawn);
+        let mut return_rows = ReturnRows::new(laboratory);
+        let (mut returns_text, mut readings_text) = (String::new(), String::new());
+        // What a scan of a flight sees is needed no longer than for that scan.
+        let mut flown = Returns::new();
+        let mut clock = Clock::new();
+        for scan in scans.clone() {
+            let seen = match open.seen.iter().rfind(|(from, _)| *from <= scan) {
+                Some((_, seen)) => seen,
+                None => {
+                    open.sight.look(scan, &mut flown);
+                    segments += segments_of(&flown);
+                    clock.add(&mut trace);
+                    &flown
                 }
-                Table::SubRays => None,
-            });
+            };
+            let changed = scan == scans.start || open.sight.changes_at(scan);
+            let readings = recorder.add(seen, changed);
+            clock.add(&mut sample);
+            if wanted(Table::Returns) && (moves || scan == 0) {
+                let scan = if moves { scan.to_string() } else { String::new() };
+                return_rows.add(number, seen, &scan, &mut returns_text);
+            }
+            if wanted(Table::Readings) {
+                let chances = laboratory.scan_chances(drawn, scan);
+                let rows = rows_of_readings(laboratory, (number, scan), seen, &chances, readings);
+                readings_text.push_str(&rows);
+            }
+            clock.add(&mut encode);
         }
+        let excerpt = recorder.finish(&open.first_seen);
+        clock.add(&mut sample);
+        let encoded = self.encoder.encode_excerpt(&excerpt)?;
+        let texts = self.tables.iter().filter_map(|table| match table {
+            Table::Returns => Some(std::mem::take(&mut returns_text)),
+            Table::Readings => Some(std::mem::take(&mut readings_text)),
+            Table::SubRays => None,
+        });
+        let texts = texts.collect();
+        clock.add(&mut encode);
         Ok(Made {
             open,
             number,
@@ -191,8 +195,24 @@ impl<'a> Stream<'a> {
             segments,
             trace,
             sample,
-            encode: begin.elapsed(),
+            encode,
         })
+    }
+}
+
+/// Tells how long each of some things that follow one another takes.
+struct Clock(Instant);
+
+impl Clock {
+    fn new() -> Self {
+        Self(Instant::now())
+    }
+
+    /// Adds what has passed since the last time.
+    fn add(&mut self, to: &mut Duration) {
+        let now = Instant::now();
+        *to += now - self.0;
+        self.0 = now;
     }
 }
 

@@ -47,34 +47,76 @@ pub(crate) fn way(names: &[&str], facets: &[usize]) -> String {
     field(&facets.join(">"))
 }
 
-/// The rows of what every beam met; `scan` is empty where they hold for every scan.
-pub(super) fn rows_of_returns(laboratory: &Laboratory, pose: usize, returns: &Returns, scan: &str) -> String {
-    let names = mirror_names(laboratory.scene());
-    let mut text = String::new();
-    let echoes = returns.iter().enumerate().flat_map(|(beam, found)| {
-        let echoes = found.iter().flat_map(Return::echoes).enumerate();
-        echoes.map(move |(echo, r)| (beam, echo, r))
-    });
-    for (beam, echo, r) in echoes {
-        let (surface, facets) = (role_name(r.role), way(&names, &r.facets));
-        let cosines: Vec<String> = r.facet_cos_incidence.iter().map(f64::to_string).collect();
-        let cosines = cosines.join(">");
-        text.push_str(&format!(
-            "{pose},{beam},{surface},{facets},{},{},{},{},{},{},{},{},{},{},{echo},{},{cosines},{scan}\n",
-            r.geometric,
-            r.cos_incidence,
-            r.power,
-            r.share,
-            r.mixed,
-            r.detection,
-            r.bias.distance,
-            r.bias.angle,
-            r.bias.color,
-            r.noise_sd,
-            r.probability,
-        ));
+/// A column of numbers as text: one that is that of the row before is not put in words again.
+#[derive(Default)]
+struct Column {
+    last: Option<f64>,
+    text: String,
+}
+
+impl Column {
+    fn add(&mut self, number: f64, to: &mut String) {
+        if self.last.map(f64::to_bits) != Some(number.to_bits()) {
+            self.last = Some(number);
+            self.text.clear();
+            // Writing to a string never fails.
+            let _ = write!(self.text, "{number},");
+        }
+        to.push_str(&self.text);
     }
-    text
+}
+
+/// The rows of what every beam met, in order of the beams.
+pub(super) struct ReturnRows<'a> {
+    names: Vec<&'a str>,
+    before_echo: [Column; 10],
+    probability: Column,
+}
+
+impl<'a> ReturnRows<'a> {
+    pub(super) fn new(laboratory: &'a Laboratory) -> Self {
+        Self {
+            names: mirror_names(laboratory.scene()),
+            before_echo: Default::default(),
+            probability: Column::default(),
+        }
+    }
+
+    /// Appends the rows of a scan; `scan` is empty where they hold for every scan.
+    pub(super) fn add(&mut self, pose: usize, returns: &Returns, scan: &str, text: &mut String) {
+        for (beam, found) in returns.iter().enumerate() {
+            for (echo, r) in found.iter().flat_map(Return::echoes).enumerate() {
+                // Writing to a string never fails.
+                let _ = write!(text, "{pose},{beam},{},", role_name(r.role));
+                match r.facets.as_slice() {
+                    [] => text.push_str("\"\""),
+                    facets => text.push_str(&way(&self.names, facets)),
+                }
+                text.push(',');
+                let numbers = [
+                    r.geometric,
+                    r.cos_incidence,
+                    r.power,
+                    r.share,
+                    r.mixed,
+                    r.detection,
+                    r.bias.distance,
+                    r.bias.angle,
+                    r.bias.color,
+                    r.noise_sd,
+                ];
+                for (number, column) in numbers.into_iter().zip(&mut self.before_echo) {
+                    column.add(number, text);
+                }
+                let _ = write!(text, "{echo},");
+                self.probability.add(r.probability, text);
+                for (k, cos) in r.facet_cos_incidence.iter().enumerate() {
+                    let _ = write!(text, "{}{cos}", if k == 0 { "" } else { ">" });
+                }
+                text.extend([",", scan, "\n"]);
+            }
+        }
+    }
 }
 
 /// First line of truth/readings.csv. `echo` is the one of truth/returns.csv that was reported, empty where none was

@@ -312,8 +312,11 @@ position_m = [0, 0.05, 1.76]
     let bare = Setting::new(&scene, &structure, Mirrors::Attached, Vec::new()).unwrap();
     let rig = laboratory.sensor().compile(&bare);
     let sight = laboratory.sight(1).unwrap();
-    assert!(!rig.holds_in(sight.setting()));
-    assert!(rig.holds_in(&bare) && rig.holds_in(&bare.seen_from(&Pose::translation(1.0, 0.0, 0.0))));
+    assert!(!rig.holds_in(std::slice::from_ref(sight.setting())));
+    assert!(rig.holds_in(&[
+        bare.seen_from(&Pose::identity()),
+        bare.seen_from(&Pose::translation(1.0, 0.0, 0.0))
+    ]));
     same_over_the_rig(&laboratory, 1);
     let names = sight.setting().names();
     let left = beam::nearest(std::f64::consts::FRAC_PI_2).unwrap();
@@ -343,10 +346,11 @@ fn flights_within_a_mesh_are_those_without_the_compiled_rig() {
     let number = laboratory.stretches() - 1;
     let sight = laboratory.sight(number).unwrap();
     assert!(sight.flies());
-    assert!(rig.holds_in(sight.setting()));
+    assert!(rig.holds_in(std::slice::from_ref(sight.setting())));
     let ends = laboratory.scans_of(number) - 1;
     let gone = sight.setting().seen_from(&Pose::translation(0.6, 0.0, 1.45));
-    assert!(!rig.holds_in(&gone));
+    let here = sight.setting().seen_from(&Pose::identity());
+    assert!(!rig.holds_in(&[here, gone]));
     for scan in [0, ends] {
         let returns = sight.returns(scan);
         for beam in (0..beam::COUNT).step_by(9) {

@@ -122,11 +122,24 @@ struct Span {
 
 impl Span {
     fn of(pulses: &[Pulse]) -> Self {
-        let ranges = pulses.iter().map(|p| p.range);
+        let (mut total, mut nearest, mut farthest) = (-0.0, f64::INFINITY, 0.0);
+        for pulse in pulses {
+            total += pulse.power;
+            nearest = if pulse.range < nearest {
+                pulse.range
+            } else {
+                nearest
+            };
+            farthest = if pulse.range > farthest {
+                pulse.range
+            } else {
+                farthest
+            };
+        }
         Self {
-            total: pulses.iter().map(|p| p.power).sum(),
-            nearest: ranges.clone().fold(f64::INFINITY, f64::min),
-            farthest: ranges.fold(0.0, f64::max),
+            total,
+            nearest,
+            farthest,
         }
     }
 }

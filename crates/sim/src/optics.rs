@@ -9,7 +9,7 @@ mod together;
 
 pub use edit::{Edit, Trail};
 pub use rig::Rig;
-pub(crate) use rig::Then;
+pub(crate) use rig::{Run, Then, Ways};
 pub(crate) use setting::Beyond;
 pub use setting::{Mirrors, Role, Setting, Target};
 

@@ -24,19 +24,37 @@ pub struct Illumination {
 /// mirrors' losses are written out.
 #[doc(alias = "P_detector")]
 pub fn received(light: &Light, on: &Illumination) -> f64 {
-    let aperture = light.receiver_diameter_mm * 1e-3;
-    let out_and_back = light.air_transmission * light.air_transmission;
-    let mirrors = on.mirrors * on.mirrors;
-    light.optics_transmission
-        * out_and_back
-        * aperture
-        * aperture
-        * on.reflectivity
-        * on.share
-        * light.power_w
-        / (on.range * on.range * light.target_dispersion_sr)
-        * on.cos_incidence
-        * mirrors
+    Target::new(light, on.reflectivity, on.mirrors).received(on.share, on.range, on.cos_incidence)
+}
+
+/// A target and the mirrors before it: what is the same for all sub-rays that go there.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Target {
+    /// τ_o·τ_a²·D_R²·ρ_t.
+    sent_back: f64,
+    power: f64,
+    dispersion: f64,
+    mirrors: f64,
+}
+
+impl Target {
+    /// A target of some reflectivity behind mirrors, as in [`Illumination`].
+    pub(crate) fn new(light: &Light, reflectivity: f64, mirrors: f64) -> Self {
+        let aperture = light.receiver_diameter_mm * 1e-3;
+        let out_and_back = light.air_transmission * light.air_transmission;
+        Self {
+            sent_back: light.optics_transmission * out_and_back * aperture * aperture * reflectivity,
+            power: light.power_w,
+            dispersion: light.target_dispersion_sr,
+            mirrors: mirrors * mirrors,
+        }
+    }
+
+    /// [`received`] from there.
+    #[inline]
+    pub(crate) fn received(&self, share: f64, range: f64, cos_incidence: f64) -> f64 {
+        self.sent_back * share * self.power / (range * range * self.dispersion) * cos_incidence * self.mirrors
+    }
 }
 
 #[cfg(test)]

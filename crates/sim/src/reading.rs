@@ -2,6 +2,7 @@
 //!
 //! Everything but `report` is free of chance; it is the same for every scan of a stretch.
 
+mod over;
 mod part;
 mod receive;
 mod report;
@@ -11,13 +12,12 @@ pub use part::Parts;
 pub use report::{Chance, MAX_ECHOES};
 pub use sub_ray::{Light as SubRayLight, Stop, SubRayEnd};
 
-use crate::cast::Hit;
 use crate::color;
 use crate::detect;
 use crate::echo::Receiver;
 use crate::error::SimError;
 use crate::footprint::{self, Ray, SubRay};
-use crate::optics::{End, MAX_BOUNCES, Path, Rig, Role, Setting, Then};
+use crate::optics::{End, MAX_BOUNCES, Path, Role, Setting};
 use crate::power::{self, Illumination};
 use crate::scene::{BeamShape, Detection, EchoChoice, ErrorModel, Errors, Light, Limits, Principle, Scene};
 use crate::truth::BeamClass;
@@ -220,47 +220,11 @@ impl Sensor {
         class(&chief, paths.iter().map(|(sub_ray, path)| (*sub_ray, path)))
     }
 
-    /// The structure's part in the ways of all sub-rays, for [`Sensor::observe_over`]; `bare` holds nothing else.
-    pub fn compile(&self, bare: &Setting<'_>) -> Rig {
-        Rig::compile(bare, beam::COUNT, |beam| self.rays(beam))
-    }
-
     /// What a beam brings home; `None` if no echo reaches the threshold.
     pub fn observe(&self, setting: &Setting<'_>, beam: usize) -> Option<Return> {
         let mut parts = Parts::default();
         self.illuminate(setting, beam, &mut parts);
         self.receive(setting, parts.as_slice())
-    }
-
-    /// What neighboring beams from `first` on bring home: the same to the last bit, with the structure's part already
-    /// followed and the room's for all of them together.
-    ///
-    /// Every beam has a setting of its own: the same one, or what is seen of it from elsewhere; `rig` must
-    /// [hold](Rig::holds_in) in all of them.
-    pub fn observe_over(
-        &self,
-        rig: &Rig,
-        settings: &[Setting<'_>],
-        first: usize,
-        parts: &mut Parts,
-        returns: &mut [Option<Return>],
-    ) {
-        let mut beyond = std::mem::take(&mut parts.beyond);
-        beyond.clear();
-        for (setting, beam) in settings.iter().zip(first..) {
-            setting.leave(rig.ways(beam).leaving(), &mut beyond);
-        }
-        if let Some(any) = settings.first() {
-            any.cast_into_room(&mut beyond);
-        }
-        let mut hits = beyond.hits.as_slice();
-        for ((setting, beam), place) in settings.iter().zip(first..).zip(returns) {
-            let (own, others) = hits.split_at(rig.ways(beam).leaving().len());
-            hits = others;
-            self.illuminate_over(rig, setting, beam, own, parts);
-            *place = self.receive(setting, parts.as_slice());
-        }
-        parts.beyond = beyond;
     }
 
     /// What the detector makes of a beam's light.
@@ -392,62 +356,6 @@ impl Sensor {
         for arrival in self.on_mirrors(setting, sub_ray, path.meetings()) {
             self.add(parts, path, &arrival, chief);
         }
-    }
-
-    /// [`Sensor::illuminate`] from where the sub-rays depart from the structure, with what those that leave it hit.
-    fn illuminate_over(
-        &self,
-        rig: &Rig,
-        setting: &Setting<'_>,
-        beam: usize,
-        hits: &[Option<Hit>],
-        parts: &mut Parts,
-    ) {
-        parts.begin();
-        let ways = rig.ways(beam);
-        let mut in_room = setting.met_in_room(ways.leaving(), hits);
-        for (sub_ray, departure) in self.sub_rays.iter().zip(ways.departures()) {
-            let end = match departure.then {
-                Then::Leaves => match in_room.next().flatten() {
-                    // A mirror of the room: its light may come back to the structure.
-                    Some(met) if met.reflects => {
-                        let ray = footprint::ray(&self.shape, beam::azimuth(beam), sub_ray);
-                        self.illuminate_along(setting, sub_ray, &ray, &setting.trace(&ray), parts);
-                        continue;
-                    }
-                    met => met.map(|met| (met.surface, met.cos_incidence, departure.length + met.distance)),
-                },
-                Then::EndsOn(surface, cos_incidence) => Some((surface, cos_incidence, departure.length)),
-                Then::Trapped => None,
-            };
-            let (facets, meetings) = (ways.facets(departure), ways.meetings(departure));
-            let cosines = meetings.iter().map(|m| m.cos_incidence);
-            let chief = is_chief(sub_ray);
-            if let Some((surface, cos_incidence, length)) = end {
-                let on = Illumination {
-                    reflectivity: setting.paint(surface).reflectivity,
-                    cos_incidence,
-                    share: sub_ray.weight,
-                    range: length,
-                    mirrors: self.mirrors[departure.silvered] * departure.gain,
-                };
-                let place = (length, cos_incidence);
-                let (power, share) = (power::received(&self.light, &on), on.share * departure.gain);
-                parts.add((surface, facets), power, share, place, cosines.clone(), chief);
-            }
-            for arrival in self.on_mirrors(setting, sub_ray, meetings.iter().copied()) {
-                let on = &arrival.on;
-                let place = (on.range, on.cos_incidence);
-                let cosines = cosines.clone().take(arrival.bounces);
-                let (power, share) = (power::received(&self.light, on), on.share * arrival.gain);
-                let facets = &facets[..arrival.bounces];
-                parts.add((arrival.surface, facets), power, share, place, cosines, chief);
-            }
-        }
-        if self.lacks_chief() {
-            Self::add_chief(parts, &self.chief_path(setting, beam));
-        }
-        parts.end();
     }
 
     /// Whether no sub-ray is the chief ray.

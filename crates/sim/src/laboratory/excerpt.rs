@@ -4,8 +4,8 @@
 //! innovations are drawn with the excerpt, and between drawing and recording the excerpts of a stretch are linked in
 //! order, which is one multiplication and one addition for a reading.
 
-use super::chance::{Memory, ScanLuck};
-use super::recorder::Digest;
+use super::chance::{Luck, Memory, ScanLuck};
+use super::recorder::{Digest, Readings};
 use super::{Laboratory, Returns};
 use crate::noise::Columns;
 use crate::reading::Chance;
@@ -22,6 +22,18 @@ pub struct Drawn {
     states: Vec<Vec<f64>>,
 }
 
+/// Some scans of a stretch being recorded.
+pub struct ExcerptRecorder<'a> {
+    laboratory: &'a Laboratory,
+    drawn: &'a Drawn,
+    luck: Luck<'a>,
+    readings: Readings,
+    digest: Digest,
+    scan_luck: ScanLuck,
+    /// The scan that is added next.
+    next: usize,
+}
+
 impl Drawn {
     /// Number of the stretch.
     pub fn number(&self) -> usize {
@@ -35,6 +47,36 @@ impl Drawn {
 
     fn states(&self, scan: usize) -> &[f64] {
         &self.states[scan - self.scans.start]
+    }
+}
+
+impl ExcerptRecorder<'_> {
+    /// Adds the next scan from what every beam met; `changed` if that may be something else than for the scan before, as it
+    /// is for the first. Its readings, in metres.
+    pub fn add(&mut self, returns: &Returns, changed: bool) -> &[f64] {
+        if changed {
+            self.digest.take(returns, self.readings.echoes.is_some());
+        }
+        let states = self.drawn.states(self.next);
+        let asked = Some(self.digest.by_chance());
+        self.luck.draw(self.next, states, asked, &mut self.scan_luck);
+        let known = self.readings.ranges.len();
+        self.readings
+            .add(self.laboratory, returns, &self.digest, &self.scan_luck);
+        self.next += 1;
+        &self.readings.ranges[known..]
+    }
+
+    /// The excerpt; `first_seen` is the stretch's.
+    pub fn finish(self, first_seen: &[Option<(f64, Pose)>]) -> Excerpt {
+        let (laboratory, number, scans) = (self.laboratory, self.drawn.number, self.drawn.scans());
+        let before = |scan| laboratory.frames_before(number, scan);
+        let frames = before(scans.start)..before(scans.end);
+        Excerpt {
+            part: laboratory.stretch_of(number, self.readings, frames),
+            first_scan: scans.start,
+            first_seen: first_seen.to_vec(),
+        }
     }
 }
 
@@ -74,23 +116,26 @@ impl Laboratory {
         first_seen: &[Option<(f64, Pose)>],
         returns: impl Fn(usize) -> &'r Returns,
     ) -> Excerpt {
-        let (number, luck) = (drawn.number, self.luck(drawn.number));
-        let mut readings = self.readings(drawn.scans.len());
-        let mut scan_luck = ScanLuck::default();
-        let mut digest: Option<Digest<'r>> = None;
+        let mut recorder = self.excerpt_recorder(drawn);
+        let mut last: Option<&Returns> = None;
         for scan in drawn.scans.clone() {
             let seen = returns(scan);
-            let known = digest.take().filter(|digest| digest.is_of(seen));
-            let digest = digest.insert(known.unwrap_or_else(|| Digest::of(seen, readings.echoes.is_some())));
-            luck.draw(scan, drawn.states(scan), Some(digest.by_chance()), &mut scan_luck);
-            readings.add(self, digest, &scan_luck);
+            recorder.add(seen, !last.is_some_and(|last| std::ptr::eq(last, seen)));
+            last = Some(seen);
         }
-        let frames =
-            self.frames_before(number, drawn.scans.start)..self.frames_before(number, drawn.scans.end);
-        Excerpt {
-            part: self.stretch_of(number, readings, frames),
-            first_scan: drawn.scans.start,
-            first_seen: first_seen.to_vec(),
+        recorder.finish(first_seen)
+    }
+
+    /// Begins to record scans that were linked: all of them are to be added, one after the other.
+    pub fn excerpt_recorder<'a>(&'a self, drawn: &'a Drawn) -> ExcerptRecorder<'a> {
+        ExcerptRecorder {
+            laboratory: self,
+            drawn,
+            luck: self.luck(drawn.number),
+            readings: self.readings(drawn.scans.len()),
+            digest: Digest::default(),
+            scan_luck: ScanLuck::default(),
+            next: drawn.scans.start,
         }
     }
 

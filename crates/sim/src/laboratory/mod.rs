@@ -12,7 +12,7 @@ mod sight;
 mod truth;
 
 pub use chance::{Chances, Memory};
-pub use excerpt::Drawn;
+pub use excerpt::{Drawn, ExcerptRecorder};
 pub use recorder::Recorder;
 pub use room::board_markers;
 pub use sight::Sight;

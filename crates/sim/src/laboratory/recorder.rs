@@ -2,7 +2,6 @@
 
 use super::chance::ScanLuck;
 use super::{Chances, Laboratory, Returns};
-use crate::reading::Return;
 use crate::scene::EchoChoice;
 use catoptric_model::range::NO_RETURN;
 use catoptric_model::{Stretch, beam};
@@ -43,8 +42,8 @@ impl Laboratory {
 }
 
 /// What every beam met, ready to be read scan after scan.
-pub(super) struct Digest<'r> {
-    returns: &'r Returns,
+#[derive(Default)]
+pub(super) struct Digest {
     beams: Vec<Reported>,
     /// The beams of [`Reported::ByChance`].
     by_chance: Vec<usize>,
@@ -61,30 +60,29 @@ enum Reported {
     ByChance,
 }
 
-impl<'r> Digest<'r> {
+impl Digest {
     /// The digest of a scan; with `all_echoes` none is simple.
-    pub(super) fn of(returns: &'r Returns, all_echoes: bool) -> Self {
-        let reported = |found: &Option<Return>| match found {
+    pub(super) fn of(returns: &Returns, all_echoes: bool) -> Self {
+        let mut digest = Self::default();
+        digest.take(returns, all_echoes);
+        digest
+    }
+
+    /// Becomes the digest of another scan.
+    pub(super) fn take(&mut self, returns: &Returns, all_echoes: bool) {
+        self.beams.clear();
+        self.by_chance.clear();
+        self.beams.extend(returns.iter().map(|found| match found {
             None => Reported::Nothing,
             Some(found) if found.probability >= 1.0 && !all_echoes => Reported::Surely {
                 range: found.range(),
                 noise_sd: found.noise_sd,
             },
             Some(_) => Reported::ByChance,
-        };
-        let beams: Vec<Reported> = returns.iter().map(reported).collect();
-        let by_chance = beams.iter().enumerate();
-        let by_chance = by_chance.filter(|(_, reported)| matches!(reported, Reported::ByChance));
-        Self {
-            returns,
-            by_chance: by_chance.map(|(beam, _)| beam).collect(),
-            beams,
-        }
-    }
-
-    /// Whether it is the digest of these.
-    pub(super) fn is_of(&self, returns: &Returns) -> bool {
-        std::ptr::eq(self.returns, returns)
+        }));
+        let beams = self.beams.iter().enumerate();
+        let by_chance = beams.filter(|(_, reported)| matches!(reported, Reported::ByChance));
+        self.by_chance.extend(by_chance.map(|(beam, _)| beam));
     }
 
     /// The beams whose detection is by chance.
@@ -94,19 +92,19 @@ impl<'r> Digest<'r> {
 }
 
 impl Readings {
-    /// Adds a scan.
-    pub(super) fn add(&mut self, laboratory: &Laboratory, seen: &Digest<'_>, luck: &ScanLuck) {
+    /// Adds a scan from what every beam met and the digest of it.
+    pub(super) fn add(&mut self, laboratory: &Laboratory, seen: &Returns, digest: &Digest, luck: &ScanLuck) {
         let sensor = &laboratory.sensor;
-        let beams = seen.beams.iter().enumerate();
+        let beams = digest.beams.iter().enumerate();
         self.ranges.extend(beams.map(|(beam, reported)| match *reported {
             Reported::Nothing => NO_RETURN,
             Reported::Surely { range, noise_sd } => {
                 sensor.read_echo(range, noise_sd, &luck.but_detection(beam))
             }
-            Reported::ByChance => sensor.read(seen.returns[beam].as_ref(), &luck.of(beam)),
+            Reported::ByChance => sensor.read(seen[beam].as_ref(), &luck.of(beam)),
         }));
         if let Some(echoes) = &mut self.echoes {
-            let beams = seen.returns.iter().enumerate();
+            let beams = seen.iter().enumerate();
             echoes.extend(beams.map(|(beam, found)| sensor.read_all(found.as_ref(), &luck.of(beam))));
         }
     }
@@ -117,7 +115,7 @@ impl Recorder<'_> {
     pub fn add(&mut self, returns: &Returns) {
         let digest = Digest::of(returns, self.readings.echoes.is_some());
         let luck = self.chances.next_scan(Some(digest.by_chance()));
-        self.readings.add(self.laboratory, &digest, luck);
+        self.readings.add(self.laboratory, returns, &digest, luck);
     }
 
     /// The stretch, with what motion capture saw meanwhile.

@@ -93,7 +93,9 @@ impl Laboratory {
             return Ok(rig);
         }
         let bare = Setting::new(&self.scene, &self.structure, mirrors, Vec::new())?;
-        Ok(kept.get_or_init(|| self.sensor.compile(&bare)))
+        // Outside of the lock: a thread that waits for others to compile may take up another stretch and come here again.
+        let rig = self.sensor.compile(&bare);
+        Ok(kept.get_or_init(|| rig))
     }
 
     /// Time at which a beam of a scan is read, in seconds since its stretch began.
@@ -126,13 +128,20 @@ impl Sight<'_> {
 
     /// What every beam of a scan meets; the same as for the scan before unless [`Sight::changes_at`] says otherwise.
     pub fn returns(&self, scan: usize) -> Returns {
+        let mut returns = Vec::new();
+        self.look(scan, &mut returns);
+        returns
+    }
+
+    /// The same, in the place of what another scan met.
+    pub fn look(&self, scan: usize, returns: &mut Returns) {
         let sensor = &self.laboratory.sensor;
         // Neighbors go together as far as the caster takes their rays at once.
         let together = (BUNDLE / sensor.sub_rays().max(1)).clamp(1, BEAMS_OF_A_THREAD);
         let observe = |parts: &mut Parts, first: usize, returns: &mut [Option<Return>]| {
             let beams = first..first + returns.len();
             let settings: Vec<_> = beams.clone().map(|beam| self.around(scan, beam)).collect();
-            if settings.iter().all(|setting| self.rig.holds_in(setting)) {
+            if self.rig.holds_in(&settings) {
                 sensor.observe_over(self.rig, &settings, first, parts, returns);
             } else {
                 for ((setting, beam), place) in settings.iter().zip(beams).zip(returns) {
@@ -140,7 +149,6 @@ impl Sight<'_> {
                 }
             }
         };
-        let mut returns = Vec::new();
         returns.resize_with(beam::COUNT, || None);
         returns
             .par_chunks_mut(together)
@@ -149,7 +157,6 @@ impl Sight<'_> {
             .for_each_init(Parts::default, |parts, (group, returns)| {
                 observe(parts, group * together, returns);
             });
-        returns
     }
 
     /// The ways of a beam's sub-rays in a scan, in the sensor frame of its time.

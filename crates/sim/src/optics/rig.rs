@@ -3,48 +3,72 @@
 //! Scanner and structure are rigid: what a sub-ray does until it leaves the structure for good, or ends on it, is the same
 //! wherever the sensor is and whatever is around it, as long as nothing of the room comes within the structure itself.
 
-use super::{End, Meeting, Setting};
+use super::{Course, End, Meeting, Setting};
 use crate::footprint::Ray;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// The ways of every sub-ray of every beam over the structure.
+/// The ways of every sub-ray of every beam over the structure, beam after beam.
 #[derive(Debug, Clone)]
 pub struct Rig {
-    beams: Vec<Ways>,
-    /// No way leaves the ball of this radius around the sensor before it departs, in metres.
+    all: Compiled,
+    /// Where the ways of each beam begin, and last where they end.
+    starts: Vec<Start>,
+    /// No way leaves the ball of this radius around the sensor before it departs, in metres; 0 if all depart at once.
     reach: f64,
     /// Whether a mirror on any way has a glass that makes ghosts.
     ghosts: bool,
 }
 
 /// The ways of a beam's sub-rays over the structure, in the order in which they are cast.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Ways {
-    departures: Vec<Departure>,
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ways<'a> {
+    /// How the sub-rays are done with the structure, in order.
+    pub(crate) runs: &'a [Run],
+    /// Lengths of the ways of all sub-rays, in metres: to the end on the structure, or to where the last leg begins.
+    pub(crate) lengths: &'a [f64],
     /// The last legs of those that leave.
-    leaving: Vec<Ray>,
-    /// Mirrors met and what was brought to them, of all ways one after the other.
-    facets: Vec<usize>,
-    meetings: Vec<Meeting>,
-    /// As for all beams together.
-    reach: f64,
-    ghosts: bool,
+    pub(crate) leaving: &'a [Ray],
+    facets: &'a [usize],
+    meetings: &'a [Meeting],
 }
 
-/// How a sub-ray is done with the structure.
+/// The ways of one beam, or of beams one after the other.
+#[derive(Debug, Clone, Default)]
+struct Compiled {
+    runs: Vec<Run>,
+    lengths: Vec<f64>,
+    leaving: Vec<Ray>,
+    /// Mirrors met by each run, one run after the other.
+    facets: Vec<usize>,
+    /// What was brought to them, of all ways one after the other.
+    meetings: Vec<Meeting>,
+}
+
+/// How much of everything comes before a beam.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Departure {
+struct Start {
+    runs: usize,
+    lengths: usize,
+    leaving: usize,
+    facets: usize,
+    meetings: usize,
+}
+
+/// Sub-rays in a row that are done with the structure alike. Each that does not leave is by itself.
+#[derive(Debug, Clone)]
+pub(crate) struct Run {
+    /// Which of the beam's sub-rays.
+    pub(crate) sub_rays: Range<usize>,
+    /// What comes then.
+    pub(crate) then: Then,
     /// Reflections by silver.
     pub(crate) silvered: usize,
     /// Share of the light that glass has let pass.
     pub(crate) gain: f64,
-    /// Length of the way, in metres: to its end on the structure, or to where the last leg begins.
-    pub(crate) length: f64,
-    /// What comes then.
-    pub(crate) then: Then,
-    first: usize,
-    count: usize,
+    facets: Range<usize>,
+    /// Place of the first meeting of the beam's.
+    meetings: usize,
 }
 
 /// What a sub-ray does when it is done with the mirrors of the structure.
@@ -65,36 +89,59 @@ impl Rig {
         beams: usize,
         rays: impl Fn(usize) -> R + Sync,
     ) -> Self {
-        let beams: Vec<Ways> = (0..beams)
+        let beams: Vec<(Compiled, f64, bool)> = (0..beams)
             .into_par_iter()
-            .map(|beam| Ways::compile(bare, rays(beam)))
+            .map(|beam| Compiled::of(bare, rays(beam)))
             .collect();
+        let mut all = Compiled::default();
+        let mut starts = vec![all.start()];
+        for (beam, ..) in &beams {
+            all.append(beam);
+            starts.push(all.start());
+        }
         Self {
-            reach: beams.iter().map(|ways| ways.reach).fold(0.0, f64::max),
-            ghosts: beams.iter().any(|ways| ways.ghosts),
-            beams,
+            all,
+            starts,
+            reach: beams.iter().map(|(_, reach, _)| *reach).fold(0.0, f64::max),
+            ghosts: beams.iter().any(|(.., ghosts)| *ghosts),
         }
     }
 
     /// The ways of a beam.
-    pub(crate) fn ways(&self, beam: usize) -> &Ways {
-        &self.beams[beam]
+    pub(crate) fn ways(&self, beam: usize) -> Ways<'_> {
+        let (from, to, all) = (&self.starts[beam], &self.starts[beam + 1], &self.all);
+        Ways {
+            runs: &all.runs[from.runs..to.runs],
+            lengths: &all.lengths[from.lengths..to.lengths],
+            leaving: &all.leaving[from.leaving..to.leaving],
+            facets: &all.facets[from.facets..to.facets],
+            meetings: &all.meetings[from.meetings..to.meetings],
+        }
     }
 
-    /// Whether these ways are those of a setting: nothing of its room comes near enough, and there are no ghosts, whose
-    /// ways are others.
-    pub fn holds_in(&self, setting: &Setting<'_>) -> bool {
-        !self.ghosts && setting.is_clear(self.reach)
+    /// Whether these ways are those of settings that are one, seen from places near each other: nothing of its room comes
+    /// near enough, and there are no ghosts, whose ways are others.
+    pub fn holds_in(&self, settings: &[Setting<'_>]) -> bool {
+        let Some(first) = settings.first() else {
+            return true;
+        };
+        let others = settings.iter().map(|other| other.distance_from(first));
+        let spread = others.fold(0.0, f64::max);
+        let is_clear = || {
+            // A ball that holds those around all places is mostly clear as well.
+            first.is_clear(self.reach + spread) || settings.iter().all(|s| s.is_clear(self.reach))
+        };
+        !self.ghosts && (self.reach == 0.0 || is_clear())
     }
 }
 
-impl Ways {
-    fn compile(bare: &Setting<'_>, rays: impl Iterator<Item = Ray>) -> Self {
+impl Compiled {
+    /// The ways of a beam, how far from the sensor they go before they depart, and whether a glass on them makes ghosts.
+    fn of(bare: &Setting<'_>, rays: impl Iterator<Item = Ray>) -> (Self, f64, bool) {
         let rays: Vec<Ray> = rays.collect();
         let mut ways = Self::default();
         let mut bounces: Vec<(usize, usize, Meeting)> = Vec::new();
-        let starts = rays.iter().map(|ray| ray.origin.coords.norm());
-        let mut reach = starts.fold(0.0, f64::max);
+        let mut reach: f64 = 0.0;
         let courses = bare.follow_beam(&rays, bare.contents.max_bounces, |ray, bounce| {
             bounces.push((ray, bounce.facet, bounce.meeting));
             let places = [bounce.point, bounce.after.origin];
@@ -103,14 +150,15 @@ impl Ways {
         // Those of one ray after the other, each in order.
         bounces.sort_by_key(|(ray, ..)| *ray);
         let facets = &bare.contents.facets;
-        ways.ghosts = bounces
+        let ghosts = bounces
             .iter()
             .any(|(_, f, _)| facets[*f].glass.is_some_and(|g| g.ghost));
-        ways.facets = bounces.iter().map(|(_, facet, _)| *facet).collect();
-        ways.meetings = bounces.iter().map(|(.., meeting)| *meeting).collect();
-        ways.departures.reserve_exact(courses.len());
-        let mut first = 0;
-        for course in &courses {
+        let mut met = 0;
+        for (ray, course) in rays.iter().zip(&courses) {
+            // What leaves at once is cast into the room from where it starts, whatever is near.
+            if course.count > 0 || !matches!(course.end, End::Escaped) {
+                reach = reach.max(ray.origin.coords.norm());
+            }
             let then = match course.end {
                 End::Escaped => {
                     ways.leaving.push(course.last);
@@ -126,43 +174,70 @@ impl Ways {
                     Then::Trapped
                 }
             };
-            ways.departures.push(Departure {
-                silvered: course.silvered,
-                gain: course.gain,
-                length: course.length,
-                then,
-                first,
-                count: course.count,
-            });
-            first += course.count;
+            let own = met..met + course.count;
+            met = own.end;
+            ways.lengths.push(course.length);
+            ways.depart(course, then, own.clone().map(|i| bounces[i].1));
+            ways.meetings
+                .extend(bounces[own].iter().map(|(.., meeting)| *meeting));
         }
-        ways.reach = reach;
-        ways
+        (ways, reach, ghosts)
     }
 
-    /// How the sub-rays are done with the structure.
-    pub(crate) fn departures(&self) -> &[Departure] {
-        &self.departures
+    fn start(&self) -> Start {
+        Start {
+            runs: self.runs.len(),
+            lengths: self.lengths.len(),
+            leaving: self.leaving.len(),
+            facets: self.facets.len(),
+            meetings: self.meetings.len(),
+        }
     }
 
-    /// The last legs of those that leave.
-    pub(crate) fn leaving(&self) -> &[Ray] {
-        &self.leaving
+    /// Adds the ways of a beam.
+    fn append(&mut self, beam: &Self) {
+        self.runs.extend_from_slice(&beam.runs);
+        self.lengths.extend_from_slice(&beam.lengths);
+        self.leaving.extend_from_slice(&beam.leaving);
+        self.facets.extend_from_slice(&beam.facets);
+        self.meetings.extend_from_slice(&beam.meetings);
     }
 
-    /// The mirrors that a sub-ray met.
-    pub(crate) fn facets(&self, departure: &Departure) -> &[usize] {
-        &self.facets[departure.range()]
-    }
-
-    /// What it brought to them.
-    pub(crate) fn meetings(&self, departure: &Departure) -> &[Meeting] {
-        &self.meetings[departure.range()]
+    /// Adds the next sub-ray to the run before, or begins one.
+    fn depart(&mut self, course: &Course, then: Then, facets: impl Iterator<Item = usize>) {
+        let number = self.lengths.len() - 1;
+        let first = self.facets.len();
+        self.facets.extend(facets);
+        if let Some(run) = self.runs.last_mut()
+            && matches!((run.then, then), (Then::Leaves, Then::Leaves))
+            && (run.silvered, run.gain) == (course.silvered, course.gain)
+            && self.facets[run.facets.clone()] == self.facets[first..]
+        {
+            self.facets.truncate(first);
+            run.sub_rays.end += 1;
+            return;
+        }
+        self.runs.push(Run {
+            sub_rays: number..number + 1,
+            then,
+            silvered: course.silvered,
+            gain: course.gain,
+            facets: first..self.facets.len(),
+            meetings: self.meetings.len(),
+        });
     }
 }
 
-impl Departure {
-    fn range(&self) -> Range<usize> {
-        self.first..self.first + self.count
+impl<'a> Ways<'a> {
+    /// The mirrors that a run's sub-rays met.
+    pub(crate) fn facets(&self, run: &Run) -> &'a [usize] {
+        &self.facets[run.facets.clone()]
+    }
+
+    /// What one of its sub-rays brought to them.
+    pub(crate) fn meetings(&self, run: &Run, sub_ray: usize) -> &'a [Meeting] {
+        let count = run.facets.len();
+        let first = run.meetings + (sub_ray - run.sub_rays.start) * count;
+        &self.meetings[first..first + count]
     }
 }

@@ -6,7 +6,7 @@
 
 use super::MAX_BOUNCES;
 use super::clearance::Extent;
-use super::placed::{place_all, placed};
+use super::placed::{incidences, place_all, placed};
 use crate::cast::{Hit, Shape, World};
 use crate::color::{self, Paint};
 use crate::error::SimError;
@@ -117,21 +117,12 @@ pub enum Mirrors {
     Removed,
 }
 
-/// What a leg beyond the structure meets.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Met {
-    pub(crate) surface: usize,
-    pub(crate) distance: f64,
-    pub(crate) cos_incidence: f64,
-    /// Whether it reflects.
-    pub(crate) reflects: bool,
-}
-
 /// Room for the legs of some beams in the frame of the room, and for what they meet.
 #[derive(Debug, Default)]
 pub(crate) struct Beyond {
     rays: Vec<Ray>,
     pub(crate) hits: Vec<Option<Hit>>,
+    pub(crate) cosines: Vec<f64>,
 }
 
 impl Beyond {
@@ -252,13 +243,22 @@ impl<'a> Setting<'a> {
 
     /// Whether nothing of the room is within a distance of the sensor, in metres.
     pub(super) fn is_clear(&self, distance: f64) -> bool {
-        let sensor = self
-            .start_from_sensor
-            .map_or_else(Point3::origin, |pose| Point3::from(pose.translation.vector));
+        let sensor = self.sensor();
         self.contents
             .extents
             .iter()
             .all(|e| e.is_beyond(&sensor, distance))
+    }
+
+    /// How far the sensor is from where another setting has it, in metres.
+    pub(super) fn distance_from(&self, other: &Self) -> f64 {
+        (self.sensor() - other.sensor()).norm()
+    }
+
+    /// Where the sensor is in the frame that the room is kept in.
+    fn sensor(&self) -> Point3<f64> {
+        self.start_from_sensor
+            .map_or_else(Point3::origin, |pose| Point3::from(pose.translation.vector))
     }
 
     /// Adds the legs of a beam, given in the sensor frame, to those that are to be cast into the room.
@@ -283,31 +283,23 @@ impl<'a> Setting<'a> {
         }
     }
 
-    /// What the legs of a beam meet in the room, from where they were cast to.
-    pub(crate) fn met_in_room<'b>(
-        &'b self,
-        rays: &'b [Ray],
-        hits: &'b [Option<Hit>],
-    ) -> impl Iterator<Item = Option<Met>> + 'b {
-        let moved = self.start_from_sensor.as_ref();
-        // Rays of a beam mostly meet one plane: its normal is turned once.
-        let mut turned: Option<[Unit<Vector3<f64>>; 2]> = None;
-        rays.iter().zip(hits).map(move |(ray, hit)| {
-            let mut hit = (*hit)?;
-            hit.surface += self.contents.first_of_room;
-            let normal = match (moved, turned) {
-                (None, _) => hit.normal,
-                (Some(_), Some([kept, seen])) if kept == hit.normal => seen,
-                (Some(pose), _) => pose.inverse_transform_unit_vector(&hit.normal),
-            };
-            turned = Some([hit.normal, normal]);
-            Some(Met {
-                surface: hit.surface,
-                distance: hit.distance,
-                cos_incidence: normal.dot(&ray.direction).abs(),
-                reflects: self.reflecting(&hit).is_some(),
-            })
-        })
+    /// Appends the cosines of the incidence of a beam's legs, from 0 to 1, where they meet the room; else anything.
+    pub(crate) fn incidences(&self, rays: &[Ray], hits: &[Option<Hit>], cosines: &mut Vec<f64>) {
+        let sensor_from_room = self.start_from_sensor.map(|pose| pose.rotation.inverse());
+        incidences(rays, hits, sensor_from_room.as_ref(), cosines);
+    }
+
+    /// A hit by a leg that was cast into the room, with its surface's index among all.
+    pub(crate) fn hit_in_room(&self, hit: &Hit) -> Hit {
+        Hit {
+            surface: hit.surface + self.contents.first_of_room,
+            ..*hit
+        }
+    }
+
+    /// Whether a surface is a mirror, or a side of one that does not reflect.
+    pub(crate) fn is_mirror(&self, surface: usize) -> bool {
+        matches!(self.role(surface), Role::Facet(_))
     }
 
     /// What a surface is.
@@ -331,7 +323,7 @@ impl<'a> Setting<'a> {
     }
 
     /// The mirror that a hit is on, and whether it is the body's back.
-    pub(super) fn reflecting(&self, hit: &Hit) -> Option<(usize, bool)> {
+    pub(crate) fn reflecting(&self, hit: &Hit) -> Option<(usize, bool)> {
         let surface = &self.contents.surfaces[hit.surface];
         let Role::Facet(facet) = surface.role else {
             return None;

@@ -50,15 +50,6 @@ impl Place {
         place
     }
 
-    /// Adds another with a weight.
-    fn add(&mut self, weight: f64, range: f64, cos_incidence: f64, cosines: impl Iterator<Item = f64>) {
-        self.range += weight * range;
-        self.cos_incidence += weight * cos_incidence;
-        for (sum, cos) in self.facets.iter_mut().zip(cosines) {
-            *sum += weight * cos;
-        }
-    }
-
     fn divide(&mut self, by: f64, facets: usize) {
         self.range /= by;
         self.cos_incidence /= by;
@@ -81,6 +72,32 @@ impl Part {
 
     fn went(&self, surface: usize, facets: &[usize]) -> bool {
         self.surface == surface && self.facets().iter().eq(facets)
+    }
+
+    /// Adds pulses, each with its share of the beam's energy and its incidence.
+    pub(super) fn add(&mut self, light: impl Iterator<Item = (Pulse, f64, f64)>) {
+        let (mut all, mut power, mut mean) = (self.share, self.power, self.mean);
+        self.pulses.extend(light.map(|(pulse, share, cos_incidence)| {
+            all += share;
+            power += pulse.power;
+            mean.range += pulse.power * pulse.range;
+            mean.cos_incidence += pulse.power * cos_incidence;
+            pulse
+        }));
+        (self.share, self.power, self.mean) = (all, power, mean);
+    }
+
+    /// Adds the incidences on the facets before to what was added after the first so many.
+    pub(super) fn add_cosines(
+        &mut self,
+        known: usize,
+        added: impl Iterator<Item = impl Iterator<Item = f64>>,
+    ) {
+        for (pulse, cosines) in self.pulses[known..].iter().zip(added) {
+            for (sum, cos) in self.mean.facets.iter_mut().zip(cosines) {
+                *sum += pulse.power * cos;
+            }
+        }
     }
 
     /// Begins anew with nothing in it.
@@ -110,6 +127,18 @@ impl Parts {
         self.live.iter_mut().find(|p| p.went(surface, facets))
     }
 
+    /// The part of a surface and the facets on the way, from now on if it is new.
+    pub(super) fn of(&mut self, surface: usize, facets: &[usize]) -> &mut Part {
+        let known = self.live.iter().position(|p| p.went(surface, facets));
+        let index = known.unwrap_or_else(|| {
+            let mut part = self.spare.pop().unwrap_or_default();
+            part.begin(surface, facets);
+            self.live.push(part);
+            self.live.len() - 1
+        });
+        &mut self.live[index]
+    }
+
     /// Adds light that reaches a surface at a range under an incidence, after incidences on facets; `share` is that of the
     /// beam's energy.
     pub(super) fn add(
@@ -121,18 +150,10 @@ impl Parts {
         cosines: impl Iterator<Item = f64> + Clone,
         chief: bool,
     ) {
-        let known = self.live.iter().position(|p| p.went(surface, facets));
-        let index = known.unwrap_or_else(|| {
-            let mut part = self.spare.pop().unwrap_or_default();
-            part.begin(surface, facets);
-            self.live.push(part);
-            self.live.len() - 1
-        });
-        let part = &mut self.live[index];
-        part.pulses.push(Pulse { range, power });
-        part.share += share;
-        part.power += power;
-        part.mean.add(power, range, cos_incidence, cosines.clone());
+        let part = self.of(surface, facets);
+        let known = part.pulses.len();
+        part.add(std::iter::once((Pulse { range, power }, share, cos_incidence)));
+        part.add_cosines(known, std::iter::once(cosines.clone()));
         if chief {
             part.chief = Some(Place::new(range, cos_incidence, cosines));
         }
