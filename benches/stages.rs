@@ -155,7 +155,13 @@ fn noise(c: &mut Criterion) {
     let drawn = laboratory.draw(FACET_STRETCH, 0..64);
     group.throughput(Throughput::Elements(64 * beam::COUNT as u64));
     group.bench_function("readings of 64 scans", |b| {
-        b.iter(|| laboratory.excerpt(&drawn, &first_seen, |_| &returns));
+        b.iter(|| {
+            let mut recorder = laboratory.excerpt_recorder(&drawn);
+            for _ in drawn.scans() {
+                recorder.add(&returns, false);
+            }
+            recorder.finish(&first_seen)
+        });
     });
     group.finish();
 }

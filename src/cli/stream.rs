@@ -162,8 +162,7 @@ impl<'a> Stream<'a> {
                     &flown
                 }
             };
-            let changed = scan == scans.start || open.sight.changes_at(scan);
-            let readings = recorder.add(seen, changed);
+            let readings = recorder.add(seen, open.sight.changes_at(scan));
             clock.add(&mut sample);
             if wanted(Table::Returns) && (moves || scan == 0) {
                 let scan = if moves { scan.to_string() } else { String::new() };

@@ -87,12 +87,8 @@ impl<'a> ReturnRows<'a> {
         for (beam, found) in returns.iter().enumerate() {
             for (echo, r) in found.iter().flat_map(Return::echoes).enumerate() {
                 // Writing to a string never fails.
-                let _ = write!(text, "{pose},{beam},{},", role_name(r.role));
-                match r.facets.as_slice() {
-                    [] => text.push_str("\"\""),
-                    facets => text.push_str(&way(&self.names, facets)),
-                }
-                text.push(',');
+                let facets = way(&self.names, &r.facets);
+                let _ = write!(text, "{pose},{beam},{},{facets},", role_name(r.role));
                 let numbers = [
                     r.geometric,
                     r.cos_incidence,

@@ -63,7 +63,13 @@ fn excerpts(laboratory: &Laboratory, number: usize, scans: usize) -> Vec<Excerpt
     let first_seen = laboratory.first_seen(number);
     drawn
         .iter()
-        .map(|drawn| laboratory.excerpt(drawn, &first_seen, |scan| &seen[scan]))
+        .map(|drawn| {
+            let mut recorder = laboratory.excerpt_recorder(drawn);
+            for scan in drawn.scans() {
+                recorder.add(&seen[scan], sight.changes_at(scan));
+            }
+            recorder.finish(&first_seen)
+        })
         .collect()
 }
 

@@ -51,10 +51,10 @@ impl Drawn {
 }
 
 impl ExcerptRecorder<'_> {
-    /// Adds the next scan from what every beam met; `changed` if that may be something else than for the scan before, as it
-    /// is for the first. Its readings, in metres.
+    /// Adds the next scan from what every beam met; `changed` if that may be something else than for the scan before. Its
+    /// readings, in metres.
     pub fn add(&mut self, returns: &Returns, changed: bool) -> &[f64] {
-        if changed {
+        if changed || self.next == self.drawn.scans.start {
             self.digest.take(returns, self.readings.echoes.is_some());
         }
         let states = self.drawn.states(self.next);
@@ -107,23 +107,6 @@ impl Laboratory {
         for (scan, states) in drawn.scans.clone().zip(&mut drawn.states) {
             luck.remember(scan, memory, states);
         }
-    }
-
-    /// Records scans that were linked, from what every one of them sees; `first_seen` is the stretch's.
-    pub fn excerpt<'r>(
-        &self,
-        drawn: &Drawn,
-        first_seen: &[Option<(f64, Pose)>],
-        returns: impl Fn(usize) -> &'r Returns,
-    ) -> Excerpt {
-        let mut recorder = self.excerpt_recorder(drawn);
-        let mut last: Option<&Returns> = None;
-        for scan in drawn.scans.clone() {
-            let seen = returns(scan);
-            recorder.add(seen, !last.is_some_and(|last| std::ptr::eq(last, seen)));
-            last = Some(seen);
-        }
-        recorder.finish(first_seen)
     }
 
     /// Begins to record scans that were linked: all of them are to be added, one after the other.
