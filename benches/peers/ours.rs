@@ -6,7 +6,7 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 use catoptric::model::Pose;
-use catoptric::sim::cast::{Met, Polygon, Shape, Triangles, World};
+use catoptric::sim::cast::{Contact, Met, Polygon, Rays, Shape, Triangles, World};
 use catoptric::sim::footprint::Ray;
 use catoptric::sim::mesh::Mesh;
 use nalgebra::{Point3, Unit, Vector3};
@@ -30,8 +30,18 @@ fn resident_mb() -> f64 {
         .map_or(0.0, |kb| kb / 1024.0)
 }
 
-/// Casts a block of rays.
-type Caster<'a> = Box<dyn Fn(&[Ray], &mut [f64]) + Sync + 'a>;
+/// Rays that a thread takes at a time.
+const BLOCK: usize = 256;
+
+/// Casts some rays together.
+type Caster<'a> = Box<dyn Fn(&Rays, &mut Found, &mut [f64]) + Sync + 'a>;
+
+/// Room for what they meet.
+#[derive(Default)]
+struct Found {
+    met: Vec<Option<Met>>,
+    contacts: Vec<Option<Contact>>,
+}
 
 /// A ray of the file, from its six numbers.
 fn ray(r: &[f32]) -> Ray {
@@ -44,21 +54,23 @@ fn ray(r: &[f32]) -> Ray {
 
 /// Seconds for all rays once, in blocks that threads take as they come. As every engine does, it starts from the rays
 /// of the file, six numbers in f32 each.
-fn pass(cast: &Caster<'_>, rays: &[f32], ways: &mut [f64], threads: usize) -> f64 {
-    const BLOCK: usize = 256;
+fn pass(cast: &Caster<'_>, together: usize, rays: &[f32], ways: &mut [f64], threads: usize) -> f64 {
     let next = AtomicUsize::new(0);
     let blocks: Vec<_> = ways.chunks_mut(BLOCK).map(std::sync::Mutex::new).collect();
     let start = Instant::now();
     let work = || {
-        let mut own = Vec::with_capacity(BLOCK);
+        let (mut own, mut found) = (Rays::default(), Found::default());
         loop {
             let number = next.fetch_add(1, Ordering::Relaxed);
             let Some(block) = blocks.get(number) else { break };
             let mut ways = block.lock().unwrap();
             let first = BLOCK * number;
-            own.clear();
-            own.extend(rays[6 * first..6 * (first + ways.len())].chunks_exact(6).map(ray));
-            cast(&own, &mut ways);
+            let rays = rays[6 * first..6 * (first + ways.len())].chunks(6 * together);
+            for (rays, ways) in rays.zip(ways.chunks_mut(together)) {
+                own.clear();
+                own.extend(rays.chunks_exact(6).map(ray));
+                cast(&own, &mut found, ways);
+            }
         }
     };
     std::thread::scope(|scope| {
@@ -96,13 +108,14 @@ fn main() {
     let memory = resident_mb() - before;
     let parry;
     let way = |met: Option<Met>| met.map_or(f64::INFINITY, |m| m.distance);
+    let mut together = BLOCK;
     let cast: Caster<'_> = match engine.as_str() {
         "single" => {
             let placed = &placed;
-            Box::new(move |rays, ways| {
-                let mut met = vec![None; rays.len()];
-                placed.nearest_of_each(rays, &mut met);
-                for (place, met) in ways.iter_mut().zip(&met) {
+            Box::new(move |rays, found, ways| {
+                found.met.resize(rays.len(), None);
+                placed.nearest_of_each(rays, &mut found.met);
+                for (place, met) in ways.iter_mut().zip(&found.met) {
                     *place = way(*met);
                 }
             })
@@ -113,7 +126,7 @@ fn main() {
                 .map(|p| parry3d::math::Vector::new(p.x, p.y, p.z))
                 .collect();
             parry = parry3d::shape::TriMesh::new(points, triangles).unwrap();
-            Box::new(|rays, ways| {
+            Box::new(|rays, _, ways| {
                 use parry3d::query::RayCast;
                 let vector = |v: &Vector3<f64>| parry3d::math::Vector::new(v.x, v.y, v.z);
                 for (ray, way) in rays.iter().zip(ways) {
@@ -126,34 +139,32 @@ fn main() {
             let count: usize = polygons["polygons".len()..].parse().unwrap();
             let polygon = |t: &[u32; 3]| Polygon::new(t.map(|v| vertices[v as usize]).to_vec()).unwrap();
             let world = World::new(triangles.iter().map(|t| Shape::Polygon(polygon(t))).collect());
-            Box::new(move |rays, ways| {
-                let mut hits = vec![None; count];
-                for (rays, ways) in rays.chunks(count).zip(ways.chunks_mut(count)) {
-                    world.cast_beam(rays, None, &mut hits[..rays.len()]);
-                    for (place, hit) in ways.iter_mut().zip(&hits) {
-                        *place = hit.map_or(f64::INFINITY, |h| h.distance);
-                    }
+            together = count;
+            Box::new(move |rays, found, ways| {
+                found.contacts.resize(rays.len(), None);
+                world.cast_beam(rays, None, &mut found.contacts);
+                for (place, contact) in ways.iter_mut().zip(&found.contacts) {
+                    *place = contact.map_or(f64::INFINITY, |c| c.distance);
                 }
             })
         }
         beam => {
             let count: usize = beam.strip_prefix("beam").and_then(|n| n.parse().ok()).unwrap();
             let placed = &placed;
-            Box::new(move |rays, ways| {
-                let mut met = vec![None; count];
-                for (rays, ways) in rays.chunks(count).zip(ways.chunks_mut(count)) {
-                    placed.nearest_of_beam(rays, &mut met[..rays.len()]);
-                    for (place, met) in ways.iter_mut().zip(&met) {
-                        *place = way(*met);
-                    }
+            together = count;
+            Box::new(move |rays, found, ways| {
+                found.met.resize(rays.len(), None);
+                placed.nearest_of_beam(rays, &mut found.met);
+                for (place, met) in ways.iter_mut().zip(&found.met) {
+                    *place = way(*met);
                 }
             })
         }
     };
     let mut ways = vec![f64::INFINITY; rays.len() / 6];
-    let mut times = vec![pass(&cast, &rays, &mut ways, threads)];
+    let mut times = vec![pass(&cast, together, &rays, &mut ways, threads)];
     while times.iter().sum::<f64>() < seconds {
-        times.push(pass(&cast, &rays, &mut ways, threads));
+        times.push(pass(&cast, together, &rays, &mut ways, threads));
     }
     times.sort_by(f64::total_cmp);
     let rate = ways.len() as f64 / times[times.len() / 2] / 1e6;

@@ -13,7 +13,9 @@ mod cylinder;
 mod each;
 mod exact;
 mod lanes;
+mod pending;
 mod pyramid;
+mod rays;
 mod rows;
 mod single;
 mod skin;
@@ -22,6 +24,8 @@ mod triangles;
 mod wide;
 
 pub use cylinder::Cylinder;
+pub use rays::Rays;
+pub(crate) use rays::placed;
 pub use skin::{CYLINDER_FACES, Triangle, volume};
 pub use triangles::{Met, Triangles};
 
@@ -81,8 +85,21 @@ pub struct Hit {
     pub point: Point3<f64>,
     /// Normal of the surface, on the side of its front.
     pub normal: Unit<Vector3<f64>>,
-    /// Whether the front was met.
-    pub front: bool,
+    /// Product of the ray's direction with the normal: the cosine of the incidence, less than zero where the front was met.
+    pub closing: f64,
+}
+
+/// Where a ray meets a surface, without what follows from that.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contact {
+    /// Index of the surface.
+    pub surface: u32,
+    /// Number of its triangle, if it is a mesh.
+    triangle: u32,
+    /// Distance from the ray's origin, in metres.
+    pub distance: f64,
+    /// Product of the ray's direction with the normal of the surface's front.
+    pub closing: f64,
 }
 
 /// Surfaces with an index over them.
@@ -93,6 +110,9 @@ pub struct World {
     nodes: Vec<wide::Node>,
     reach: f32,
 }
+
+/// Number of a surface or a triangle that is none.
+const NONE: u32 = u32::MAX;
 
 /// Farthest distance at which anything is looked for, in metres: beyond any scanner's range.
 const FARTHEST: f64 = 1e4;
@@ -269,6 +289,10 @@ impl World {
 
     /// The nearest surface along a ray, `left` (the mirror it just left) aside.
     pub fn cast(&self, ray: &Ray, left: Option<usize>) -> Option<Hit> {
+        Some(self.hit(&self.contact(ray, left)?, ray))
+    }
+
+    fn contact(&self, ray: &Ray, left: Option<usize>) -> Option<Contact> {
         let parry_ray = parry3d::query::Ray::new(to_glam(&ray.origin.coords), to_glam(&ray.direction));
         let (surface, distance) = self.bvh.cast_ray(&parry_ray, FARTHEST, |leaf, _| {
             let leaf = leaf as usize;
@@ -277,31 +301,64 @@ impl World {
             }
             self.shapes[leaf].distance(ray)
         })?;
-        let surface = surface as usize;
-        let (_, normal) = self.shapes[surface].cast(ray)?;
-        Some(Hit::new(surface, distance, normal, ray))
+        let (triangle, normal) = match &self.shapes[surface as usize] {
+            Shape::Mesh(mesh) => {
+                let triangle = mesh.nearest(ray)?.triangle;
+                (triangle, mesh.normal(triangle, ray))
+            }
+            other => (NONE, other.cast(ray)?.1),
+        };
+        Some(Contact {
+            surface,
+            triangle,
+            distance,
+            closing: normal.dot(&ray.direction),
+        })
     }
 
-    /// The nearest surface along each of some rays, `left` aside: what [`World::cast`] says of each of them, and faster
+    /// The nearest surface along each of some rays, `left` aside: where [`World::cast`] says of each of them, and faster
     /// if they are a narrow cone from nearly one point. Of surfaces at the very same distance the first counts.
     ///
     /// # Panics
-    /// If there are not as many places for the hits.
-    pub fn cast_beam(&self, rays: &[Ray], left: Option<usize>, hits: &mut [Option<Hit>]) {
-        self.cast_beam_at(Level::new(), rays, left, hits);
+    /// If there are not as many places for what they meet.
+    pub fn cast_beam(&self, rays: &Rays, left: Option<usize>, contacts: &mut [Option<Contact>]) {
+        self.cast_beam_at(Level::new(), rays, left, contacts);
+    }
+
+    /// All there is to know of where a ray meets a surface.
+    pub fn hit(&self, contact: &Contact, ray: &Ray) -> Hit {
+        let normal = match &self.shapes[contact.surface as usize] {
+            Shape::Polygon(polygon) => polygon.normal,
+            Shape::Mesh(mesh) => mesh.normal(contact.triangle, ray),
+            // It is met.
+            other => other.cast(ray).map_or(-ray.direction, |(_, normal)| normal),
+        };
+        Hit {
+            surface: contact.surface as usize,
+            distance: contact.distance,
+            point: ray.origin + ray.direction.into_inner() * contact.distance,
+            normal,
+            closing: contact.closing,
+        }
     }
 }
 
 impl Hit {
-    #[inline(always)]
-    fn new(surface: usize, distance: f64, normal: Unit<Vector3<f64>>, ray: &Ray) -> Self {
-        Self {
-            surface,
-            distance,
-            point: ray.origin + ray.direction.into_inner() * distance,
-            normal,
-            front: normal.dot(&ray.direction) < 0.0,
-        }
+    /// Whether the front was met.
+    pub fn front(&self) -> bool {
+        self.closing < 0.0
+    }
+
+    /// Cosine of the incidence, from 0 to 1.
+    pub fn cos_incidence(&self) -> f64 {
+        self.closing.abs()
+    }
+}
+
+impl Contact {
+    /// Cosine of the incidence, from 0 to 1.
+    pub fn cos_incidence(&self) -> f64 {
+        self.closing.abs()
     }
 }
 
@@ -370,7 +427,7 @@ mod tests {
             square(9.0),
         ]);
         let hit = world.cast(&towards(0.0, 0.0), None).expect("it is in the way");
-        assert!((hit.distance - 2.75).abs() < 1e-12 && hit.front);
+        assert!((hit.distance - 2.75).abs() < 1e-12 && hit.front());
         assert!((hit.normal.into_inner() + Vector3::x()).norm() < 1e-12);
     }
 }

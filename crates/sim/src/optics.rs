@@ -2,7 +2,6 @@
 
 mod clearance;
 mod edit;
-mod placed;
 mod rig;
 mod setting;
 mod together;
@@ -13,12 +12,11 @@ pub(crate) use rig::{Run, Then, Ways};
 pub(crate) use setting::Beyond;
 pub use setting::{Mirrors, Role, Setting, Target};
 
-use crate::cast::Hit;
+use crate::cast::{Hit, placed};
 use crate::footprint::Ray;
 use crate::glass::{self, Passage};
 use catoptric_model::{Pose, mirror};
 use nalgebra::{Point3, Vector3};
-use placed::placed;
 use setting::Leg;
 
 /// Most mirrors a ray can meet; `max_bounces` may be less.
@@ -177,7 +175,7 @@ impl Setting<'_> {
         ghost: Option<usize>,
         tell: &mut impl FnMut(&Bounce),
     ) -> Option<usize> {
-        let Some((facet, back)) = self.reflecting(&leg.hit) else {
+        let Some((facet, back)) = self.reflecting(leg.hit.surface, leg.hit.front()) else {
             course.length += leg.hit.distance;
             course.end = End::Hit(leg.in_sensor_frame());
             return None;
@@ -220,7 +218,7 @@ impl Setting<'_> {
     ) -> Option<Bounce> {
         let mirror = &self.contents.facets[facet];
         let (hit, incoming) = (&leg.hit, leg.incoming);
-        let normal = match (back, hit.front) {
+        let normal = match (back, hit.front()) {
             (false, _) => mirror.normal_at(&hit.point),
             (true, true) => hit.normal,
             (true, false) => -hit.normal,

@@ -377,7 +377,7 @@ impl Sensor {
         if let End::Hit(hit) = path.end
             && let Some(part) = parts.find(hit.surface, path.facets())
         {
-            let cos_incidence = hit.normal.dot(&path.last.direction).abs();
+            let cos_incidence = hit.cos_incidence();
             let cosines = path.meetings().take(part.facets().len()).map(|m| m.cos_incidence);
             part.chief = Some(Place::new(path.length, cos_incidence, cosines));
         }

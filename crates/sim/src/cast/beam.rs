@@ -18,15 +18,16 @@
 //! place; whatever overlaps is decided in f64 at once ([`Judge`]); the ways themselves are found at the
 //! end.
 
-use super::FARTHEST;
 use super::bundle::{Bundle, around};
 use super::exact::{Judge, Plane};
-use super::lanes::{cross, dot, inlined, less, size};
-use super::rows::{HALF, LANES, Origin, Rows, Vectors, half, whole};
-use super::triangles::Met;
+use super::lanes::{cross, dot, inlined, less, size, unfused};
+use super::pending::{Pending, Settled};
+use super::rows::{HALF, InRows, LANES, Rows, Vectors, half, whole};
 use super::wide::{Leaf, ROUNDING, WIDTH, Walk, Wide};
+use super::{FARTHEST, NONE};
 use fearless_simd::{Simd, prelude::*};
-use fearless_simd::{f32x8, f32x16, f64x8, u32x16};
+use fearless_simd::{f32x8, f32x16, f64x8, mask64x8, u32x16};
+use nalgebra::Vector3;
 
 /// What a bundle has met so far.
 pub(super) struct Found<const R: usize> {
@@ -38,8 +39,19 @@ pub(super) struct Found<const R: usize> {
     limit: f32,
 }
 
-/// Number of a triangle that is none.
-const NONE: u32 = u32::MAX;
+/// What sixteen rays in a row meet.
+pub(super) struct MetInRow<'a> {
+    pub(super) row: usize,
+    /// A bit for every ray that meets anything; the others have any numbers.
+    pub(super) some: u64,
+    pub(super) triangle: &'a [u32; LANES],
+    pub(super) distance: &'a [f64; LANES],
+    /// Product of the ray's direction with the triangle's normal, if it was asked for.
+    pub(super) closing: &'a [f64; LANES],
+}
+
+/// Where the normal counts too, fewer rays of a row with the same triangle are looked at each by itself.
+const FEW: u32 = 5;
 
 /// What the rays need to know of eight triangles, in the order of [`At`].
 type Facts = [[f32; WIDTH]; 25];
@@ -61,7 +73,7 @@ impl At {
 }
 
 impl<const R: usize> Found<R> {
-    fn new(count: usize) -> Self {
+    pub(super) fn new(count: usize) -> Self {
         let farthest = super::build::upwards(FARTHEST);
         let mut found = Self {
             low: Rows::of(super::build::downwards(FARTHEST)),
@@ -79,82 +91,157 @@ impl<const R: usize> Found<R> {
     /// Decides in f64 about a triangle that a ray may meet.
     #[cold]
     #[inline(never)]
-    fn decide(&mut self, judge: &Judge<'_>, ray: usize, triangle: u32) {
+    fn decide(&mut self, judge: &Judge<'_>, rays: &InRows<'_, R>, number: usize, triangle: u32) {
+        let ray = &rays.get(number);
         let Some(way) = judge.meet(ray, triangle) else {
             return;
         };
-        let present = match self.triangle.get(ray) {
+        let present = match self.triangle.get(number) {
             NONE => FARTHEST,
             triangle => judge.way(ray, triangle),
         };
-        if way < present || (way == present && triangle < self.triangle.get(ray)) {
-            self.triangle.set(ray, triangle);
+        if way < present || (way == present && triangle < self.triangle.get(number)) {
+            self.triangle.set(number, triangle);
             let (low, high) = around(way);
-            self.low.set(ray, low);
-            self.high.set(ray, high);
+            self.low.set(number, low);
+            self.high.set(number, high);
         }
     }
 
-    /// Tells of every ray the nearest triangle, and the distance to it.
+    /// Tells of every ray the nearest triangle, row by row.
     #[inline(always)]
-    pub(super) fn finish<S: Simd>(
+    pub(super) fn finish<S: Simd, const CLOSING: bool>(
         &self,
         simd: S,
-        bundle: &Bundle<R>,
+        bundle: &Bundle<'_, R>,
         judge: &Judge<'_>,
-        mut tell: impl FnMut(usize, Option<Met>),
+        mut tell: impl FnMut(&MetInRow<'_>),
     ) {
-        let count = bundle.rays.count;
+        let rays = &bundle.rays;
+        let (mut ways, mut closings) = (Rows::<f64, R>::of(0.0), Rows::<f64, R>::of(0.0));
+        let mut pending = Pending::default();
+        let ray = inlined(
+            #[inline(always)]
+            |ray: usize| rays.get(ray),
+        );
+        let mut somes = [0; R];
         let mut last = NONE;
         let mut plane = Plane::default();
-        let mut common = f64x8::splat(simd, 0.0);
-        for row in 0..count.div_ceil(LANES) {
-            let lanes = LANES.min(count - row * LANES);
-            let numbers = &self.triangle.0[row];
+        let (mut normal, mut common) = (Vector3::zeros(), f64x8::splat(simd, 0.0));
+        for (row, numbers) in self
+            .triangle
+            .0
+            .iter()
+            .enumerate()
+            .take(rays.count.div_ceil(LANES))
+        {
             let triangles = u32x16::simd_from(simd, *numbers);
             let some = !triangles.simd_eq(u32x16::splat(simd, NONE)).to_bitmask();
-            let mut ways = [f64x8::splat(simd, 0.0); 2];
-            let mut sure = 0;
+            let some = some & ((1 << LANES.min(rays.count - row * LANES)) - 1);
+            somes[row] = some;
             // Rays of the same triangle, one triangle after the other.
-            let mut open = some & ((1 << lanes) - 1);
+            let mut open = some;
             while open != 0 {
-                let triangle = numbers[open.trailing_zeros() as usize & (LANES - 1)];
+                let first = open.trailing_zeros() as usize & (LANES - 1);
+                let triangle = numbers[first];
                 let alike = triangles.simd_eq(u32x16::splat(simd, triangle));
-                open &= !alike.to_bitmask();
+                let lanes = alike.to_bitmask() & open;
+                open &= !lanes;
+                if CLOSING && lanes.count_ones() < FEW {
+                    let mut few = lanes;
+                    while few != 0 {
+                        let lane = few.trailing_zeros() as usize;
+                        few &= few - 1;
+                        if pending.add(row * LANES + lane, triangle) {
+                            pending.settle::<_, CLOSING>(
+                                simd,
+                                judge,
+                                &ray,
+                                inlined(
+                                    #[inline(always)]
+                                    |settled: Settled| {
+                                        ways.set(settled.ray, settled.way);
+                                        closings.set(settled.ray, settled.closing);
+                                    },
+                                ),
+                            );
+                        }
+                    }
+                    continue;
+                }
                 if triangle != last {
                     last = triangle;
                     plane = judge.plane(triangle);
-                    if let Origin::Common(start) = &bundle.rays.origin {
+                    if CLOSING {
+                        normal = plane.unit();
+                    }
+                    if let Some(start) = &rays.common {
                         common = f64x8::splat(simd, plane.height(start));
                     }
                 }
                 let (low, high) = alike.widen();
+                let mut unsure = lanes;
                 for (second, alike) in [low, high].into_iter().enumerate() {
-                    let height = match &bundle.rays.origin {
-                        Origin::Common(_) => common,
-                        Origin::Each(origins) => plane.heights(simd, &half(simd, origins, row, second)),
+                    let height = match &rays.common {
+                        Some(_) => common,
+                        None => plane.heights(simd, &half(simd, &rays.origin, row, second)),
                     };
-                    let direction = half(simd, &bundle.rays.direction, row, second);
+                    let direction = half(simd, &rays.direction, row, second);
                     let (way, steep) = plane.ways(simd, height, &direction);
-                    ways[second] = alike.select(way, ways[second]);
-                    sure |= (steep & alike).to_bitmask() << (second * HALF);
+                    put(simd, alike, way, &mut ways.0[row], second);
+                    if CLOSING {
+                        let closing = unfused::product(simd, &normal, &direction);
+                        put(simd, alike, closing, &mut closings.0[row], second);
+                    }
+                    unsure &= !((steep & alike).to_bitmask() << (second * HALF));
+                }
+                while unsure != 0 {
+                    let number = row * LANES + unsure.trailing_zeros() as usize;
+                    unsure &= unsure - 1;
+                    let ray = rays.get(number);
+                    ways.set(number, judge.way(&ray, triangle));
+                    if CLOSING {
+                        closings.set(number, judge.normal(triangle, &ray).dot(&ray.direction));
+                    }
                 }
             }
-            let mut distances = [0.0; LANES];
-            ways[0].store_slice(&mut distances[..HALF]);
-            ways[1].store_slice(&mut distances[HALF..]);
-            for lane in 0..lanes {
-                let triangle = numbers[lane];
-                let distance = if (sure | !some) >> lane & 1 == 1 {
-                    distances[lane]
-                } else {
-                    judge.way(row * LANES + lane, triangle)
-                };
-                let met = (triangle != NONE).then_some(Met { triangle, distance });
-                tell(row * LANES + lane, met);
-            }
+        }
+        pending.settle::<_, CLOSING>(
+            simd,
+            judge,
+            &ray,
+            inlined(
+                #[inline(always)]
+                |settled: Settled| {
+                    ways.set(settled.ray, settled.way);
+                    closings.set(settled.ray, settled.closing);
+                },
+            ),
+        );
+        for (row, triangle) in self
+            .triangle
+            .0
+            .iter()
+            .enumerate()
+            .take(rays.count.div_ceil(LANES))
+        {
+            tell(&MetInRow {
+                row,
+                some: somes[row],
+                triangle,
+                distance: &ways.0[row],
+                closing: &closings.0[row],
+            });
         }
     }
+}
+
+/// Puts numbers in a half of a row where they count.
+#[inline(always)]
+fn put<S: Simd>(simd: S, which: mask64x8<S>, numbers: f64x8<S>, row: &mut [f64; LANES], second: usize) {
+    let place = &mut row[second * HALF..(second + 1) * HALF];
+    let present = f64x8::from_slice(simd, place);
+    which.select(numbers, present).store_slice(place);
 }
 
 /// Follows a bundle through the index.
@@ -162,10 +249,10 @@ impl<const R: usize> Found<R> {
 pub(super) fn follow<S: Simd, const R: usize>(
     simd: S,
     wide: &Wide,
-    bundle: &Bundle<R>,
+    bundle: &Bundle<'_, R>,
     judge: &Judge<'_>,
-) -> Found<R> {
-    let mut found = Found::new(bundle.rays.count);
+    found: &mut Found<R>,
+) {
     let mut walk = Walk::new();
     let mut next = Some(walk.start());
     while let Some(child) = next {
@@ -178,7 +265,7 @@ pub(super) fn follow<S: Simd, const R: usize>(
                 wide.reach,
                 bundle,
                 judge,
-                &mut found,
+                found,
             );
         } else {
             let node = &wide.nodes[child.number()];
@@ -187,7 +274,6 @@ pub(super) fn follow<S: Simd, const R: usize>(
         }
         next = nearer.or_else(|| walk.next(found.limit));
     }
-    found
 }
 
 #[inline(always)]
@@ -196,7 +282,7 @@ fn leaf<S: Simd, const R: usize>(
     leaf: &Leaf,
     count: usize,
     reach: f32,
-    bundle: &Bundle<R>,
+    bundle: &Bundle<'_, R>,
     judge: &Judge<'_>,
     found: &mut Found<R>,
 ) {
@@ -234,7 +320,7 @@ fn facts<S: Simd, const R: usize>(
     simd: S,
     corners: &[[f32x8<S>; 3]; 3],
     reach: f32,
-    bundle: &Bundle<R>,
+    bundle: &Bundle<'_, R>,
 ) -> Facts {
     let splat = inlined(
         #[inline(always)]
@@ -280,7 +366,7 @@ fn facts<S: Simd, const R: usize>(
             put(At::CROSSES + 3 * i + k, *coordinate);
         }
     }
-    if bundle.apart.is_some() {
+    if bundle.apart {
         for (i, vector) in [bc, ca, ab].iter().enumerate() {
             for (k, coordinate) in vector.iter().enumerate() {
                 put(At::EDGES + 3 * i + k, *coordinate);
@@ -304,7 +390,7 @@ fn triangle<S: Simd, const R: usize>(
     facts: &Facts,
     lane: usize,
     number: u32,
-    bundle: &Bundle<R>,
+    bundle: &Bundle<'_, R>,
     judge: &Judge<'_>,
     found: &mut Found<R>,
 ) -> bool {
@@ -338,9 +424,10 @@ fn triangle<S: Simd, const R: usize>(
             #[inline(always)]
             |i: usize| {
                 let about = product(&direction, At::CROSSES + 3 * i);
-                match &bundle.apart {
-                    None => about,
-                    Some(apart) => more(&load(&apart.moment), At::EDGES + 3 * i, about),
+                if bundle.apart {
+                    more(&load(&bundle.moment), At::EDGES + 3 * i, about)
+                } else {
+                    about
                 }
             },
         );
@@ -354,10 +441,10 @@ fn triangle<S: Simd, const R: usize>(
         }
         let inside = least.simd_gt(error) | most.simd_lt(-error);
         let closing = product(&direction, At::NORMAL);
-        let height = match &bundle.apart {
-            None => fact(At::HEIGHT),
-            Some(apart) => fact(At::HEIGHT) - product(&load(&apart.offset), At::NORMAL),
-        };
+        let mut height = fact(At::HEIGHT);
+        if bundle.apart {
+            height -= product(&load(&bundle.offset), At::NORMAL);
+        }
         let inverse = f32x16::splat(simd, 1.0) / closing;
         let way = height * inverse;
         let error = fact(At::WAY_ERROR) * inverse.abs();
@@ -386,7 +473,7 @@ fn triangle<S: Simd, const R: usize>(
             let ray = row * LANES + open.trailing_zeros() as usize;
             open &= open - 1;
             if ray < bundle.rays.count {
-                found.decide(judge, ray, number);
+                found.decide(judge, &bundle.rays, ray, number);
                 changed = true;
             }
         }

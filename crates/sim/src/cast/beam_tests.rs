@@ -1,7 +1,9 @@
 //! Beams against rays alone, against every triangle by itself, and against parry.
 
+use super::bundle::{Caster, cast_all};
+use super::triangles::InMesh;
 use super::triangles::tests::random_star;
-use super::{Block, Cylinder, Met, Polygon, Shape, Triangles, World};
+use super::{Block, Cylinder, Met, Polygon, Rays, Shape, Triangles, World};
 use crate::footprint::Ray;
 use crate::mesh::Mesh;
 use crate::noise::{Draws, Purpose};
@@ -32,7 +34,7 @@ fn vector(draws: &mut Draws, size: f64) -> Vector3<f64> {
 }
 
 /// A narrow cone of rays from starts that are so far apart.
-fn cone(draws: &mut Draws, from: Point3<f64>, towards: Point3<f64>, count: usize, apart: f64) -> Vec<Ray> {
+fn cone(draws: &mut Draws, from: Point3<f64>, towards: Point3<f64>, count: usize, apart: f64) -> Rays {
     let middle = (towards - from).normalize();
     let width = 0.03 * draws.uniform();
     (0..count)
@@ -49,9 +51,9 @@ fn cone(draws: &mut Draws, from: Point3<f64>, towards: Point3<f64>, count: usize
 
 /// The nearest triangle by trying all.
 fn tried(mesh: &Triangles, ray: &Ray, count: u32) -> Option<Met> {
-    let judge = mesh.judge(std::slice::from_ref(ray));
+    let judge = mesh.judge();
     let met = (0..count).filter_map(|triangle| {
-        let distance = judge.meet(0, triangle)?;
+        let distance = judge.meet(ray, triangle)?;
         Some(Met { triangle, distance })
     });
     met.min_by(|a, b| {
@@ -119,14 +121,14 @@ fn beams_and_rays_find_what_trying_all_finds_with_any_lanes() {
             let apart = [0.0, 0.005, 0.3][shot % 3];
             let size = [1, 5, 16, 19, 64, 100, 128, 140][shot % 8];
             let rays = cone(&mut draws, from, towards, size, apart);
-            let expected: Vec<_> = rays.iter().map(|ray| tried(&mesh, ray, count)).collect();
+            let expected: Vec<_> = rays.iter().map(|ray| tried(&mesh, &ray, count)).collect();
             hits += expected.iter().flatten().count();
             for level in levels() {
                 let mut met = vec![None; rays.len()];
-                mesh.nearest_of_beam_at(level, &rays, &mut met);
+                cast_all(&InMesh::new(&mesh, level), &rays, &mut met);
                 assert_eq!(met, expected, "seed {seed}, shot {shot}, a beam at {level:?}");
                 let mut met = vec![None; rays.len()];
-                mesh.nearest_of_each_at(level, &rays, &mut met);
+                InMesh::new(&mesh, level).cast_each(&rays, 0..rays.len(), &mut met);
                 assert_eq!(met, expected, "seed {seed}, shot {shot}, each ray at {level:?}");
             }
         }
@@ -233,16 +235,14 @@ fn a_world_answers_a_beam_as_it_answers_its_rays() {
                 [1, 16, 19, 61, 130][shot % 5],
                 [0.0, 0.004][shot % 2],
             );
-            for left in [None, world.cast(&rays[0], None).map(|hit| hit.surface)] {
+            for left in [None, world.cast(&rays.get(0), None).map(|hit| hit.surface)] {
                 for level in levels() {
                     let mut found = vec![None; rays.len()];
                     world.cast_beam_at(level, &rays, left, &mut found);
                     for (ray, found) in rays.iter().zip(&found) {
-                        let expected = world.cast(ray, left);
-                        let key = |h: &super::Hit| (h.surface, h.distance, h.point, h.normal, h.front);
-                        assert_eq!(found.as_ref().map(key), expected.as_ref().map(key), "{level:?}");
-                        if let Some(hit) = found {
-                            hits[hit.surface.min(2)] += 1;
+                        assert_eq!(*found, world.contact(&ray, left), "{level:?}");
+                        if let Some(contact) = found {
+                            hits[contact.surface.min(2) as usize] += 1;
                         }
                     }
                 }
@@ -260,5 +260,5 @@ fn nothing_is_met_in_an_empty_world_and_by_no_rays() {
     let mut hits = vec![None; 16];
     world.cast_beam(&rays, None, &mut hits);
     assert!(hits.iter().all(Option::is_none));
-    world.cast_beam(&[], None, &mut []);
+    world.cast_beam(&Rays::default(), None, &mut []);
 }

@@ -3,9 +3,12 @@
 use super::FARTHEST;
 use super::bundle::around;
 use super::exact::Judge;
+use super::lanes::inlined;
+use super::pending::{Pending, Settled};
 use super::single::{Line, Outcome};
 use super::triangles::Met;
 use super::wide::{Leaf, WIDTH, Walk, Wide};
+use crate::footprint::Ray;
 use fearless_simd::Simd;
 
 /// What a ray has met so far.
@@ -15,14 +18,6 @@ struct Nearest {
     triangle: Option<u32>,
     /// In f64, if known.
     way: Option<f64>,
-}
-
-/// Rays whose triangle is known, but not the way to it.
-#[derive(Default)]
-struct Pending {
-    count: usize,
-    /// Each ray and its triangle.
-    found: [(usize, u32); WIDTH],
 }
 
 impl Nearest {
@@ -39,7 +34,7 @@ impl Nearest {
     /// Decides in f64 about a triangle that the ray may meet.
     #[cold]
     #[inline(never)]
-    fn decide(&mut self, judge: &Judge<'_>, ray: usize, triangle: u32) {
+    fn decide(&mut self, judge: &Judge<'_>, ray: &Ray, triangle: u32) {
         let Some(way) = judge.meet(ray, triangle) else {
             return;
         };
@@ -56,7 +51,7 @@ impl Nearest {
 
     /// Takes what the ray meets of a leaf.
     #[inline(always)]
-    fn take(&mut self, leaf: &Leaf, outcome: &Outcome, judge: &Judge<'_>, ray: usize) {
+    fn take(&mut self, leaf: &Leaf, outcome: &Outcome, judge: &Judge<'_>, ray: &Ray) {
         let mut may = outcome.may;
         while may != 0 {
             let lane = may.trailing_zeros() as usize & (WIDTH - 1);
@@ -77,47 +72,35 @@ impl Nearest {
     }
 }
 
-impl Pending {
-    /// Takes one more; whether that is all there is room for.
-    #[inline(always)]
-    fn add(&mut self, ray: usize, triangle: u32) -> bool {
-        self.found[self.count] = (ray, triangle);
-        self.count += 1;
-        self.count == WIDTH
-    }
-
-    /// Finds the ways and tells them.
-    #[inline(always)]
-    fn tell<S: Simd>(&mut self, simd: S, judge: &Judge<'_>, tell: &mut impl FnMut(usize, Option<Met>)) {
-        let found = &self.found[..self.count];
-        let mut ways = [0.0; WIDTH];
-        if self.count == WIDTH {
-            ways = judge.ways(simd, &self.found);
-        } else {
-            for (way, &(ray, triangle)) in ways.iter_mut().zip(found) {
-                *way = judge.way(ray, triangle);
-            }
-        }
-        for (&(ray, triangle), &distance) in found.iter().zip(&ways) {
-            tell(ray, Some(Met { triangle, distance }));
-        }
-        self.count = 0;
-    }
-}
-
-/// Follows rays through the index and tells what each meets, in no order.
+/// Follows so many rays through the index and tells what each meets, in no order.
 #[inline(always)]
-pub(super) fn follow<S: Simd>(
+pub(super) fn follow<S: Simd, F: FnMut(usize, Option<Met>)>(
     simd: S,
     wide: &Wide,
     judge: &Judge<'_>,
-    mut tell: impl FnMut(usize, Option<Met>),
+    count: usize,
+    rays: impl Fn(usize) -> Ray,
+    mut tell: F,
 ) {
     let mut walk = Walk::new();
     let mut outcome = Outcome::default();
     let mut pending = Pending::default();
-    for (number, ray) in judge.rays.iter().enumerate() {
-        let line = Line::new(ray, wide.reach);
+    let settle = inlined(
+        #[inline(always)]
+        |pending: &mut Pending, tell: &mut F| {
+            let told = inlined(
+                #[inline(always)]
+                |found: Settled| {
+                    let (triangle, distance) = (found.triangle, found.way);
+                    tell(found.ray, Some(Met { triangle, distance }));
+                },
+            );
+            pending.settle::<_, false>(simd, judge, &rays, told);
+        },
+    );
+    for number in 0..count {
+        let ray = rays(number);
+        let line = Line::new(&ray, wide.reach);
         let mut nearest = Nearest::nothing();
         let mut next = Some(walk.start());
         while let Some(child) = next {
@@ -125,7 +108,7 @@ pub(super) fn follow<S: Simd>(
             if child.is_leaf() {
                 let leaf = &wide.leaves[child.number()];
                 line.triangles(simd, leaf, child.count(), nearest.high, &mut outcome);
-                nearest.take(leaf, &outcome, judge, number);
+                nearest.take(leaf, &outcome, judge, &ray);
             } else {
                 let node = &wide.nodes[child.number()];
                 let (met, near) = line.boxes(simd, node, nearest.high);
@@ -138,10 +121,10 @@ pub(super) fn follow<S: Simd>(
             (Some(triangle), Some(distance)) => tell(number, Some(Met { triangle, distance })),
             (Some(triangle), None) => {
                 if pending.add(number, triangle) {
-                    pending.tell(simd, judge, &mut tell);
+                    settle(&mut pending, &mut tell);
                 }
             }
         }
     }
-    pending.tell(simd, judge, &mut tell);
+    settle(&mut pending, &mut tell);
 }

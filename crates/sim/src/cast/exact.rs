@@ -8,17 +8,16 @@
 //! changed is found from the exact products (fused multiply-add). The distance is that to the triangle's plane.
 
 use super::FARTHEST;
-use super::lanes::{inlined, less, size};
+use super::lanes::{less, unfused};
 use crate::footprint::Ray;
 use fearless_simd::{Simd, prelude::*};
 use fearless_simd::{f64x8, mask64x8};
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Unit, Vector3};
 
-/// Decides in f64 which triangles of a mesh the rays of a bundle meet.
+/// Decides in f64 which triangles of a mesh rays meet.
 pub(super) struct Judge<'a> {
     pub(super) vertices: &'a [Point3<f64>],
     pub(super) triangles: &'a [[u32; 3]],
-    pub(super) rays: &'a [Ray],
 }
 
 /// A triangle's plane.
@@ -33,18 +32,17 @@ pub(super) struct Plane {
 
 /// Least part of a triangle's greatest extent squared that its normal along a ray has where the way is that to the plane:
 /// of slivers, and for rays along the plane, it is the mean of the corners' ways.
-const STEEP: f64 = 1e-7;
+pub(super) const STEEP: f64 = 1e-7;
 
 impl Judge<'_> {
     /// Distance at which a ray meets a triangle.
-    pub(super) fn meet(&self, ray: usize, triangle: u32) -> Option<f64> {
-        meet(&self.rays[ray], &self.corners(triangle))
+    pub(super) fn meet(&self, ray: &Ray, triangle: u32) -> Option<f64> {
+        meet(ray, &self.corners(triangle))
     }
 
     /// Distance to a triangle that the ray surely meets: what [`Judge::meet`] gives, to the bit.
-    pub(super) fn way(&self, ray: usize, triangle: u32) -> f64 {
+    pub(super) fn way(&self, ray: &Ray, triangle: u32) -> f64 {
         let corners = self.corners(triangle);
-        let ray = &self.rays[ray];
         let plane = Plane::new(&corners);
         match plane.way(ray) {
             Some(way) => way,
@@ -52,54 +50,11 @@ impl Judge<'_> {
         }
     }
 
-    /// [`Judge::way`] of eight rays to a triangle each.
-    #[inline(always)]
-    pub(super) fn ways<S: Simd>(&self, simd: S, found: &[(usize, u32); 8]) -> [f64; 8] {
-        let [mut a, mut b, mut c, mut origin, mut direction] = [[[0.0; 8]; 3]; 5];
-        for (lane, &(ray, triangle)) in found.iter().enumerate() {
-            let (ray, corners) = (&self.rays[ray], self.corners(triangle));
-            for k in 0..3 {
-                a[k][lane] = corners[0][k];
-                b[k][lane] = corners[1][k];
-                c[k][lane] = corners[2][k];
-                origin[k][lane] = ray.origin[k];
-                direction[k][lane] = ray.direction[k];
-            }
-        }
-        let load = inlined(
-            #[inline(always)]
-            |v: &[[f64; 8]; 3]| {
-                [
-                    f64x8::simd_from(simd, v[0]),
-                    f64x8::simd_from(simd, v[1]),
-                    f64x8::simd_from(simd, v[2]),
-                ]
-            },
-        );
-        let a = load(&a);
-        let (p, q) = (less(&load(&b), &a), less(&load(&c), &a));
-        // As for a ray alone, in the same order and not fused.
-        let long = size(&p).max(size(&q));
-        let normal = [
-            p[1] * q[2] - p[2] * q[1],
-            p[2] * q[0] - p[0] * q[2],
-            p[0] * q[1] - p[1] * q[0],
-        ];
-        let along = inlined(
-            #[inline(always)]
-            |v: &[f64x8<S>; 3]| normal[0] * v[0] + normal[1] * v[1] + normal[2] * v[2],
-        );
-        let closing = along(&load(&direction));
-        let least = f64x8::splat(simd, STEEP) * long * long;
-        let sure = closing.abs().simd_gt(least).to_bitmask();
-        let mut ways = [0.0; 8];
-        (along(&less(&a, &load(&origin))) / closing).store_slice(&mut ways);
-        for (lane, (way, &(ray, triangle))) in ways.iter_mut().zip(found).enumerate() {
-            if sure >> lane & 1 == 0 {
-                *way = self.way(ray, triangle);
-            }
-        }
-        ways
+    /// Normal of a triangle, for a ray that meets it.
+    pub(super) fn normal(&self, triangle: u32, ray: &Ray) -> Unit<Vector3<f64>> {
+        let [a, b, c] = self.corners(triangle);
+        // A sliver without an area has no normal; any that looks back does.
+        Unit::try_new((b - a).cross(&(c - a)), f64::MIN_POSITIVE).unwrap_or(-ray.direction)
     }
 
     #[inline(always)]
@@ -108,7 +63,7 @@ impl Judge<'_> {
     }
 
     #[inline(always)]
-    fn corners(&self, triangle: u32) -> [Point3<f64>; 3] {
+    pub(super) fn corners(&self, triangle: u32) -> [Point3<f64>; 3] {
         let [a, b, c] = self.triangles[triangle as usize];
         [
             self.vertices[a as usize],
@@ -136,6 +91,11 @@ impl Plane {
         (closing.abs() > self.least).then(|| self.height(&ray.origin) / closing)
     }
 
+    /// The normal by its length.
+    pub(super) fn unit(&self) -> Vector3<f64> {
+        self.normal / self.normal.norm()
+    }
+
     /// N·(A − O).
     pub(super) fn height(&self, origin: &Point3<f64>) -> f64 {
         self.normal.dot(&(self.corner - origin))
@@ -149,7 +109,7 @@ impl Plane {
         height: f64x8<S>,
         direction: &[f64x8<S>; 3],
     ) -> (f64x8<S>, mask64x8<S>) {
-        let closing = product(simd, &self.normal, direction);
+        let closing = unfused::product(simd, &self.normal, direction);
         let sure = closing.abs().simd_gt(f64x8::splat(simd, self.least));
         (height / closing, sure)
     }
@@ -162,7 +122,7 @@ impl Plane {
             f64x8::splat(simd, self.corner.y),
             f64x8::splat(simd, self.corner.z),
         ];
-        product(simd, &self.normal, &less(&corner, origin))
+        unfused::product(simd, &self.normal, &less(&corner, origin))
     }
 }
 
@@ -213,10 +173,4 @@ fn edge(p: &Vector3<f64>, q: &Vector3<f64>) -> f64 {
     }
     let (left_rest, right_rest) = (p.x.mul_add(q.y, -left), p.y.mul_add(q.x, -right));
     value + (left_rest - right_rest)
-}
-
-/// Of a vector and eight. Not fused, as for a ray alone.
-#[inline(always)]
-pub(super) fn product<S: Simd>(simd: S, a: &Vector3<f64>, b: &[f64x8<S>; 3]) -> f64x8<S> {
-    f64x8::splat(simd, a.x) * b[0] + f64x8::splat(simd, a.y) * b[1] + f64x8::splat(simd, a.z) * b[2]
 }

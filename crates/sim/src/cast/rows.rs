@@ -1,9 +1,11 @@
-//! Rays in rows: a coordinate of sixteen rays side by side, one row or some.
+//! Rows of a bundle: a coordinate of sixteen rays side by side, one row or some.
 
 use super::build::rounded;
+use super::rays::Rays;
 use crate::footprint::Ray;
 use fearless_simd::{Simd, f32x16, f64x8, prelude::*};
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Unit, Vector3};
+use std::ops::Range;
 
 /// Rays that one instruction treats in f32.
 pub(super) const LANES: usize = 16;
@@ -25,18 +27,16 @@ pub(super) struct Rows<T, const R: usize>(pub(super) [[T; LANES]; R]);
 /// Points or directions, by axis.
 pub(super) type Vectors<T, const R: usize> = [Rows<T, R>; 3];
 
-/// Rays in f64. What the last row has too many are copies of the first ray.
-pub(super) struct Rays<const R: usize> {
-    pub(super) count: usize,
-    pub(super) direction: Vectors<f64, R>,
-    pub(super) origin: Origin<R>,
-}
+/// Coordinates in f64 of so many rows of rays, by axis.
+pub(super) type Wide<'a, const R: usize> = [&'a [[f64; LANES]; R]; 3];
 
-/// Where rays start.
-pub(super) enum Origin<const R: usize> {
-    /// All at one point, bit for bit.
-    Common(Point3<f64>),
-    Each(Vectors<f64, R>),
+/// Rays in f64. What the last row has too many may be anything.
+pub(super) struct InRows<'a, const R: usize> {
+    pub(super) count: usize,
+    pub(super) direction: Wide<'a, R>,
+    pub(super) origin: Wide<'a, R>,
+    /// Where all of them start, bit for bit, if they do.
+    pub(super) common: Option<Point3<f64>>,
 }
 
 impl<T: Copy, const R: usize> Rows<T, R> {
@@ -51,87 +51,78 @@ impl<T: Copy, const R: usize> Rows<T, R> {
     pub(super) fn set(&mut self, ray: usize, value: T) {
         self.0[ray / LANES][ray % LANES] = value;
     }
+
+    /// Gives all after so many rays the number of the first.
+    pub(super) fn fill_up(&mut self, count: usize) {
+        let all = self.0.as_flattened_mut();
+        let first = all[0];
+        all[count..].fill(first);
+    }
 }
 
-impl<const R: usize> Rays<R> {
-    pub(super) fn blank() -> Self {
+impl<'a, const R: usize> InRows<'a, R> {
+    /// Some rays, as many as fit, one at least.
+    #[inline(always)]
+    pub(super) fn of(rays: &'a Rays, which: Range<usize>) -> Self {
+        let count = which.len();
+        assert!((1..=R * LANES).contains(&count), "they fit");
+        let [origin, direction] = rays.rows(which.start);
+        let mut apart = 0;
+        for row in origin {
+            let row = &row.as_flattened()[..count];
+            let first = row[0].to_bits();
+            apart = row.iter().fold(apart, |apart, x| apart | (first ^ x.to_bits()));
+        }
         Self {
-            count: 0,
-            direction: [Rows::of(0.0); 3],
-            origin: Origin::Common(Point3::origin()),
+            count,
+            direction,
+            origin,
+            common: (apart == 0).then(|| rays.get(which.start).origin),
         }
     }
 
-    /// Takes rays, as many as fit, one at least.
-    #[inline(always)]
-    pub(super) fn fill(&mut self, rays: &[Ray]) {
-        assert!(!rays.is_empty() && rays.len() <= R * LANES, "they fit");
-        self.count = rays.len();
-        fill(&mut self.direction, rays, |ray| ray.direction.into_inner());
-        let first = rays[0].origin;
-        let [a, b, c] = [first.x, first.y, first.z].map(f64::to_bits);
-        let apart = rays.iter().fold(0, |apart, ray| {
-            let [x, y, z] = [ray.origin.x, ray.origin.y, ray.origin.z].map(f64::to_bits);
-            apart | (x ^ a) | (y ^ b) | (z ^ c)
-        });
-        self.origin = if apart == 0 {
-            Origin::Common(first)
-        } else {
-            let mut origins = [Rows::of(0.0); 3];
-            fill(&mut origins, rays, |ray| ray.origin.coords);
-            Origin::Each(origins)
+    /// One of them.
+    pub(super) fn get(&self, ray: usize) -> Ray {
+        let of = |[x, y, z]: &Wide<'_, R>| {
+            let at = |row: &[[f64; LANES]; R]| row[ray / LANES][ray % LANES];
+            Vector3::new(at(x), at(y), at(z))
         };
+        Ray {
+            origin: Point3::from(of(&self.origin)),
+            // As it came.
+            direction: Unit::new_unchecked(of(&self.direction)),
+        }
     }
 
-    /// Directions in f32.
+    /// Directions in f32; what the last row has too many are copies of the first ray.
     #[inline(always)]
     pub(super) fn narrow<S: Simd>(&self, simd: S, narrow: &mut Vectors<f32, R>) {
         for (wide, narrow) in self.direction.iter().zip(narrow) {
-            for (wide, narrow) in wide.0.iter().zip(&mut narrow.0) {
+            for (wide, narrow) in wide.iter().zip(&mut narrow.0) {
                 let [low, high] = halves(simd, wide);
                 low.narrow(high).store_slice(narrow);
             }
+            narrow.fill_up(self.count);
         }
     }
 
     /// The start of the first ray in f32.
     #[inline(always)]
     pub(super) fn start(&self) -> [f32; 3] {
-        let first = match &self.origin {
-            Origin::Common(point) => [point.x, point.y, point.z],
-            Origin::Each([x, y, z]) => [x.0[0][0], y.0[0][0], z.0[0][0]],
-        };
-        [rounded(first[0]), rounded(first[1]), rounded(first[2])]
+        let [x, y, z] = self.origin;
+        [rounded(x[0][0]), rounded(y[0][0]), rounded(z[0][0])]
     }
 
     /// Starts of a half of a row (the first or the second).
     #[inline(always)]
     pub(super) fn starts<S: Simd>(&self, simd: S, row: usize, second: usize) -> [f64x8<S>; 3] {
-        match &self.origin {
-            Origin::Common(point) => [
+        match &self.common {
+            Some(point) => [
                 f64x8::splat(simd, point.x),
                 f64x8::splat(simd, point.y),
                 f64x8::splat(simd, point.z),
             ],
-            Origin::Each(origins) => half(simd, origins, row, second),
-        }
-    }
-}
-
-/// Puts vectors of rays in rows, and what is left of the last with that of the first ray.
-#[inline(always)]
-fn fill<const R: usize>(rows: &mut Vectors<f64, R>, rays: &[Ray], of: impl Fn(&Ray) -> Vector3<f64>) {
-    for (row, some) in rays.chunks(LANES).enumerate() {
-        for (lane, ray) in some.iter().enumerate() {
-            let vector = of(ray);
-            for k in 0..3 {
-                rows[k].0[row][lane] = vector[k];
-            }
-        }
-    }
-    for ray in rays.len()..R * LANES {
-        for row in &mut *rows {
-            row.set(ray, row.get(0));
+            None => half(simd, &self.origin, row, second),
         }
     }
 }
@@ -149,15 +140,15 @@ pub(super) fn halves<S: Simd>(simd: S, row: &[f64; LANES]) -> [f64x8<S>; 2] {
 #[inline(always)]
 pub(super) fn half<S: Simd, const R: usize>(
     simd: S,
-    of: &Vectors<f64, R>,
+    [x, y, z]: &Wide<'_, R>,
     row: usize,
     second: usize,
 ) -> [f64x8<S>; 3] {
     let from = second * HALF;
     [
-        f64x8::from_slice(simd, &of[0].0[row][from..from + HALF]),
-        f64x8::from_slice(simd, &of[1].0[row][from..from + HALF]),
-        f64x8::from_slice(simd, &of[2].0[row][from..from + HALF]),
+        f64x8::from_slice(simd, &x[row][from..from + HALF]),
+        f64x8::from_slice(simd, &y[row][from..from + HALF]),
+        f64x8::from_slice(simd, &z[row][from..from + HALF]),
     ]
 }
 

@@ -3,20 +3,18 @@
 //! A polygon's plane and edges are computed in f64 as for a ray alone, in the same order: the answer is the same to the
 //! bit. Where the whole pyramid around the rays passes inside the polygon, or outside, its edges need not be tried.
 
+use super::beam::MetInRow;
 use super::build::upwards;
 use super::bundle::{Bundle, Caster, cast_all};
-use super::exact::product;
-use super::lanes::{inlined, less};
-use super::rows::{HALF, LANES, Rows, half};
+use super::lanes::{inlined, less, unfused};
+use super::rays::Rays;
+use super::rows::{HALF, InRows, LANES, Rows, half};
 use super::wide::Walk;
-use super::{EDGE_SLACK, FARTHEST, Hit, Met, Polygon, Shape, World};
-use crate::footprint::Ray;
+use super::{Contact, EDGE_SLACK, FARTHEST, NONE, Polygon, Shape, World};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
-use fearless_simd::{f64x4, f64x8};
-use nalgebra::{Unit, Vector3};
-
-/// Number of a surface that is none.
-const NONE: u32 = u32::MAX;
+use fearless_simd::{f64x4, f64x8, mask32x8, mask64x8, u32x8};
+use nalgebra::Vector3;
+use std::ops::Range;
 
 /// Where the corners of a pyramid meet a polygon's plane, as seen from the polygon.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,10 +29,20 @@ enum Passes {
 struct Nearest<const R: usize> {
     distance: Rows<f64, R>,
     surface: Rows<u32, R>,
-    /// Its triangle, if it is a mesh.
+    /// Its triangle, if it is a mesh, and the product of the direction with the normal there.
     triangle: Rows<u32, R>,
+    closing: Rows<f64, R>,
     /// Not less than the greatest distance.
     limit: f32,
+}
+
+/// What eight rays meet of a surface.
+struct Candidates<S: Simd> {
+    surface: u32,
+    /// Infinite where it is not met.
+    distance: f64x8<S>,
+    /// Of a mesh the triangle, and the product of the direction with the normal.
+    of_mesh: Option<(u32x8<S>, f64x8<S>)>,
 }
 
 /// A world without the surface that the rays left, with what the machine has.
@@ -44,21 +52,27 @@ struct InWorld<'a> {
     left: Option<usize>,
 }
 
-impl Caster<Option<Hit>> for InWorld<'_> {
-    fn cast_each(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = self.world.cast(ray, self.left);
+impl Caster<Option<Contact>> for InWorld<'_> {
+    fn cast_each(&self, rays: &Rays, which: Range<usize>, contacts: &mut [Option<Contact>]) {
+        for (ray, contact) in which.zip(contacts) {
+            *contact = self.world.contact(&rays.get(ray), self.left);
         }
     }
 
-    fn cast_rows<const R: usize>(&self, rays: &[Ray], hits: &mut [Option<Hit>]) -> bool {
+    fn cast_rows<const R: usize>(
+        &self,
+        rays: &Rays,
+        which: Range<usize>,
+        contacts: &mut [Option<Contact>],
+    ) -> bool {
         dispatch!(self.level, simd => {
-            let mut bundle = Bundle::<R>::blank();
-            let narrow = bundle.fill(simd, rays, self.world.reach);
+            let mut bundle = Bundle::<R>::new(rays, which);
+            let narrow = bundle.surround(simd, self.world.reach);
             if narrow {
-                let nearest = self.world.sweep(simd, &bundle, rays, self.left);
-                for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
-                    *hit = self.world.hit(ray, nearest.surface.get(i), nearest.triangle.get(i), nearest.distance.get(i));
+                let mut nearest = Nearest::new(bundle.rays.count);
+                self.world.sweep(simd, &bundle, self.left, &mut nearest);
+                for (ray, contact) in contacts.iter_mut().enumerate() {
+                    *contact = nearest.contact(self.world, &bundle.rays, ray);
                 }
             }
             narrow
@@ -70,23 +84,22 @@ impl World {
     pub(super) fn cast_beam_at(
         &self,
         level: Level,
-        rays: &[Ray],
+        rays: &Rays,
         left: Option<usize>,
-        hits: &mut [Option<Hit>],
+        contacts: &mut [Option<Contact>],
     ) {
         let world = self;
-        cast_all(&InWorld { world, level, left }, rays, hits);
+        cast_all(&InWorld { world, level, left }, rays, contacts);
     }
 
     #[inline(always)]
     fn sweep<S: Simd, const R: usize>(
         &self,
         simd: S,
-        bundle: &Bundle<R>,
-        rays: &[Ray],
+        bundle: &Bundle<'_, R>,
         left: Option<usize>,
-    ) -> Nearest<R> {
-        let mut nearest = Nearest::new(rays.len());
+        nearest: &mut Nearest<R>,
+    ) {
         let mut walk = Walk::new();
         let mut next = Some(walk.start());
         while let Some(child) = next {
@@ -96,19 +109,17 @@ impl World {
                 let (met, near) = bundle.pyramid.boxes(simd, &node.bounds, nearest.limit);
                 nearer = walk.enter(node, met, near);
             } else if left != Some(child.number()) {
-                self.meet(simd, bundle, rays, child.number(), &mut nearest);
+                self.meet(simd, bundle, child.number(), nearest);
             }
             next = nearer.or_else(|| walk.next(nearest.limit));
         }
-        nearest
     }
 
     #[inline(always)]
     fn meet<S: Simd, const R: usize>(
         &self,
         simd: S,
-        bundle: &Bundle<R>,
-        rays: &[Ray],
+        bundle: &Bundle<'_, R>,
         surface: usize,
         nearest: &mut Nearest<R>,
     ) {
@@ -117,39 +128,20 @@ impl World {
             Shape::Mesh(mesh) => {
                 let take = inlined(
                     #[inline(always)]
-                    |ray: usize, met: Option<Met>| {
-                        if let Some(met) = met {
-                            nearest.take(ray, met.distance, surface, met.triangle);
-                        }
-                    },
+                    |met: &MetInRow<'_>| nearest.mesh(simd, numbered(surface), met),
                 );
-                mesh.nearest_of_bundle(simd, bundle, rays, take);
+                mesh.nearest_of_bundle::<_, R, true>(simd, bundle, take);
                 nearest.set_limit(simd);
             }
             other => {
-                for (i, ray) in rays.iter().enumerate() {
-                    if let Some(distance) = other.distance(ray) {
-                        nearest.take(i, distance, surface, NONE);
+                for ray in 0..bundle.rays.count {
+                    if let Some(distance) = other.distance(&bundle.rays.get(ray)) {
+                        nearest.take(ray, distance, numbered(surface));
                     }
                 }
                 nearest.set_limit(simd);
             }
         }
-    }
-
-    /// What there is to know of a surface that a ray meets at a distance.
-    #[inline(always)]
-    fn hit(&self, ray: &Ray, surface: u32, triangle: u32, distance: f64) -> Option<Hit> {
-        if surface == NONE {
-            return None;
-        }
-        let surface = surface as usize;
-        let normal: Unit<Vector3<f64>> = match &self.shapes[surface] {
-            Shape::Polygon(polygon) => polygon.normal,
-            Shape::Mesh(mesh) => mesh.normal(triangle, ray),
-            other => other.cast(ray)?.1,
-        };
-        Some(Hit::new(surface, distance, normal, ray))
     }
 }
 
@@ -160,6 +152,7 @@ impl<const R: usize> Nearest<R> {
             distance: Rows::of(f64::INFINITY),
             surface: Rows::of(NONE),
             triangle: Rows::of(NONE),
+            closing: Rows::of(0.0),
             limit: upwards(FARTHEST),
         };
         // What a row is filled up with meets nothing.
@@ -169,14 +162,35 @@ impl<const R: usize> Nearest<R> {
         nearest
     }
 
-    /// A surface at some distance; of surfaces at the same distance the first counts. Whether it does.
-    fn take(&mut self, ray: usize, distance: f64, surface: usize, triangle: u32) -> bool {
-        let surface = numbered(surface);
+    /// What there is to know of the surface that a ray meets.
+    #[inline(always)]
+    fn contact(&self, world: &World, rays: &InRows<'_, R>, number: usize) -> Option<Contact> {
+        let surface = self.surface.get(number);
+        if surface == NONE {
+            return None;
+        }
+        let (triangle, closing) = match &world.shapes[surface as usize] {
+            Shape::Mesh(_) => (self.triangle.get(number), self.closing.get(number)),
+            Shape::Polygon(polygon) => (NONE, polygon.normal.dot(&rays.get(number).direction)),
+            other => {
+                let ray = rays.get(number);
+                (NONE, other.cast(&ray)?.1.dot(&ray.direction))
+            }
+        };
+        Some(Contact {
+            surface,
+            triangle,
+            distance: self.distance.get(number),
+            closing,
+        })
+    }
+
+    /// A surface that is no mesh at some distance; of surfaces at the same distance the first counts. Whether it does.
+    fn take(&mut self, ray: usize, distance: f64, surface: u32) -> bool {
         let nearer = (distance, surface) < (self.distance.get(ray), self.surface.get(ray));
         if nearer {
             self.distance.set(ray, distance);
             self.surface.set(ray, surface);
-            self.triangle.set(ray, triangle);
         }
         nearer
     }
@@ -192,8 +206,65 @@ impl<const R: usize> Nearest<R> {
         self.limit = upwards(most.reduce_max().min(FARTHEST));
     }
 
+    /// Takes those of a half of a row that are nearer than what is known, or as near and before it; whether any is.
     #[inline(always)]
-    fn polygon<S: Simd>(&mut self, simd: S, bundle: &Bundle<R>, surface: usize, polygon: &Polygon) {
+    fn take_half<S: Simd>(&mut self, simd: S, row: usize, second: usize, of: &Candidates<S>) -> bool {
+        let places = second * HALF..(second + 1) * HALF;
+        let present = f64x8::from_slice(simd, &self.distance.0[row][places.clone()]);
+        let number = u32x8::splat(simd, of.surface);
+        let surfaces = u32x8::from_slice(simd, &self.surface.0[row][places.clone()]);
+        let (nearer, as_near) = (of.distance.simd_lt(present), of.distance.simd_eq(present));
+        let mut which = nearer;
+        if as_near.to_bitmask() != 0 {
+            let infinite = f64x8::splat(simd, f64::INFINITY);
+            let before = number.simd_lt(surfaces).to_bitmask();
+            let before = mask64x8::from_bitmask(simd, before);
+            which |= as_near & before & of.distance.simd_lt(infinite);
+        }
+        let bits = which.to_bitmask();
+        if bits == 0 {
+            return false;
+        }
+        let narrow = mask32x8::from_bitmask(simd, bits);
+        which
+            .select(of.distance, present)
+            .store_slice(&mut self.distance.0[row][places.clone()]);
+        narrow
+            .select(number, surfaces)
+            .store_slice(&mut self.surface.0[row][places.clone()]);
+        if let Some((triangle, closing)) = of.of_mesh {
+            let triangles = u32x8::from_slice(simd, &self.triangle.0[row][places.clone()]);
+            let closings = f64x8::from_slice(simd, &self.closing.0[row][places.clone()]);
+            narrow
+                .select(triangle, triangles)
+                .store_slice(&mut self.triangle.0[row][places.clone()]);
+            which
+                .select(closing, closings)
+                .store_slice(&mut self.closing.0[row][places]);
+        }
+        true
+    }
+
+    #[inline(always)]
+    fn mesh<S: Simd>(&mut self, simd: S, surface: u32, met: &MetInRow<'_>) {
+        for second in 0..2 {
+            let places = second * HALF..(second + 1) * HALF;
+            let some = mask64x8::from_bitmask(simd, met.some >> (second * HALF) & 0xff);
+            let distance = f64x8::from_slice(simd, &met.distance[places.clone()]);
+            let candidates = Candidates {
+                surface,
+                distance: some.select(distance, f64x8::splat(simd, f64::INFINITY)),
+                of_mesh: Some((
+                    u32x8::from_slice(simd, &met.triangle[places.clone()]),
+                    f64x8::from_slice(simd, &met.closing[places]),
+                )),
+            };
+            self.take_half(simd, met.row, second, &candidates);
+        }
+    }
+
+    #[inline(always)]
+    fn polygon<S: Simd>(&mut self, simd: S, bundle: &Bundle<'_, R>, surface: usize, polygon: &Polygon) {
         let passes = passes(simd, bundle, polygon);
         if passes == Passes::Outside {
             return;
@@ -201,32 +272,12 @@ impl<const R: usize> Nearest<R> {
         let mut changed = false;
         for row in 0..R {
             for second in 0..2 {
-                let distances = distances(simd, bundle, row, second, polygon, passes == Passes::Inside);
-                let from = second * HALF;
-                let present = f64x8::from_slice(simd, &self.distance.0[row][from..from + HALF]);
-                let nearer = distances.simd_lt(present).to_bitmask();
-                if nearer == (1 << HALF) - 1 {
-                    let places = from..from + HALF;
-                    distances.store_slice(&mut self.distance.0[row][places.clone()]);
-                    self.surface.0[row][places.clone()].fill(numbered(surface));
-                    self.triangle.0[row][places].fill(NONE);
-                    changed = true;
-                    continue;
-                }
-                // One that is as near may be a surface before this one.
-                let mut open = nearer | distances.simd_eq(present).to_bitmask();
-                if open == 0 {
-                    continue;
-                }
-                let mut all = [0.0; HALF];
-                distances.store_slice(&mut all);
-                while open != 0 {
-                    let lane = open.trailing_zeros() as usize & (HALF - 1);
-                    open &= open - 1;
-                    if all[lane] < f64::INFINITY {
-                        changed |= self.take(row * LANES + from + lane, all[lane], surface, NONE);
-                    }
-                }
+                let candidates = Candidates {
+                    surface: numbered(surface),
+                    distance: distances(simd, bundle, row, second, polygon, passes == Passes::Inside),
+                    of_mesh: None,
+                };
+                changed |= self.take_half(simd, row, second, &candidates);
             }
         }
         if changed {
@@ -245,7 +296,7 @@ fn numbered(surface: usize) -> u32 {
 #[inline(always)]
 fn distances<S: Simd, const R: usize>(
     simd: S,
-    bundle: &Bundle<R>,
+    bundle: &Bundle<'_, R>,
     row: usize,
     second: usize,
     polygon: &Polygon,
@@ -263,9 +314,9 @@ fn distances<S: Simd, const R: usize>(
             ]
         },
     );
-    let closing = product(simd, &polygon.normal, &direction);
+    let closing = unfused::product(simd, &polygon.normal, &direction);
     let seen = less(&splat(&polygon.origin.coords), &origin);
-    let distance = product(simd, &polygon.normal, &seen) / closing;
+    let distance = unfused::product(simd, &polygon.normal, &seen) / closing;
     if inside {
         return distance;
     }
@@ -276,7 +327,7 @@ fn distances<S: Simd, const R: usize>(
     ];
     let mut met = distance.simd_gt(f64x8::splat(simd, 0.0)) & distance.simd_lt(f64x8::splat(simd, FARTHEST));
     for (inwards, edge) in &polygon.edges {
-        met &= product(simd, inwards, &point).simd_ge(f64x8::splat(simd, edge - EDGE_SLACK));
+        met &= unfused::product(simd, inwards, &point).simd_ge(f64x8::splat(simd, edge - EDGE_SLACK));
     }
     met.select(distance, f64x8::splat(simd, f64::INFINITY))
 }
@@ -286,7 +337,7 @@ fn distances<S: Simd, const R: usize>(
 /// The plane cuts it in a convex outline whose corners are where the pyramid's do. Rays that start elsewhere than at its
 /// tip, by δ at most, are off by δ(1 + 1/N·d) there.
 #[inline(always)]
-fn passes<S: Simd, const R: usize>(simd: S, bundle: &Bundle<R>, polygon: &Polygon) -> Passes {
+fn passes<S: Simd, const R: usize>(simd: S, bundle: &Bundle<'_, R>, polygon: &Polygon) -> Passes {
     let splat = inlined(
         #[inline(always)]
         |x: f64| f64x4::splat(simd, x),

@@ -4,17 +4,20 @@
 //! share an edge; the answer is the same with any instruction set, alone or in a beam. Of triangles that are met at the
 //! very same distance the first counts.
 
-use super::beam;
+use super::beam::{self, Found, MetInRow};
 use super::bundle::{Bundle, Caster, cast_all};
 use super::each;
 use super::exact::Judge;
 use super::lanes::inlined;
+use super::rays::Rays;
+use super::rows::LANES;
 use super::wide::Wide;
 use crate::footprint::Ray;
 use crate::mesh::Mesh;
 use catoptric_model::Pose;
 use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::{Point3, Unit, Vector3};
+use std::ops::Range;
 
 /// A mesh in its place, with an index over its triangles.
 pub struct Triangles {
@@ -70,18 +73,17 @@ impl Triangles {
         self.each().collect()
     }
 
-    pub(super) fn judge<'a>(&'a self, rays: &'a [Ray]) -> Judge<'a> {
+    pub(super) fn judge(&self) -> Judge<'_> {
         Judge {
             vertices: &self.vertices,
             triangles: &self.triangles,
-            rays,
         }
     }
 
     /// The nearest triangle along a ray.
     pub fn nearest(&self, ray: &Ray) -> Option<Met> {
         let mut met = [None];
-        self.nearest_of_each(std::slice::from_ref(ray), &mut met);
+        self.follow_each(Level::new(), |_| *ray, &mut met);
         met[0]
     }
 
@@ -89,48 +91,44 @@ impl Triangles {
     ///
     /// # Panics
     /// If there are not as many places for what they meet.
-    pub fn nearest_of_each(&self, rays: &[Ray], met: &mut [Option<Met>]) {
-        self.nearest_of_each_at(Level::new(), rays, met);
-    }
-
-    pub(super) fn nearest_of_each_at(&self, level: Level, rays: &[Ray], met: &mut [Option<Met>]) {
-        assert_eq!(rays.len(), met.len(), "every ray has its place");
-        let judge = self.judge(rays);
-        dispatch!(level, simd => {
-            each::follow(simd, &self.wide, &judge, inlined(#[inline(always)] |ray: usize, of_ray| met[ray] = of_ray));
-        });
+    pub fn nearest_of_each(&self, rays: &Rays, met: &mut [Option<Met>]) {
+        InMesh::new(self, Level::new()).cast_each(rays, 0..rays.len(), met);
     }
 
     /// The nearest triangle along each of some rays: fast if they are a narrow cone, from nearly one point.
     ///
     /// # Panics
     /// If there are not as many places for what they meet.
-    pub fn nearest_of_beam(&self, rays: &[Ray], met: &mut [Option<Met>]) {
-        self.nearest_of_beam_at(Level::new(), rays, met);
+    pub fn nearest_of_beam(&self, rays: &Rays, met: &mut [Option<Met>]) {
+        cast_all(&InMesh::new(self, Level::new()), rays, met);
     }
 
-    pub(super) fn nearest_of_beam_at(&self, level: Level, rays: &[Ray], met: &mut [Option<Met>]) {
-        cast_all(&InMesh { mesh: self, level }, rays, met);
+    fn follow_each(&self, level: Level, rays: impl Fn(usize) -> Ray, met: &mut [Option<Met>]) {
+        let (judge, count) = (self.judge(), met.len());
+        dispatch!(level, simd => {
+            let tell = inlined(#[inline(always)] |ray: usize, of_ray| met[ray] = of_ray);
+            each::follow(simd, &self.wide, &judge, count, &rays, tell);
+        });
     }
 
-    /// Tells what each ray of a bundle meets; it may be made for things that reach farther than the mesh.
+    /// Tells what the rays of a bundle meet, row by row, and under which incidence if that is asked for; it may be made for
+    /// things that reach farther than the mesh.
     #[inline(always)]
-    pub(super) fn nearest_of_bundle<S: Simd, const R: usize>(
+    pub(super) fn nearest_of_bundle<S: Simd, const R: usize, const CLOSING: bool>(
         &self,
         simd: S,
-        bundle: &Bundle<R>,
-        rays: &[Ray],
-        tell: impl FnMut(usize, Option<Met>),
+        bundle: &Bundle<'_, R>,
+        tell: impl FnMut(&MetInRow<'_>),
     ) {
-        let judge = self.judge(rays);
-        beam::follow(simd, &self.wide, bundle, &judge).finish(simd, bundle, &judge, tell);
+        let judge = self.judge();
+        let mut found = Found::new(bundle.rays.count);
+        beam::follow(simd, &self.wide, bundle, &judge, &mut found);
+        found.finish::<_, CLOSING>(simd, bundle, &judge, tell);
     }
 
     /// Normal of a triangle, for a ray that meets it.
     pub(super) fn normal(&self, triangle: u32, ray: &Ray) -> Unit<Vector3<f64>> {
-        let [a, b, c] = self.corners(triangle as usize);
-        // A sliver without an area has no normal; any that looks back does.
-        Unit::try_new((b - a).cross(&(c - a)), f64::MIN_POSITIVE).unwrap_or(-ray.direction)
+        self.judge().normal(triangle, ray)
     }
 
     /// Distance and normal of the nearest triangle along a ray.
@@ -141,22 +139,39 @@ impl Triangles {
 }
 
 /// A mesh, with what the machine has.
-struct InMesh<'a> {
+pub(super) struct InMesh<'a> {
     mesh: &'a Triangles,
     level: Level,
 }
 
+impl<'a> InMesh<'a> {
+    pub(super) fn new(mesh: &'a Triangles, level: Level) -> Self {
+        Self { mesh, level }
+    }
+}
+
 impl Caster<Option<Met>> for InMesh<'_> {
-    fn cast_each(&self, rays: &[Ray], met: &mut [Option<Met>]) {
-        self.mesh.nearest_of_each_at(self.level, rays, met);
+    fn cast_each(&self, rays: &Rays, which: Range<usize>, met: &mut [Option<Met>]) {
+        assert_eq!(which.len(), met.len(), "every ray has its place");
+        let ray = inlined(
+            #[inline(always)]
+            |ray: usize| rays.get(which.start + ray),
+        );
+        self.mesh.follow_each(self.level, ray, met);
     }
 
-    fn cast_rows<const R: usize>(&self, rays: &[Ray], met: &mut [Option<Met>]) -> bool {
+    fn cast_rows<const R: usize>(&self, rays: &Rays, which: Range<usize>, met: &mut [Option<Met>]) -> bool {
         dispatch!(self.level, simd => {
-            let mut bundle = Bundle::<R>::blank();
-            let narrow = bundle.fill(simd, rays, self.mesh.wide.reach);
+            let mut bundle = Bundle::<R>::new(rays, which);
+            let narrow = bundle.surround(simd, self.mesh.wide.reach);
             if narrow {
-                self.mesh.nearest_of_bundle(simd, &bundle, rays, inlined(#[inline(always)] |ray, of_ray| met[ray] = of_ray));
+                self.mesh.nearest_of_bundle::<_, R, false>(simd, &bundle, inlined(#[inline(always)] |row: &MetInRow<'_>| {
+                    let places = met.chunks_mut(LANES).nth(row.row).unwrap_or_default();
+                    for (lane, place) in places.iter_mut().enumerate() {
+                        let found = Met { triangle: row.triangle[lane], distance: row.distance[lane] };
+                        *place = (row.some >> lane & 1 == 1).then_some(found);
+                    }
+                }));
             }
             narrow
         })

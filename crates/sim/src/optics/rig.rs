@@ -4,6 +4,7 @@
 //! wherever the sensor is and whatever is around it, as long as nothing of the room comes within the structure itself.
 
 use super::{Course, End, Meeting, Setting};
+use crate::cast::Rays;
 use crate::footprint::Ray;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -12,6 +13,8 @@ use std::ops::Range;
 #[derive(Debug, Clone)]
 pub struct Rig {
     all: Compiled,
+    /// The last legs of all, which `all` has no more.
+    leaving: Rays,
     /// Where the ways of each beam begin, and last where they end.
     starts: Vec<Start>,
     /// No way leaves the ball of this radius around the sensor before it departs, in metres; 0 if all depart at once.
@@ -21,14 +24,14 @@ pub struct Rig {
 }
 
 /// The ways of a beam's sub-rays over the structure, in the order in which they are cast.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Ways<'a> {
     /// How the sub-rays are done with the structure, in order.
     pub(crate) runs: &'a [Run],
     /// Lengths of the ways of all sub-rays, in metres: to the end on the structure, or to where the last leg begins.
     pub(crate) lengths: &'a [f64],
-    /// The last legs of those that leave.
-    pub(crate) leaving: &'a [Ray],
+    /// The last legs of those that leave, among [`Rig::leaving`].
+    pub(crate) leaving: Range<usize>,
     facets: &'a [usize],
     meetings: &'a [Meeting],
 }
@@ -100,11 +103,17 @@ impl Rig {
             starts.push(all.start());
         }
         Self {
+            leaving: std::mem::take(&mut all.leaving).into_iter().collect(),
             all,
             starts,
             reach: beams.iter().map(|(_, reach, _)| *reach).fold(0.0, f64::max),
             ghosts: beams.iter().any(|(.., ghosts)| *ghosts),
         }
+    }
+
+    /// The last legs of all sub-rays that leave.
+    pub(crate) fn leaving(&self) -> &Rays {
+        &self.leaving
     }
 
     /// The ways of a beam.
@@ -113,7 +122,7 @@ impl Rig {
         Ways {
             runs: &all.runs[from.runs..to.runs],
             lengths: &all.lengths[from.lengths..to.lengths],
-            leaving: &all.leaving[from.leaving..to.leaving],
+            leaving: from.leaving..to.leaving,
             facets: &all.facets[from.facets..to.facets],
             meetings: &all.meetings[from.meetings..to.meetings],
         }
@@ -166,7 +175,7 @@ impl Compiled {
                 }
                 End::Hit(hit) => {
                     reach = reach.max(hit.point.coords.norm());
-                    Then::EndsOn(hit.surface, hit.normal.dot(&course.last.direction).abs())
+                    Then::EndsOn(hit.surface, hit.cos_incidence())
                 }
                 // It has met one more mirror, somewhere on the structure: all of that counts.
                 End::Trapped => {

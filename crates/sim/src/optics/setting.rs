@@ -6,8 +6,7 @@
 
 use super::MAX_BOUNCES;
 use super::clearance::Extent;
-use super::placed::{incidences, place_all, placed};
-use crate::cast::{Hit, Shape, World};
+use crate::cast::{Contact, Hit, Rays, Shape, World, placed};
 use crate::color::{self, Paint};
 use crate::error::SimError;
 use crate::footprint::Ray;
@@ -17,7 +16,7 @@ use crate::structure::{Back, BuiltFacet, Part, Structure};
 use catoptric_model::Pose;
 use nalgebra::{Point3, Unit, Vector3};
 use std::borrow::Cow;
-use std::ops::Deref;
+use std::ops::{Deref, Range};
 
 /// What a surface is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -120,9 +119,8 @@ pub enum Mirrors {
 /// Room for the legs of some beams in the frame of the room, and for what they meet.
 #[derive(Debug, Default)]
 pub(crate) struct Beyond {
-    rays: Vec<Ray>,
-    pub(crate) hits: Vec<Option<Hit>>,
-    pub(crate) cosines: Vec<f64>,
+    rays: Rays,
+    pub(crate) contacts: Vec<Option<Contact>>,
 }
 
 impl Beyond {
@@ -261,40 +259,31 @@ impl<'a> Setting<'a> {
             .map_or_else(Point3::origin, |pose| Point3::from(pose.translation.vector))
     }
 
-    /// Adds the legs of a beam, given in the sensor frame, to those that are to be cast into the room.
-    pub(crate) fn leave(&self, rays: &[Ray], beyond: &mut Beyond) {
-        self.place_in_room(rays, &mut beyond.rays);
+    /// Adds some legs, given in the sensor frame, to those that are to be cast into the room.
+    pub(crate) fn leave(&self, rays: &Rays, which: Range<usize>, beyond: &mut Beyond) {
+        self.place_in_room(rays, which, &mut beyond.rays);
     }
 
     /// Appends rays of the sensor frame, in the frame that the room is kept in.
-    fn place_in_room(&self, rays: &[Ray], in_room: &mut Vec<Ray>) {
+    fn place_in_room(&self, rays: &Rays, which: Range<usize>, in_room: &mut Rays) {
         match &self.start_from_sensor {
-            None => in_room.extend_from_slice(rays),
-            Some(pose) => place_all(rays, pose, in_room),
+            None => in_room.extend_from(rays, which),
+            Some(pose) => in_room.extend_placed(rays, which, pose),
         }
     }
 
     /// Casts all legs into the room, those of neighboring beams together.
     pub(crate) fn cast_into_room(&self, beyond: &mut Beyond) {
-        beyond.hits.clear();
-        beyond.hits.resize(beyond.rays.len(), None);
+        beyond.contacts.clear();
+        beyond.contacts.resize(beyond.rays.len(), None);
         if let Some(room) = &self.contents.room {
-            room.cast_beam(&beyond.rays, None, &mut beyond.hits);
+            room.cast_beam(&beyond.rays, None, &mut beyond.contacts);
         }
     }
 
-    /// Appends the cosines of the incidence of a beam's legs, from 0 to 1, where they meet the room; else anything.
-    pub(crate) fn incidences(&self, rays: &[Ray], hits: &[Option<Hit>], cosines: &mut Vec<f64>) {
-        let sensor_from_room = self.start_from_sensor.map(|pose| pose.rotation.inverse());
-        incidences(rays, hits, sensor_from_room.as_ref(), cosines);
-    }
-
-    /// A hit by a leg that was cast into the room, with its surface's index among all.
-    pub(crate) fn hit_in_room(&self, hit: &Hit) -> Hit {
-        Hit {
-            surface: hit.surface + self.contents.first_of_room,
-            ..*hit
-        }
+    /// Index among all surfaces of one that a leg met in the room.
+    pub(crate) fn met_in_room(&self, contact: &Contact) -> usize {
+        contact.surface as usize + self.contents.first_of_room
     }
 
     /// Whether a surface is a mirror, or a side of one that does not reflect.
@@ -322,13 +311,13 @@ impl<'a> Setting<'a> {
         self.contents.diffuse_reflectivity
     }
 
-    /// The mirror that a hit is on, and whether it is the body's back.
-    pub(crate) fn reflecting(&self, hit: &Hit) -> Option<(usize, bool)> {
-        let surface = &self.contents.surfaces[hit.surface];
+    /// The mirror that a surface is part of if its front, or its back, reflects; and whether that is the body's back.
+    pub(crate) fn reflecting(&self, surface: usize, front: bool) -> Option<(usize, bool)> {
+        let surface = &self.contents.surfaces[surface];
         let Role::Facet(facet) = surface.role else {
             return None;
         };
-        match (surface.side, hit.front) {
+        match (surface.side, front) {
             (Side::Face | Side::Both, true) => Some((facet, false)),
             (Side::Both, false) | (Side::Back, true) => Some((facet, true)),
             _ => None,
@@ -382,30 +371,32 @@ impl<'a> Setting<'a> {
     }
 
     /// The same along every ray of a beam.
-    pub(super) fn cast_beam<'s>(
-        &'s self,
-        rays: &[Ray],
-        left: Option<usize>,
-        legs: &mut Vec<Option<Leg<'s>>>,
-    ) {
+    pub(super) fn cast_beam<'s>(&'s self, rays: &Rays, left: Option<usize>, legs: &mut Vec<Option<Leg<'s>>>) {
         legs.clear();
         let contents = &*self.contents;
         let first = contents.first_of_room;
-        let mut own = vec![None; rays.len()];
-        contents
-            .world
-            .cast_beam(rays, left.filter(|l| *l < first), &mut own);
+        let cast = |world: &World, rays: &Rays, left: Option<usize>| {
+            let mut contacts = vec![None; rays.len()];
+            world.cast_beam(rays, left, &mut contacts);
+            contacts
+        };
+        let world = &contents.world;
+        let own = cast(world, rays, left.filter(|l| *l < first));
+        let own = own.into_iter().zip(rays.iter());
+        let own = own.map(|(contact, ray)| (contact.map(|contact| world.hit(&contact, &ray)), ray));
         let Some(room) = &contents.room else {
-            let each = own.into_iter().zip(rays);
-            legs.extend(each.map(|(hit, ray)| Some(self.unmoved(hit?, ray.direction))));
+            legs.extend(own.map(|(hit, ray)| Some(self.unmoved(hit?, ray.direction))));
             return;
         };
-        let mut in_room = Vec::new();
-        self.place_in_room(rays, &mut in_room);
-        let mut past = vec![None; rays.len()];
-        room.cast_beam(&in_room, left.and_then(|l| l.checked_sub(first)), &mut past);
-        let pairs = own.into_iter().zip(rays).zip(past.into_iter().zip(&in_room));
-        legs.extend(pairs.map(|(own, past)| self.nearer(own, past)));
+        let mut in_room = Rays::default();
+        self.place_in_room(rays, 0..rays.len(), &mut in_room);
+        let past = cast(room, &in_room, left.and_then(|l| l.checked_sub(first)));
+        let past = past.into_iter().zip(in_room.iter());
+        let past = past.map(|(contact, ray)| (contact.map(|contact| room.hit(&contact, &ray)), ray));
+        legs.extend(
+            own.zip(past)
+                .map(|((own, ray), (past, in_room))| self.nearer((own, &ray), (past, &in_room))),
+        );
     }
 
     /// The nearer of what a ray meets of the structure and, in the frame of the room, of that.

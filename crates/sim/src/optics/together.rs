@@ -1,6 +1,7 @@
 //! The ways of the rays of a beam, leg by leg together: rays that left one mirror are a beam again.
 
 use super::{Bounce, Course, End, MAX_BOUNCES, Path, Setting};
+use crate::cast::Rays;
 use crate::footprint::Ray;
 use nalgebra::Point3;
 
@@ -34,7 +35,7 @@ impl Setting<'_> {
         let mut courses: Vec<Course> = rays.iter().map(Course::begin).collect();
         // The mirror that a ray has left, and its number.
         let mut going: Vec<(Option<usize>, usize)> = (0..rays.len()).map(|ray| (None, ray)).collect();
-        let (mut beam, mut legs) = (Vec::new(), Vec::new());
+        let (mut beam, mut legs) = (Rays::default(), Vec::new());
         while !going.is_empty() {
             let mut next = Vec::new();
             for group in going.chunk_by(|a, b| a.0 == b.0) {

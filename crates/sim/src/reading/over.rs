@@ -3,7 +3,7 @@
 
 use super::part::{Parts, Place};
 use super::{Return, Sensor, is_chief};
-use crate::cast::Hit;
+use crate::cast::Contact;
 use crate::detect::Pulse;
 use crate::footprint;
 use crate::optics::{Rig, Run, Setting, Then, Ways};
@@ -11,17 +11,11 @@ use crate::power::{self, Target};
 use catoptric_model::beam;
 use std::ops::Range;
 
-/// What the legs of a beam that leave the structure meet in the room, and the cosines of the incidence there.
-struct InRoom<'a> {
-    hits: &'a [Option<Hit>],
-    cosines: &'a [f64],
-}
-
 /// Sub-rays that leave the structure alike, and what is around it.
 #[derive(Clone, Copy)]
 struct Group<'a> {
     setting: &'a Setting<'a>,
-    ways: Ways<'a>,
+    ways: &'a Ways<'a>,
     run: &'a Run,
 }
 
@@ -47,20 +41,17 @@ impl Sensor {
         let mut beyond = std::mem::take(&mut parts.beyond);
         beyond.clear();
         for (setting, beam) in settings.iter().zip(first..) {
-            setting.leave(rig.ways(beam).leaving, &mut beyond);
+            setting.leave(rig.leaving(), rig.ways(beam).leaving, &mut beyond);
         }
         if let Some(any) = settings.first() {
             any.cast_into_room(&mut beyond);
         }
-        let mut from = 0;
+        let mut in_room = beyond.contacts.as_slice();
         for ((setting, beam), place) in settings.iter().zip(first..).zip(returns) {
             let ways = rig.ways(beam);
-            let hits = &beyond.hits[from..from + ways.leaving.len()];
-            from += ways.leaving.len();
-            beyond.cosines.clear();
-            setting.incidences(ways.leaving, hits, &mut beyond.cosines);
-            let cosines = &beyond.cosines;
-            self.illuminate_over(ways, setting, beam, &InRoom { hits, cosines }, parts);
+            let (own, others) = in_room.split_at(ways.leaving.len());
+            in_room = others;
+            self.illuminate_over(&ways, setting, beam, own, parts);
             *place = self.receive(setting, parts.as_slice());
         }
         parts.beyond = beyond;
@@ -69,10 +60,10 @@ impl Sensor {
     /// [`Sensor::illuminate`] from where the sub-rays depart from the structure.
     fn illuminate_over(
         &self,
-        ways: Ways<'_>,
+        ways: &Ways<'_>,
         setting: &Setting<'_>,
         beam: usize,
-        room: &InRoom<'_>,
+        in_room: &[Option<Contact>],
         parts: &mut Parts,
     ) {
         parts.begin();
@@ -84,7 +75,7 @@ impl Sensor {
                 Then::Leaves => {
                     let legs = left..left + all.len();
                     left = legs.end;
-                    self.illuminate_room(&group, beam, &room.only(legs), parts);
+                    self.illuminate_room(&group, beam, &in_room[legs], parts);
                 }
                 Then::EndsOn(surface, cos_incidence) => {
                     let end = |length| (length, cos_incidence);
@@ -102,28 +93,40 @@ impl Sensor {
     }
 
     /// Adds the light of sub-rays that leave alike, with what they meet in the room.
-    fn illuminate_room(&self, group: &Group<'_>, beam: usize, room: &InRoom<'_>, parts: &mut Parts) {
+    fn illuminate_room(
+        &self,
+        group: &Group<'_>,
+        beam: usize,
+        in_room: &[Option<Contact>],
+        parts: &mut Parts,
+    ) {
         let Group { setting, ways, run } = *group;
         let mut done = 0;
-        while let Some(first) = room.hits.get(done) {
-            let hit = first.map(|hit| setting.hit_in_room(&hit));
-            let mirror = hit.filter(|hit| setting.is_mirror(hit.surface));
+        while let Some(first) = in_room.get(done) {
+            let surface = first.map(|contact| setting.met_in_room(&contact));
+            let mirror = surface.filter(|surface| setting.is_mirror(*surface));
             // Mirrors are looked at ray by ray.
-            let count = mirror.map_or_else(|| room.alike(done), |_| 1);
-            let legs = done..done + count;
-            let from = run.sub_rays.start;
-            let sub_rays = from + legs.start..from + legs.end;
-            done = legs.end;
-            if mirror.is_some_and(|hit| setting.reflecting(&hit).is_some()) {
+            let count = if mirror.is_some() {
+                1
+            } else {
+                alike(&in_room[done..])
+            };
+            let contacts = &in_room[done..done + count];
+            let from = run.sub_rays.start + done;
+            let sub_rays = from..from + count;
+            done += count;
+            let front = first.is_some_and(|contact| contact.closing < 0.0);
+            if mirror.is_some_and(|mirror| setting.reflecting(mirror, front).is_some()) {
                 // Its light may come back to the structure.
                 let sub_ray = &self.sub_rays[sub_rays.start];
                 let ray = footprint::ray(&self.shape, beam::azimuth(beam), sub_ray);
                 self.illuminate_along(setting, sub_ray, &ray, &setting.trace(&ray), parts);
                 continue;
             }
-            if let Some(hit) = hit {
-                let ends = room.ends(&ways.lengths[sub_rays.clone()], legs);
-                self.add_light(group, sub_rays.clone(), hit.surface, ends, parts);
+            if let Some(surface) = surface {
+                let ends = contacts.iter().flatten().zip(&ways.lengths[sub_rays.clone()]);
+                let ends = ends.map(|(contact, length)| (length + contact.distance, contact.cos_incidence()));
+                self.add_light(group, sub_rays.clone(), surface, ends, parts);
             }
             self.add_on_mirrors(group, sub_rays, parts);
         }
@@ -187,30 +190,12 @@ impl Sensor {
     }
 }
 
-impl<'a> InRoom<'a> {
-    /// Some of the legs.
-    fn only(&self, legs: Range<usize>) -> InRoom<'a> {
-        Self {
-            hits: &self.hits[legs.clone()],
-            cosines: &self.cosines[legs],
-        }
-    }
-
-    /// How many legs in a row, from one on, meet the same surface, or nothing.
-    fn alike(&self, first: usize) -> usize {
-        let surface = |hit: &Option<Hit>| hit.as_ref().map(|hit| hit.surface);
-        let met = surface(&self.hits[first]);
-        self.hits[first..]
-            .iter()
-            .take_while(|hit| surface(hit) == met)
-            .count()
-    }
-
-    /// Ranges and incidences where these legs end, after ways of these lengths.
-    fn ends(&self, lengths: &[f64], legs: Range<usize>) -> impl Iterator<Item = (f64, f64)> {
-        let distance = |hit: &Option<Hit>| hit.as_ref().map_or(f64::INFINITY, |hit| hit.distance);
-        let ends = self.hits[legs.clone()].iter().map(distance);
-        let ends = ends.zip(&self.cosines[legs]).zip(lengths);
-        ends.map(|((distance, cosine), length)| (length + distance, *cosine))
-    }
+/// How many legs in a row, from the first on, meet the same surface, or nothing.
+fn alike(in_room: &[Option<Contact>]) -> usize {
+    let surface = |contact: &Option<Contact>| contact.as_ref().map(|contact| contact.surface);
+    let met = in_room.first().and_then(surface);
+    in_room
+        .iter()
+        .take_while(|contact| surface(contact) == met)
+        .count()
 }

@@ -126,7 +126,7 @@ impl Sensor {
             bounces: path.facets().len(),
             on: Illumination {
                 reflectivity: setting.paint(hit.surface).reflectivity,
-                cos_incidence: hit.normal.dot(&path.last.direction).abs(),
+                cos_incidence: hit.cos_incidence(),
                 share: sub_ray.weight,
                 range: path.length,
                 mirrors: self.mirrors[path.silvered] * path.gain,

@@ -1,0 +1,103 @@
+//! Ways to triangles that are known to be met, each ray to one of its own: found in f64 eight at a time.
+
+use super::exact::{Judge, STEEP};
+use super::lanes::{inlined, less, size, unfused};
+use crate::footprint::Ray;
+use fearless_simd::{Simd, f64x8, prelude::*};
+
+const LANES: usize = 8;
+
+/// Rays whose triangle is known, but not the way to it.
+#[derive(Default)]
+pub(super) struct Pending {
+    count: usize,
+    /// Each ray and its triangle.
+    found: [(usize, u32); LANES],
+}
+
+/// The way of a ray to its triangle.
+pub(super) struct Settled {
+    pub(super) ray: usize,
+    pub(super) triangle: u32,
+    /// What [`Judge::way`] gives, to the bit.
+    pub(super) way: f64,
+    /// Product of the ray's direction with [`Judge::normal`], if it was asked for.
+    pub(super) closing: f64,
+}
+
+impl Pending {
+    /// Takes one more; whether that is all there is room for, and [`Pending::settle`] must be called.
+    #[inline(always)]
+    pub(super) fn add(&mut self, ray: usize, triangle: u32) -> bool {
+        self.found[self.count] = (ray, triangle);
+        self.count += 1;
+        self.count == LANES
+    }
+
+    /// Finds the ways and tells them.
+    #[inline(always)]
+    pub(super) fn settle<S: Simd, const CLOSING: bool>(
+        &mut self,
+        simd: S,
+        judge: &Judge<'_>,
+        rays: &impl Fn(usize) -> Ray,
+        mut tell: impl FnMut(Settled),
+    ) {
+        let count = std::mem::take(&mut self.count);
+        if count == 0 {
+            return;
+        }
+        for lane in count..LANES {
+            self.found[lane] = self.found[0];
+        }
+        let [mut a, mut b, mut c, mut origin, mut direction] = [[[0.0; LANES]; 3]; 5];
+        for (lane, &(ray, triangle)) in self.found.iter().enumerate() {
+            let (ray, corners) = (rays(ray), judge.corners(triangle));
+            for k in 0..3 {
+                a[k][lane] = corners[0][k];
+                b[k][lane] = corners[1][k];
+                c[k][lane] = corners[2][k];
+                origin[k][lane] = ray.origin[k];
+                direction[k][lane] = ray.direction[k];
+            }
+        }
+        let load = inlined(
+            #[inline(always)]
+            |v: &[[f64; LANES]; 3]| {
+                [
+                    f64x8::simd_from(simd, v[0]),
+                    f64x8::simd_from(simd, v[1]),
+                    f64x8::simd_from(simd, v[2]),
+                ]
+            },
+        );
+        let (a, direction) = (load(&a), load(&direction));
+        let (p, q) = (less(&load(&b), &a), less(&load(&c), &a));
+        let long = size(&p).max(size(&q));
+        let normal = unfused::cross(&p, &q);
+        let closing = unfused::dot(&normal, &direction);
+        let least = f64x8::splat(simd, STEEP) * long * long;
+        let sure = closing.abs().simd_gt(least).to_bitmask();
+        let (mut ways, mut closings) = ([0.0; LANES], [0.0; LANES]);
+        (unfused::dot(&normal, &less(&a, &load(&origin))) / closing).store_slice(&mut ways);
+        if CLOSING {
+            let norm = unfused::dot(&normal, &normal).sqrt();
+            let unit = [normal[0] / norm, normal[1] / norm, normal[2] / norm];
+            unfused::dot(&unit, &direction).store_slice(&mut closings);
+        }
+        for (lane, &(number, triangle)) in self.found[..count].iter().enumerate() {
+            let mut settled = Settled {
+                ray: number,
+                triangle,
+                way: ways[lane],
+                closing: closings[lane],
+            };
+            if sure >> lane & 1 == 0 {
+                let ray = rays(number);
+                settled.way = judge.way(&ray, triangle);
+                settled.closing = judge.normal(triangle, &ray).dot(&ray.direction);
+            }
+            tell(settled);
+        }
+    }
+}

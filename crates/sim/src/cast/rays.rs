@@ -1,0 +1,242 @@
+//! Rays side by side, and moved into another frame eight at a time with the operations of one alone, in their order.
+
+use super::lanes::{inlined, unfused};
+use super::rows::{HALF, LANES as ROW, MOST, Wide};
+use crate::footprint::Ray;
+use catoptric_model::Pose;
+use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
+use nalgebra::{Point3, Unit, Vector3};
+use std::ops::Range;
+
+const LANES: usize = HALF;
+
+/// Rays that are put in their places at a time.
+const BLOCK: usize = 64;
+
+/// Rays side by side: each coordinate of all of them in a row of its own.
+///
+/// ```
+/// # use catoptric_sim::{cast::Rays, footprint::Ray};
+/// # use nalgebra::{Point3, Vector3};
+/// let ray = Ray { origin: Point3::new(0.0, 0.0, 0.1), direction: Vector3::x_axis() };
+/// let rays: Rays = [ray, ray].into_iter().collect();
+/// assert_eq!((rays.len(), rays.get(1)), (2, ray));
+/// ```
+#[derive(Debug, Clone, Default)]
+pub struct Rays {
+    count: usize,
+    /// A bundle more than there are, so that whole bundles can be taken from any ray on; what is there is of no account.
+    origin: [Vec<f64>; 3],
+    direction: [Vec<f64>; 3],
+}
+
+impl Rays {
+    /// How many.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// Forgets them and keeps their place in memory.
+    pub fn clear(&mut self) {
+        self.count = 0;
+    }
+
+    /// Makes room for so many more.
+    fn make_room(&mut self, more: usize) {
+        let wanted = self.count + more + MOST;
+        if self.origin[0].len() < wanted {
+            for row in self.origin.iter_mut().chain(&mut self.direction) {
+                row.resize(wanted, 0.0);
+            }
+        }
+    }
+
+    /// Adds some of others.
+    pub(crate) fn extend_from(&mut self, others: &Self, which: Range<usize>) {
+        assert!(which.end <= others.count, "they are there");
+        self.make_room(which.len());
+        let own = self.count..self.count + which.len();
+        for k in 0..3 {
+            self.origin[k][own.clone()].copy_from_slice(&others.origin[k][which.clone()]);
+            self.direction[k][own.clone()].copy_from_slice(&others.direction[k][which.clone()]);
+        }
+        self.count = own.end;
+    }
+
+    /// Adds some of others, moved into another frame: what [`placed`] makes of each of them, to the bit.
+    pub(crate) fn extend_placed(&mut self, others: &Self, which: Range<usize>, other_from_ray: &Pose) {
+        assert!(which.end <= others.count, "they are there");
+        self.make_room(which.len());
+        let own = self.count;
+        self.count += which.len();
+        dispatch!(Level::new(), simd => self.place(simd, own, others, which, other_from_ray));
+    }
+
+    /// There is room for eight beyond the last, and eight may be read there.
+    #[inline(always)]
+    fn place<S: Simd>(&mut self, simd: S, own: usize, others: &Self, which: Range<usize>, pose: &Pose) {
+        let splat = inlined(
+            #[inline(always)]
+            |x: f64| f64x8::splat(simd, x),
+        );
+        let turn = pose.rotation.coords;
+        let (q, w) = ([splat(turn.x), splat(turn.y), splat(turn.z)], splat(turn.w));
+        let shift = &pose.translation.vector;
+        let shift = [splat(shift.x), splat(shift.y), splat(shift.z)];
+        let load = inlined(
+            #[inline(always)]
+            |rows: &[Vec<f64>; 3], from: usize| {
+                [
+                    f64x8::from_slice(simd, &rows[0][from..from + LANES]),
+                    f64x8::from_slice(simd, &rows[1][from..from + LANES]),
+                    f64x8::from_slice(simd, &rows[2][from..from + LANES]),
+                ]
+            },
+        );
+        for done in (0..which.len()).step_by(LANES) {
+            let (from, to) = (which.start + done, own + done);
+            let origin = rotate(simd, &q, w, &load(&others.origin, from));
+            let direction = rotate(simd, &q, w, &load(&others.direction, from));
+            for k in 0..3 {
+                (origin[k] + shift[k]).store_slice(&mut self.origin[k][to..to + LANES]);
+                direction[k].store_slice(&mut self.direction[k][to..to + LANES]);
+            }
+        }
+    }
+
+    /// One of them.
+    ///
+    /// # Panics
+    /// If there are not so many.
+    #[inline(always)]
+    pub fn get(&self, ray: usize) -> Ray {
+        assert!(ray < self.count, "it is there");
+        let [ox, oy, oz] = &self.origin;
+        let [dx, dy, dz] = &self.direction;
+        Ray {
+            origin: Point3::new(ox[ray], oy[ray], oz[ray]),
+            // As it came.
+            direction: Unit::new_unchecked(Vector3::new(dx[ray], dy[ray], dz[ray])),
+        }
+    }
+
+    /// All of them, one by one.
+    pub fn iter(&self) -> impl Iterator<Item = Ray> {
+        (0..self.count).map(|ray| self.get(ray))
+    }
+
+    /// Coordinates of where they start and of where they go, by axis, from one of them on for so many rows.
+    #[inline(always)]
+    pub(super) fn rows<'a, const R: usize>(&'a self, from: usize) -> [Wide<'a, R>; 2] {
+        let three = inlined(
+            #[inline(always)]
+            |of: &'a [Vec<f64>; 3]| {
+                [
+                    bundle(&of[0][from..]),
+                    bundle(&of[1][from..]),
+                    bundle(&of[2][from..]),
+                ]
+            },
+        );
+        [three(&self.origin), three(&self.direction)]
+    }
+}
+
+/// The first so many rows.
+#[inline(always)]
+fn bundle<const R: usize>(of: &[f64]) -> &[[f64; ROW]; R] {
+    match of.as_chunks().0.first_chunk() {
+        Some(rows) => rows,
+        None => unreachable!("there is a bundle more than there are rays"),
+    }
+}
+
+impl Extend<Ray> for Rays {
+    fn extend<T: IntoIterator<Item = Ray>>(&mut self, rays: T) {
+        let mut rays = rays.into_iter();
+        let mut next = rays.next();
+        while next.is_some() {
+            // In blocks, so that a place is looked for once in a while.
+            self.make_room(BLOCK);
+            let from = self.count;
+            let [x, y, z] = self.origin.each_mut().map(|row| &mut row[from..from + BLOCK]);
+            let [u, v, w] = self.direction.each_mut().map(|row| &mut row[from..from + BLOCK]);
+            let mut own = 0;
+            while own < BLOCK
+                && let Some(Ray { origin, direction }) = next
+            {
+                (x[own], y[own], z[own]) = (origin.x, origin.y, origin.z);
+                (u[own], v[own], w[own]) = (direction.x, direction.y, direction.z);
+                own += 1;
+                next = rays.next();
+            }
+            self.count += own;
+        }
+    }
+}
+
+impl FromIterator<Ray> for Rays {
+    fn from_iter<T: IntoIterator<Item = Ray>>(rays: T) -> Self {
+        let mut all = Self::default();
+        all.extend(rays);
+        all
+    }
+}
+
+/// A ray moved into another frame.
+pub(crate) fn placed(ray: &Ray, other_from_ray: &Pose) -> Ray {
+    Ray {
+        origin: other_from_ray * ray.origin,
+        direction: other_from_ray * ray.direction,
+    }
+}
+
+/// t·w + q × t + v with t = 2·(q × v).
+#[inline(always)]
+fn rotate<S: Simd>(simd: S, q: &[f64x8<S>; 3], w: f64x8<S>, v: &[f64x8<S>; 3]) -> [f64x8<S>; 3] {
+    let two = f64x8::splat(simd, 2.0);
+    let t = unfused::cross(q, v);
+    let t = [t[0] * two, t[1] * two, t[2] * two];
+    let across = unfused::cross(q, &t);
+    [
+        t[0] * w + across[0] + v[0],
+        t[1] * w + across[1] + v[1],
+        t[2] * w + across[2] + v[2],
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Translation3, UnitQuaternion};
+
+    #[test]
+    fn many_rays_are_moved_as_each_alone_to_the_bit() {
+        let pose = Pose::from_parts(
+            Translation3::new(0.3, -1.7, 2.9),
+            UnitQuaternion::from_scaled_axis(Vector3::new(0.4, -1.1, 0.7)),
+        );
+        let ray = |i: u32| {
+            let x = f64::from(i);
+            Ray {
+                origin: Point3::new(0.01 * x, -0.003 * x * x, 0.1 / (1.0 + x)),
+                direction: Unit::new_normalize(Vector3::new(1.0, 0.1 * x, -0.07 * x * x)),
+            }
+        };
+        let all: Rays = (0..64).map(ray).collect();
+        let mut moved = Rays::default();
+        for count in [0, 1, 7, 8, 9, 19, 61] {
+            moved.clear();
+            // Not at the beginning of either.
+            moved.extend([ray(0)]);
+            moved.extend_placed(&all, 3..3 + count, &pose);
+            let each: Vec<Ray> = (3..3 + count).map(|i| placed(&all.get(i), &pose)).collect();
+            assert_eq!(moved.iter().skip(1).collect::<Vec<_>>(), each, "{count} rays");
+        }
+    }
+}
