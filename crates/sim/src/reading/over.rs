@@ -124,8 +124,12 @@ impl Sensor {
                 continue;
             }
             if let Some(surface) = surface {
-                let ends = contacts.iter().flatten().zip(&ways.lengths[sub_rays.clone()]);
-                let ends = ends.map(|(contact, length)| (length + contact.distance, contact.cos_incidence()));
+                let ends = contacts.iter().zip(&ways.lengths[sub_rays.clone()]);
+                // All of them are there.
+                let ends = ends.map(|(contact, length)| {
+                    let end = |contact: &Contact| (length + contact.distance, contact.cos_incidence());
+                    contact.as_ref().map_or((f64::INFINITY, 0.0), end)
+                });
                 self.add_light(group, sub_rays.clone(), surface, ends, parts);
             }
             self.add_on_mirrors(group, sub_rays, parts);
