@@ -37,8 +37,10 @@ impl Canvas {
             self.span([a[1], b[1], c[1]], self.height),
         );
         for row in rows {
-            for column in columns.clone() {
-                let (x, y) = (column as f64 + 0.5, row as f64 + 0.5);
+            let y = row as f64 + 0.5;
+            let within = self.within([[a, b], [b, c], [c, a]], area, y);
+            for column in columns.start.max(within.start)..columns.end.min(within.end) {
+                let x = column as f64 + 0.5;
                 let part = |p: [f64; 3], q: [f64; 3]| {
                     ((q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0])) / area
                 };
@@ -48,6 +50,21 @@ impl Canvas {
                 }
             }
         }
+    }
+
+    /// Columns of a row, some more than are needed, between which the edges of a triangle lie.
+    fn within(&self, edges: [[[f64; 3]; 2]; 3], area: f64, y: f64) -> std::ops::Range<usize> {
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        for [p, q] in edges {
+            let rise = q[1] - p[1];
+            let at = p[0] + (q[0] - p[0]) * (y - p[1]) / rise;
+            if rise * area < 0.0 {
+                low = low.max(at);
+            } else if rise * area > 0.0 {
+                high = high.min(at);
+            }
+        }
+        self.span([low - 2.0, low - 2.0, high + 2.0], self.width)
     }
 
     /// Samples between the least and the greatest of some places.
