@@ -12,6 +12,7 @@ mod bundle;
 mod cylinder;
 mod each;
 mod exact;
+mod finish;
 mod lanes;
 mod pending;
 mod pyramid;

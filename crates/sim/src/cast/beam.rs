@@ -16,18 +16,16 @@
 //!
 //! So each ray knows an interval that holds the nearest way in f64. What is surely hit and surely nearer takes its
 //! place; whatever overlaps is decided in f64 at once ([`Judge`]); the ways themselves are found at the
-//! end.
+//! end ([`finish`](super::finish)).
 
 use super::bundle::{Bundle, around};
-use super::exact::{Judge, Plane};
-use super::lanes::{cross, dot, inlined, less, size, unfused};
-use super::pending::{Pending, Settled};
-use super::rows::{HALF, InRows, LANES, Rows, Vectors, half, whole};
+use super::exact::Judge;
+use super::lanes::{cross, dot, inlined, less, size};
+use super::rows::{InRows, LANES, Rows, Vectors, whole};
 use super::wide::{Leaf, ROUNDING, WIDTH, Walk, Wide};
 use super::{FARTHEST, NONE};
 use fearless_simd::{Simd, prelude::*};
-use fearless_simd::{f32x8, f32x16, f64x8, mask64x8, u32x16};
-use nalgebra::Vector3;
+use fearless_simd::{f32x8, f32x16, u32x16};
 
 /// What a bundle has met so far.
 pub(super) struct Found<const R: usize> {
@@ -38,20 +36,6 @@ pub(super) struct Found<const R: usize> {
     /// Greatest of the upper bounds.
     limit: f32,
 }
-
-/// What sixteen rays in a row meet.
-pub(super) struct MetInRow<'a> {
-    pub(super) row: usize,
-    /// A bit for every ray that meets anything; the others have any numbers.
-    pub(super) some: u64,
-    pub(super) triangle: &'a [u32; LANES],
-    pub(super) distance: &'a [f64; LANES],
-    /// Product of the ray's direction with the triangle's normal, if it was asked for.
-    pub(super) closing: &'a [f64; LANES],
-}
-
-/// Where the normal counts too, fewer rays of a row with the same triangle are looked at each by itself.
-const FEW: u32 = 5;
 
 /// What the rays need to know of eight triangles, in the order of [`At`].
 type Facts = [[f32; WIDTH]; 25];
@@ -108,140 +92,10 @@ impl<const R: usize> Found<R> {
         }
     }
 
-    /// Tells of every ray the nearest triangle, row by row.
-    #[inline(always)]
-    pub(super) fn finish<S: Simd, const CLOSING: bool>(
-        &self,
-        simd: S,
-        bundle: &Bundle<'_, R>,
-        judge: &Judge<'_>,
-        mut tell: impl FnMut(&MetInRow<'_>),
-    ) {
-        let rays = &bundle.rays;
-        let (mut ways, mut closings) = (Rows::<f64, R>::of(0.0), Rows::<f64, R>::of(0.0));
-        let mut pending = Pending::default();
-        let ray = inlined(
-            #[inline(always)]
-            |ray: usize| rays.get(ray),
-        );
-        let mut somes = [0; R];
-        let mut last = NONE;
-        let mut plane = Plane::default();
-        let (mut normal, mut common) = (Vector3::zeros(), f64x8::splat(simd, 0.0));
-        for (row, numbers) in self
-            .triangle
-            .0
-            .iter()
-            .enumerate()
-            .take(rays.count.div_ceil(LANES))
-        {
-            let triangles = u32x16::simd_from(simd, *numbers);
-            let some = !triangles.simd_eq(u32x16::splat(simd, NONE)).to_bitmask();
-            let some = some & ((1 << LANES.min(rays.count - row * LANES)) - 1);
-            somes[row] = some;
-            // Rays of the same triangle, one triangle after the other.
-            let mut open = some;
-            while open != 0 {
-                let first = open.trailing_zeros() as usize & (LANES - 1);
-                let triangle = numbers[first];
-                let alike = triangles.simd_eq(u32x16::splat(simd, triangle));
-                let lanes = alike.to_bitmask() & open;
-                open &= !lanes;
-                if CLOSING && lanes.count_ones() < FEW {
-                    let mut few = lanes;
-                    while few != 0 {
-                        let lane = few.trailing_zeros() as usize;
-                        few &= few - 1;
-                        if pending.add(row * LANES + lane, triangle) {
-                            pending.settle::<_, CLOSING>(
-                                simd,
-                                judge,
-                                &ray,
-                                inlined(
-                                    #[inline(always)]
-                                    |settled: Settled| {
-                                        ways.set(settled.ray, settled.way);
-                                        closings.set(settled.ray, settled.closing);
-                                    },
-                                ),
-                            );
-                        }
-                    }
-                    continue;
-                }
-                if triangle != last {
-                    last = triangle;
-                    plane = judge.plane(triangle);
-                    if CLOSING {
-                        normal = plane.unit();
-                    }
-                    if let Some(start) = &rays.common {
-                        common = f64x8::splat(simd, plane.height(start));
-                    }
-                }
-                let (low, high) = alike.widen();
-                let mut unsure = lanes;
-                for (second, alike) in [low, high].into_iter().enumerate() {
-                    let height = match &rays.common {
-                        Some(_) => common,
-                        None => plane.heights(simd, &half(simd, &rays.origin, row, second)),
-                    };
-                    let direction = half(simd, &rays.direction, row, second);
-                    let (way, steep) = plane.ways(simd, height, &direction);
-                    put(simd, alike, way, &mut ways.0[row], second);
-                    if CLOSING {
-                        let closing = unfused::product(simd, &normal, &direction);
-                        put(simd, alike, closing, &mut closings.0[row], second);
-                    }
-                    unsure &= !((steep & alike).to_bitmask() << (second * HALF));
-                }
-                while unsure != 0 {
-                    let number = row * LANES + unsure.trailing_zeros() as usize;
-                    unsure &= unsure - 1;
-                    let ray = rays.get(number);
-                    ways.set(number, judge.way(&ray, triangle));
-                    if CLOSING {
-                        closings.set(number, judge.normal(triangle, &ray).dot(&ray.direction));
-                    }
-                }
-            }
-        }
-        pending.settle::<_, CLOSING>(
-            simd,
-            judge,
-            &ray,
-            inlined(
-                #[inline(always)]
-                |settled: Settled| {
-                    ways.set(settled.ray, settled.way);
-                    closings.set(settled.ray, settled.closing);
-                },
-            ),
-        );
-        for (row, triangle) in self
-            .triangle
-            .0
-            .iter()
-            .enumerate()
-            .take(rays.count.div_ceil(LANES))
-        {
-            tell(&MetInRow {
-                row,
-                some: somes[row],
-                triangle,
-                distance: &ways.0[row],
-                closing: &closings.0[row],
-            });
-        }
+    /// The nearest triangle of every ray, [`NONE`] where there is none.
+    pub(super) fn triangles(&self) -> &[[u32; LANES]; R] {
+        &self.triangle.0
     }
-}
-
-/// Puts numbers in a half of a row where they count.
-#[inline(always)]
-fn put<S: Simd>(simd: S, which: mask64x8<S>, numbers: f64x8<S>, row: &mut [f64; LANES], second: usize) {
-    let place = &mut row[second * HALF..(second + 1) * HALF];
-    let present = f64x8::from_slice(simd, place);
-    which.select(numbers, present).store_slice(place);
 }
 
 /// Follows a bundle through the index.

@@ -3,9 +3,9 @@
 //! A polygon's plane and edges are computed in f64 as for a ray alone, in the same order: the answer is the same to the
 //! bit. Where the whole pyramid around the rays passes inside the polygon, or outside, its edges need not be tried.
 
-use super::beam::MetInRow;
 use super::build::upwards;
 use super::bundle::{Bundle, Caster, cast_all};
+use super::finish::MetInRow;
 use super::lanes::{inlined, less, unfused};
 use super::rays::Rays;
 use super::rows::{HALF, InRows, LANES, Rows, half};

@@ -4,10 +4,11 @@
 //! share an edge; the answer is the same with any instruction set, alone or in a beam. Of triangles that are met at the
 //! very same distance the first counts.
 
-use super::beam::{self, Found, MetInRow};
+use super::beam::{self, Found};
 use super::bundle::{Bundle, Caster, cast_all};
 use super::each;
 use super::exact::Judge;
+use super::finish::{MetInRow, finish};
 use super::lanes::inlined;
 use super::rays::Rays;
 use super::rows::LANES;
@@ -123,7 +124,7 @@ impl Triangles {
         let judge = self.judge();
         let mut found = Found::new(bundle.rays.count);
         beam::follow(simd, &self.wide, bundle, &judge, &mut found);
-        found.finish::<_, CLOSING>(simd, bundle, &judge, tell);
+        finish::<S, R, CLOSING>(simd, found.triangles(), &bundle.rays, &judge, tell);
     }
 
     /// Normal of a triangle, for a ray that meets it.
