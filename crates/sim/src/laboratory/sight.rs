@@ -28,6 +28,22 @@ pub struct Sight<'a> {
 /// Fewest beams of a scan that are worth another thread.
 const BEAMS_OF_A_THREAD: usize = 64;
 
+/// Bundles of rays at most that neighboring beams are cast in.
+const BUNDLES: usize = 4;
+
+/// Beams that are cast together: as many as leave the least room in the bundles that the caster makes of their rays.
+fn together(sub_rays: usize) -> usize {
+    let filled = |beams: usize| {
+        let rays = beams * sub_rays;
+        rays as f64 / rays.next_multiple_of(BUNDLE) as f64
+    };
+    let most = (BUNDLES * BUNDLE / sub_rays.max(1)).clamp(1, BEAMS_OF_A_THREAD);
+    (1..=most).fold(
+        1,
+        |best, beams| if filled(beams) > filled(best) { beams } else { best },
+    )
+}
+
 impl Laboratory {
     /// What the sensor sees during a stretch.
     ///
@@ -136,8 +152,7 @@ impl Sight<'_> {
     /// The same, in the place of what another scan met.
     pub fn look(&self, scan: usize, returns: &mut Returns) {
         let sensor = &self.laboratory.sensor;
-        // Neighbors go together as far as the caster takes their rays at once.
-        let together = (BUNDLE / sensor.sub_rays().max(1)).clamp(1, BEAMS_OF_A_THREAD);
+        let together = together(sensor.sub_rays());
         let observe = |parts: &mut Parts, first: usize, returns: &mut [Option<Return>]| {
             let beams = first..first + returns.len();
             let settings: Vec<_> = beams.clone().map(|beam| self.around(scan, beam)).collect();
@@ -185,5 +200,22 @@ impl Sight<'_> {
         }
         let rig_from_sensor = self.laboratory.structure.rig_from_sensor;
         rig_from_sensor.inverse() * first_from_rig * rig_from_sensor
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn beams_that_go_together_fill_bundles() {
+        for sub_rays in 1..=200 {
+            let beams = together(sub_rays);
+            assert!((1..=BEAMS_OF_A_THREAD).contains(&beams), "{beams} of {sub_rays}");
+            let rays = beams * sub_rays;
+            assert!(beams == 1 || rays <= BUNDLES * BUNDLE, "{rays} rays");
+        }
+        // Eight of 16 fill one; six of 19 would leave 14 rays of room in one, twenty leave 4 in three.
+        assert_eq!((together(16), together(19)), (8, 20));
     }
 }
