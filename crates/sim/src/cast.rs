@@ -99,7 +99,7 @@ pub struct Contact {
     triangle: u32,
     /// Distance from the ray's origin, in metres.
     pub distance: f64,
-    /// Product of the ray's direction with the normal of the surface's front.
+    /// Product of the ray's direction with the normal of the surface's front, as of a [`Hit`].
     pub closing: f64,
 }
 
@@ -357,6 +357,11 @@ impl Hit {
 }
 
 impl Contact {
+    /// Whether the front was met.
+    pub fn front(&self) -> bool {
+        self.closing < 0.0
+    }
+
     /// Cosine of the incidence, from 0 to 1.
     pub fn cos_incidence(&self) -> f64 {
         self.closing.abs()

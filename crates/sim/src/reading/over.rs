@@ -115,7 +115,7 @@ impl Sensor {
             let from = run.sub_rays.start + done;
             let sub_rays = from..from + count;
             done += count;
-            let front = first.is_some_and(|contact| contact.closing < 0.0);
+            let front = first.is_some_and(|contact| contact.front());
             if mirror.is_some_and(|mirror| setting.reflecting(mirror, front).is_some()) {
                 // Its light may come back to the structure.
                 let sub_ray = &self.sub_rays[sub_rays.start];
