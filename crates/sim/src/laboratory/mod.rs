@@ -48,7 +48,8 @@ pub struct Laboratory {
     seed: u64,
     sensor: Sensor,
     structure: Structure,
-    stage: Stage,
+    /// What stands in the room, as the sensor sees it from where the rig stands; nothing if it never does.
+    stage: Option<Stage>,
     planned: Vec<Planned>,
     /// Where each planned board really stands, in the room frame.
     boards: Vec<Option<Pose>>,
@@ -97,7 +98,10 @@ impl Laboratory {
         let room_from_sensor = placement::room_from_rig(&scene.room) * structure.rig_from_sensor;
         let laboratory = Self {
             seed,
-            stage: Stage::new(scene, &room_from_sensor.inverse())?,
+            stage: match planned.iter().all(|p| p.flight.is_some()) {
+                true => None,
+                false => Some(Stage::new(scene, &room_from_sensor.inverse())?),
+            },
             structure,
             believed: knowledge::believed_bias(scene, seed, sensor.bias()),
             scene: scene.clone(),

@@ -96,7 +96,13 @@ impl Laboratory {
         room_from_board: Option<&Pose>,
     ) -> Result<Setting<'_>, SimError> {
         let targets = self.targets(number, room_from_board)?;
-        Setting::in_room(&self.scene, &self.structure, mirrors, Some(&self.stage), targets)
+        Setting::in_room(
+            &self.scene,
+            &self.structure,
+            mirrors,
+            self.stage.as_ref(),
+            targets,
+        )
     }
 
     /// The structure's part in what the sensor sees, with or without its mirrors; compiled when it is first asked for.
