@@ -317,8 +317,9 @@ impl World {
         })
     }
 
-    /// The nearest surface along each of some rays, `left` aside: where [`World::cast`] says of each of them, and faster
-    /// if they are a narrow cone from nearly one point. Of surfaces at the very same distance the first counts.
+    /// The nearest surface along each of some rays, `left` aside: what [`World::cast`] says of each of them but for the point
+    /// and the normal, which [`World::hit`] adds; faster if they are a narrow cone from nearly one point. Of surfaces at
+    /// the very same distance the first counts.
     ///
     /// # Panics
     /// If there are not as many places for what they meet.

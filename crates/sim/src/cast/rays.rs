@@ -13,7 +13,7 @@ const LANES: usize = HALF;
 /// Rays that are put in their places at a time.
 const BLOCK: usize = 64;
 
-/// Rays side by side: each coordinate of all of them in a row of its own.
+/// Rays side by side: each coordinate of all of them in a row of its own, starts in metres, directions of length 1.
 ///
 /// ```
 /// # use catoptric_sim::{cast::Rays, footprint::Ray};
