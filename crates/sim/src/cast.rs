@@ -302,19 +302,26 @@ impl World {
             }
             self.shapes[leaf].distance(ray)
         })?;
-        let (triangle, normal) = match &self.shapes[surface as usize] {
-            Shape::Mesh(mesh) => {
-                let triangle = mesh.nearest(ray)?.triangle;
-                (triangle, mesh.normal(triangle, ray))
-            }
-            other => (NONE, other.cast(ray)?.1),
+        let triangle = match &self.shapes[surface as usize] {
+            Shape::Mesh(mesh) => mesh.nearest(ray)?.triangle,
+            _ => NONE,
         };
         Some(Contact {
             surface,
             triangle,
             distance,
-            closing: normal.dot(&ray.direction),
+            closing: self.normal(surface, triangle, ray).dot(&ray.direction),
         })
+    }
+
+    /// Normal of a surface where a ray meets it, if it is a mesh on a triangle.
+    fn normal(&self, surface: u32, triangle: u32, ray: &Ray) -> Unit<Vector3<f64>> {
+        match &self.shapes[surface as usize] {
+            Shape::Polygon(polygon) => polygon.normal,
+            Shape::Mesh(mesh) => mesh.normal(triangle, ray),
+            // It is met.
+            other => other.cast(ray).map_or(-ray.direction, |(_, normal)| normal),
+        }
     }
 
     /// The nearest surface along each of some rays, `left` aside: what [`World::cast`] says of each of them but for the point
@@ -329,17 +336,11 @@ impl World {
 
     /// All there is to know of where a ray meets a surface.
     pub fn hit(&self, contact: &Contact, ray: &Ray) -> Hit {
-        let normal = match &self.shapes[contact.surface as usize] {
-            Shape::Polygon(polygon) => polygon.normal,
-            Shape::Mesh(mesh) => mesh.normal(contact.triangle, ray),
-            // It is met.
-            other => other.cast(ray).map_or(-ray.direction, |(_, normal)| normal),
-        };
         Hit {
             surface: contact.surface as usize,
             distance: contact.distance,
             point: ray.origin + ray.direction.into_inner() * contact.distance,
-            normal,
+            normal: self.normal(contact.surface, contact.triangle, ray),
             closing: contact.closing,
         }
     }

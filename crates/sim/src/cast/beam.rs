@@ -220,7 +220,7 @@ fn facts<S: Simd, const R: usize>(
             put(At::CROSSES + 3 * i + k, *coordinate);
         }
     }
-    if bundle.apart {
+    if bundle.apart() {
         for (i, vector) in [bc, ca, ab].iter().enumerate() {
             for (k, coordinate) in vector.iter().enumerate() {
                 put(At::EDGES + 3 * i + k, *coordinate);
@@ -278,7 +278,7 @@ fn triangle<S: Simd, const R: usize>(
             #[inline(always)]
             |i: usize| {
                 let about = product(&direction, At::CROSSES + 3 * i);
-                if bundle.apart {
+                if bundle.apart() {
                     more(&load(&bundle.moment), At::EDGES + 3 * i, about)
                 } else {
                     about
@@ -296,7 +296,7 @@ fn triangle<S: Simd, const R: usize>(
         let inside = least.simd_gt(error) | most.simd_lt(-error);
         let closing = product(&direction, At::NORMAL);
         let mut height = fact(At::HEIGHT);
-        if bundle.apart {
+        if bundle.apart() {
             height -= product(&load(&bundle.offset), At::NORMAL);
         }
         let inverse = f32x16::splat(simd, 1.0) / closing;

@@ -16,9 +16,7 @@ pub(super) struct Bundle<'a, const R: usize> {
     pub(super) rays: InRows<'a, R>,
     pub(super) start: Start,
     pub(super) direction: Vectors<f32, R>,
-    /// Whether they do not all start at one point.
-    pub(super) apart: bool,
-    /// Then, starts relative to the reference.
+    /// If they do not all start at one point, starts relative to the reference.
     pub(super) offset: Vectors<f32, R>,
     /// And direction × offset.
     pub(super) moment: Vectors<f32, R>,
@@ -31,11 +29,16 @@ impl<'a, const R: usize> Bundle<'a, R> {
             rays: InRows::of(rays, which),
             start: Start::default(),
             direction: [Rows::of(0.0); 3],
-            apart: false,
             offset: [Rows::of(0.0); 3],
             moment: [Rows::of(0.0); 3],
             pyramid: Pyramid::blank(),
         }
+    }
+
+    /// Whether the rays do not all start at one point.
+    #[inline(always)]
+    pub(super) fn apart(&self) -> bool {
+        self.rays.common.is_none()
     }
 
     /// Finds what there is to know of the rays among things whose coordinates reach so far; whether they are a narrow cone.
@@ -48,8 +51,7 @@ impl<'a, const R: usize> Bundle<'a, R> {
             reach: reference[0].abs().max(reference[1].abs()).max(reference[2].abs()),
             spread: 0.0,
         };
-        self.apart = self.rays.common.is_none();
-        if self.apart {
+        if self.apart() {
             self.start.spread = self.part(simd);
             if self.start.spread > TOGETHER * reach {
                 return false;

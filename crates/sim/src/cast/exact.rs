@@ -52,9 +52,8 @@ impl Judge<'_> {
 
     /// Normal of a triangle, for a ray that meets it.
     pub(super) fn normal(&self, triangle: u32, ray: &Ray) -> Unit<Vector3<f64>> {
-        let [a, b, c] = self.corners(triangle);
         // A sliver without an area has no normal; any that looks back does.
-        Unit::try_new((b - a).cross(&(c - a)), f64::MIN_POSITIVE).unwrap_or(-ray.direction)
+        Unit::try_new(self.plane(triangle).normal, f64::MIN_POSITIVE).unwrap_or(-ray.direction)
     }
 
     #[inline(always)]

@@ -171,10 +171,9 @@ impl<const R: usize> Nearest<R> {
         }
         let (triangle, closing) = match &world.shapes[surface as usize] {
             Shape::Mesh(_) => (self.triangle.get(number), self.closing.get(number)),
-            Shape::Polygon(polygon) => (NONE, polygon.normal.dot(&rays.get(number).direction)),
-            other => {
+            _ => {
                 let ray = rays.get(number);
-                (NONE, other.cast(&ray)?.1.dot(&ray.direction))
+                (NONE, world.normal(surface, NONE, &ray).dot(&ray.direction))
             }
         };
         Some(Contact {
