@@ -310,8 +310,16 @@ impl World {
             surface,
             triangle,
             distance,
-            closing: self.normal(surface, triangle, ray).dot(&ray.direction),
+            closing: self.closing(surface, triangle, ray),
         })
+    }
+
+    /// Product of the direction of a ray with the normal of a surface where it meets it, if it is a mesh on a triangle.
+    fn closing(&self, surface: u32, triangle: u32, ray: &Ray) -> f64 {
+        match &self.shapes[surface as usize] {
+            Shape::Mesh(mesh) => mesh.closing(triangle, ray),
+            _ => self.normal(surface, triangle, ray).dot(&ray.direction),
+        }
     }
 
     /// Normal of a surface where a ray meets it, if it is a mesh on a triangle.

@@ -21,7 +21,7 @@ pub(super) struct Judge<'a> {
 }
 
 /// A triangle's plane.
-#[derive(Default)]
+#[derive(Clone, Copy, Default)]
 pub(super) struct Plane {
     corner: Point3<f64>,
     /// (B − A)×(C − A).
@@ -54,6 +54,18 @@ impl Judge<'_> {
     pub(super) fn normal(&self, triangle: u32, ray: &Ray) -> Unit<Vector3<f64>> {
         // A sliver without an area has no normal; any that looks back does.
         Unit::try_new(self.plane(triangle).normal, f64::MIN_POSITIVE).unwrap_or(-ray.direction)
+    }
+
+    /// Product of a ray's direction with the normal of a triangle that it meets: the cosine of the incidence, with a sign.
+    pub(super) fn closing(&self, triangle: u32, ray: &Ray) -> f64 {
+        let plane = self.plane(triangle);
+        let inverse = plane.inverse();
+        if inverse.is_finite() {
+            plane.normal.dot(&ray.direction) * inverse
+        } else {
+            // Of a sliver without an area any normal that looks back does.
+            -1.0
+        }
     }
 
     #[inline(always)]
@@ -90,9 +102,9 @@ impl Plane {
         (closing.abs() > self.least).then(|| self.height(&ray.origin) / closing)
     }
 
-    /// The normal by its length.
-    pub(super) fn unit(&self) -> Vector3<f64> {
-        self.normal / self.normal.norm()
+    /// One over the normal's length.
+    pub(super) fn inverse(&self) -> f64 {
+        1.0 / self.normal.norm()
     }
 
     /// N·(A − O).
@@ -100,17 +112,17 @@ impl Plane {
         self.normal.dot(&(self.corner - origin))
     }
 
-    /// [`Plane::way`] of eight rays, and where it is good.
+    /// [`Plane::way`] of eight rays, the products of their directions with the normal, and where both are good.
     #[inline(always)]
     pub(super) fn ways<S: Simd>(
         &self,
         simd: S,
         height: f64x8<S>,
         direction: &[f64x8<S>; 3],
-    ) -> (f64x8<S>, mask64x8<S>) {
+    ) -> (f64x8<S>, f64x8<S>, mask64x8<S>) {
         let closing = unfused::product(simd, &self.normal, direction);
         let sure = closing.abs().simd_gt(f64x8::splat(simd, self.least));
-        (height / closing, sure)
+        (height / closing, closing, sure)
     }
 
     /// [`Plane::height`] of eight rays.

@@ -3,12 +3,11 @@
 
 use super::NONE;
 use super::exact::{Judge, Plane};
-use super::lanes::{inlined, unfused};
+use super::lanes::inlined;
 use super::pending::{Pending, Settled};
 use super::rows::{HALF, InRows, LANES, Rows, half};
 use fearless_simd::{Simd, prelude::*};
 use fearless_simd::{f64x8, mask32x16, mask64x8, u32x16};
-use nalgebra::Vector3;
 
 /// What sixteen rays in a row meet.
 pub(super) struct MetInRow<'a> {
@@ -24,6 +23,9 @@ pub(super) struct MetInRow<'a> {
 /// Where the normal counts too, fewer rays of a row with the same triangle are looked at each by itself.
 const FEW: u32 = 5;
 
+/// Triangles that are kept, each in the place that its number gives it.
+const KEPT: usize = 16;
+
 /// What is known so far.
 struct Ways<'a, const R: usize> {
     rays: &'a InRows<'a, R>,
@@ -31,14 +33,16 @@ struct Ways<'a, const R: usize> {
     distance: Rows<f64, R>,
     closing: Rows<f64, R>,
     pending: Pending,
-    last: Last,
+    kept: [Kept; KEPT],
 }
 
-/// The triangle that was looked at last.
-struct Last {
+/// A triangle that was looked at: neighboring rows have some in common.
+#[derive(Clone, Copy)]
+struct Kept {
     triangle: u32,
     plane: Plane,
-    normal: Vector3<f64>,
+    /// One over the length of the plane's normal, if it was asked for.
+    inverse: f64,
     /// Height of the plane over where all rays start, if they do.
     height: f64,
 }
@@ -52,18 +56,19 @@ pub(super) fn finish<S: Simd, const R: usize, const CLOSING: bool>(
     judge: &Judge<'_>,
     mut tell: impl FnMut(&MetInRow<'_>),
 ) {
+    let none = Kept {
+        triangle: NONE,
+        plane: Plane::default(),
+        inverse: 0.0,
+        height: 0.0,
+    };
     let mut ways = Ways {
         rays,
         judge,
         distance: Rows::of(0.0),
         closing: Rows::of(0.0),
         pending: Pending::default(),
-        last: Last {
-            triangle: NONE,
-            plane: Plane::default(),
-            normal: Vector3::zeros(),
-            height: 0.0,
-        },
+        kept: [none; KEPT],
     };
     let mut somes = [0; R];
     let rows = rays.count.div_ceil(LANES);
@@ -139,29 +144,30 @@ impl<const R: usize> Ways<'_, R> {
         lanes: u64,
         triangle: u32,
     ) {
-        let (rays, judge, last) = (self.rays, self.judge, &mut self.last);
-        if triangle != last.triangle {
-            last.triangle = triangle;
-            last.plane = judge.plane(triangle);
+        let (rays, judge) = (self.rays, self.judge);
+        let kept = &mut self.kept[triangle as usize % KEPT];
+        if triangle != kept.triangle {
+            kept.triangle = triangle;
+            kept.plane = judge.plane(triangle);
             if CLOSING {
-                last.normal = last.plane.unit();
+                kept.inverse = kept.plane.inverse();
             }
             if let Some(start) = &rays.common {
-                last.height = last.plane.height(start);
+                kept.height = kept.plane.height(start);
             }
         }
         let mut unsure = lanes;
         let (low, high) = alike.widen();
         for (second, alike) in [low, high].into_iter().enumerate() {
             let height = match &rays.common {
-                Some(_) => f64x8::splat(simd, last.height),
-                None => last.plane.heights(simd, &half(simd, &rays.origin, row, second)),
+                Some(_) => f64x8::splat(simd, kept.height),
+                None => kept.plane.heights(simd, &half(simd, &rays.origin, row, second)),
             };
             let direction = half(simd, &rays.direction, row, second);
-            let (way, steep) = last.plane.ways(simd, height, &direction);
+            let (way, closing, steep) = kept.plane.ways(simd, height, &direction);
             put(simd, alike, way, &mut self.distance.0[row], second);
             if CLOSING {
-                let closing = unfused::product(simd, &last.normal, &direction);
+                let closing = closing * f64x8::splat(simd, kept.inverse);
                 put(simd, alike, closing, &mut self.closing.0[row], second);
             }
             unsure &= !((steep & alike).to_bitmask() << (second * HALF));
@@ -172,8 +178,7 @@ impl<const R: usize> Ways<'_, R> {
             let ray = rays.get(number);
             self.distance.set(number, judge.way(&ray, triangle));
             if CLOSING {
-                let normal = judge.normal(triangle, &ray);
-                self.closing.set(number, normal.dot(&ray.direction));
+                self.closing.set(number, judge.closing(triangle, &ray));
             }
         }
     }

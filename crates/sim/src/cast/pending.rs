@@ -21,7 +21,7 @@ pub(super) struct Settled {
     pub(super) triangle: u32,
     /// What [`Judge::way`] gives, to the bit.
     pub(super) way: f64,
-    /// Product of the ray's direction with [`Judge::normal`], if it was asked for.
+    /// [`Judge::closing`], if it was asked for.
     pub(super) closing: f64,
 }
 
@@ -81,9 +81,8 @@ impl Pending {
         let (mut ways, mut closings) = ([0.0; LANES], [0.0; LANES]);
         (unfused::dot(&normal, &less(&a, &load(&origin))) / closing).store_slice(&mut ways);
         if CLOSING {
-            let norm = unfused::dot(&normal, &normal).sqrt();
-            let unit = [normal[0] / norm, normal[1] / norm, normal[2] / norm];
-            unfused::dot(&unit, &direction).store_slice(&mut closings);
+            let inverse = f64x8::splat(simd, 1.0) / unfused::dot(&normal, &normal).sqrt();
+            (closing * inverse).store_slice(&mut closings);
         }
         for (lane, &(number, triangle)) in self.found[..count].iter().enumerate() {
             let mut settled = Settled {
@@ -95,7 +94,7 @@ impl Pending {
             if sure >> lane & 1 == 0 {
                 let ray = rays(number);
                 settled.way = judge.way(&ray, triangle);
-                settled.closing = judge.normal(triangle, &ray).dot(&ray.direction);
+                settled.closing = judge.closing(triangle, &ray);
             }
             tell(settled);
         }

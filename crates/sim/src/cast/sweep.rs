@@ -173,7 +173,7 @@ impl<const R: usize> Nearest<R> {
             Shape::Mesh(_) => (self.triangle.get(number), self.closing.get(number)),
             _ => {
                 let ray = rays.get(number);
-                (NONE, world.normal(surface, NONE, &ray).dot(&ray.direction))
+                (NONE, world.closing(surface, NONE, &ray))
             }
         };
         Some(Contact {

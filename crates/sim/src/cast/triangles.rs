@@ -132,6 +132,11 @@ impl Triangles {
         self.judge().normal(triangle, ray)
     }
 
+    /// Product of the direction of a ray with the normal of a triangle that it meets.
+    pub(super) fn closing(&self, triangle: u32, ray: &Ray) -> f64 {
+        self.judge().closing(triangle, ray)
+    }
+
     /// Distance and normal of the nearest triangle along a ray.
     pub(super) fn cast(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
         let met = self.nearest(ray)?;
