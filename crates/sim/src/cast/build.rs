@@ -333,6 +333,7 @@ fn node(items: &mut [Item], part: Part, (level, leaf): (usize, usize), nodes: &m
                 (below(&mut nodes, slice, part), nodes)
             })
             .collect();
+        nodes.reserve_exact(branches.iter().map(|(_, branch)| branch.len()).sum());
         let append = |(child, branch): (Child, Vec<Node>)| {
             let base = nodes.len();
             let moved = |c: Child| {
