@@ -23,9 +23,6 @@ pub(super) struct MetInRow<'a> {
 /// Where the normal counts too, fewer rays of a row with the same triangle are looked at each by itself.
 const FEW: u32 = 5;
 
-/// Triangles that are kept, each in the place that its number gives it.
-const KEPT: usize = 16;
-
 /// What is known so far.
 struct Ways<'a, const R: usize> {
     rays: &'a InRows<'a, R>,
@@ -33,7 +30,8 @@ struct Ways<'a, const R: usize> {
     distance: Rows<f64, R>,
     closing: Rows<f64, R>,
     pending: Pending,
-    kept: [Kept; KEPT],
+    /// As many as there are rows, each in the place that its number gives it.
+    kept: [Kept; R],
 }
 
 /// A triangle that was looked at: neighboring rows have some in common.
@@ -68,7 +66,7 @@ pub(super) fn finish<S: Simd, const R: usize, const CLOSING: bool>(
         distance: Rows::of(0.0),
         closing: Rows::of(0.0),
         pending: Pending::default(),
-        kept: [none; KEPT],
+        kept: [none; R],
     };
     let mut somes = [0; R];
     let rows = rays.count.div_ceil(LANES);
@@ -145,7 +143,7 @@ impl<const R: usize> Ways<'_, R> {
         triangle: u32,
     ) {
         let (rays, judge) = (self.rays, self.judge);
-        let kept = &mut self.kept[triangle as usize % KEPT];
+        let kept = &mut self.kept[triangle as usize % R];
         if triangle != kept.triangle {
             kept.triangle = triangle;
             kept.plane = judge.plane(triangle);
