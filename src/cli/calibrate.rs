@@ -6,7 +6,7 @@ use super::files::read_characterization;
 use super::interrupt;
 use super::output::{counted, print, quoted};
 use catoptric::calib::{self, JacobianForm, Method, Options};
-use catoptric::io;
+use catoptric::files;
 use catoptric::model::{Calibration, Status};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -75,7 +75,7 @@ enum JacobianName {
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let mut dataset = io::read_dataset(&arguments.dataset)?;
+    let mut dataset = files::read_dataset(&arguments.dataset)?;
     interrupt::check()?;
     if let Some(path) = &arguments.characterization {
         let found = read_characterization(path)?;
@@ -106,7 +106,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     for warning in &calibration.warnings {
         context.say(&format!("warning: {warning}"));
     }
-    io::write_json(&arguments.out, &calibration)?;
+    files::write_json(&arguments.out, &calibration)?;
     print(&format!(
         "wrote {}: {}\n{}next: catoptric score {} {}\n",
         arguments.out.display(),

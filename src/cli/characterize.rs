@@ -6,7 +6,7 @@ use super::files::read_truth;
 use super::interrupt;
 use super::output::{print, quoted};
 use super::progress::Progress;
-use catoptric::io::{self, scene};
+use catoptric::files::{self, scene};
 use catoptric::model::{Characterization, Dataset, PoseRecord, RangeBias};
 use catoptric::sim::Laboratory;
 use catoptric::{calib, report, tables};
@@ -45,7 +45,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         }
         let truth = read_truth(&arguments.input)?;
         (
-            io::read_dataset(&arguments.input)?,
+            files::read_dataset(&arguments.input)?,
             truth.and_then(|t| injected(t.bias)),
         )
     } else {
@@ -57,8 +57,8 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         help: Some("record boards before the bare sensor: [[experiment.test]] in a scene".to_owned()),
     })?;
     interrupt::check()?;
-    io::write_json(&arguments.out, &found)?;
-    io::write_file(
+    files::write_json(&arguments.out, &found)?;
+    files::write_file(
         &page,
         report::characterization(&found, injected.as_ref()).as_bytes(),
     )?;

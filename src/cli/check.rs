@@ -3,7 +3,7 @@
 use super::Context;
 use super::error::CliError;
 use super::output::{counted, print, quoted};
-use catoptric::io::scene;
+use catoptric::files::scene;
 use catoptric::model::beam;
 use catoptric::sim::check::{Outline, outline};
 use catoptric::sim::trace::Scenery;

@@ -5,7 +5,7 @@ use super::files::{read_calibration, read_truth};
 use super::output::{counted, print};
 use super::score::figure;
 use catoptric::compare::{CONTRADICTION, Comparison, Contestant, Row, compare};
-use catoptric::io;
+use catoptric::files;
 use catoptric::score::Honesty;
 use clap::Args;
 use std::path::PathBuf;
@@ -25,7 +25,7 @@ pub(crate) struct Arguments {
 
 /// Ends well whatever the verdicts are: `score` is what judges one of them.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
-    let dataset = io::read_dataset(&arguments.dataset)?;
+    let dataset = files::read_dataset(&arguments.dataset)?;
     let truth = read_truth(&arguments.dataset)?;
     let contestants: Vec<Contestant> = arguments
         .calibrations

@@ -8,12 +8,12 @@ use super::interrupt;
 use super::output::{counted, grouped, print, quoted};
 use super::score::figure;
 use super::simulate::{self, Recording};
-use catoptric::apply::{CloudFrame, apply};
 use catoptric::calib::{self, Method, Options};
-use catoptric::io::cloud::{CloudFormat, cloud_bytes};
-use catoptric::io::scene::{self, Layout};
-use catoptric::io::{self, IoError};
+use catoptric::files::cloud::{CloudFormat, cloud_bytes};
+use catoptric::files::scene::{self, Layout};
+use catoptric::files::{self, IoError};
 use catoptric::score::{Verdict, score};
+use catoptric::{CloudFrame, apply};
 use clap::Args;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -35,7 +35,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let begin = Instant::now();
     let folder = &arguments.out;
-    if folder.join(io::dataset::SESSION).exists() {
+    if folder.join(files::dataset::SESSION).exists() {
         return Err(CliError::Invalid {
             message: format!(
                 "{} is itself a dataset; the demo writes one into a folder of its own",
@@ -63,7 +63,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     )?;
 
     context.say("reading the dataset back");
-    let dataset = io::read_dataset(&dataset_folder)?;
+    let dataset = files::read_dataset(&dataset_folder)?;
     let truth = read_truth(&dataset_folder)?;
     let mut results = Vec::new();
     let mut lines = Vec::new();
@@ -72,9 +72,9 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         let name = method.name();
         context.say(&format!("calibrating: {name}"));
         let calibration = calib::calibrate(&dataset, method, &Options::default())?;
-        io::write_json(folder.join(format!("calibration-{name}.json")), &calibration)?;
+        files::write_json(folder.join(format!("calibration-{name}.json")), &calibration)?;
         let result = score(&dataset, &calibration, truth.as_ref());
-        io::write_json(folder.join(format!("score-{name}.json")), &result)?;
+        files::write_json(folder.join(format!("score-{name}.json")), &result)?;
         lines.push(format!(
             "{name:8}  {}; per-axis error {} rms",
             summary(&calibration),
@@ -90,10 +90,10 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         help: None,
     })?;
     let bytes = cloud_bytes(CloudFormat::Ply, &cloud).map_err(|e| IoError::write(&cloud_path, e))?;
-    io::write_file(&cloud_path, &bytes)?;
+    files::write_file(&cloud_path, &bytes)?;
     let report_path = folder.join("report.html");
     let html = catoptric::report::report(&dataset, truth.as_ref(), &results, Some(&cloud));
-    io::write_file(&report_path, html.as_bytes())?;
+    files::write_file(&report_path, html.as_bytes())?;
 
     let score = &results[0].1;
     let verdict = score.verdict.word();

@@ -1,12 +1,11 @@
 //! How a verb can end other than well, and what the shell is told.
 
 use catoptric::calib::CalibError;
-use catoptric::io::IoError;
-use catoptric::io::scene::SceneErrors;
+use catoptric::files::IoError;
+use catoptric::files::scene::SceneErrors;
 use catoptric::sim::SimError;
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Why a verb did not succeed.
 #[derive(Debug, thiserror::Error)]
@@ -68,7 +67,7 @@ impl CliError {
     }
 
     /// Tells the person on stderr and the shell by the exit code.
-    pub(crate) fn report(&self) -> ExitCode {
+    pub(crate) fn report(&self) -> u8 {
         let mut stderr = anstream::stderr();
         // With stderr closed there is nobody left to tell.
         let _ = match self {
@@ -90,6 +89,6 @@ impl CliError {
             Self::Verdict(_) | Self::Interrupted => writeln!(stderr, "{self}"),
             other => writeln!(stderr, "error: {other}"),
         };
-        ExitCode::from(self.exit_code())
+        self.exit_code()
     }
 }

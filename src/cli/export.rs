@@ -4,7 +4,7 @@ use super::Context;
 use super::error::CliError;
 use super::output::{counted, print, quoted};
 use catoptric::export::{self, Part};
-use catoptric::io::{self, scene};
+use catoptric::files::{self, scene};
 use catoptric::layout::Drawing;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -118,7 +118,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
             format!("the laser and {}", counted(drawing.facets.len(), "mirror")),
         ),
     };
-    io::write_file(&arguments.out, &bytes)?;
+    files::write_file(&arguments.out, &bytes)?;
     print(&format!("wrote {}: {what}\n", quoted(&arguments.out)))
 }
 
@@ -145,7 +145,7 @@ fn boards(arguments: &Arguments) -> Result<(), CliError> {
             help: Some("a dataset is exported as it was recorded".to_owned()),
         });
     }
-    let dataset = io::read_dataset(&arguments.input)?;
+    let dataset = files::read_dataset(&arguments.input)?;
     let boards = dataset.poses.iter().filter(|p| export::has_rows(p)).count();
     if boards == 0 {
         return Err(CliError::Invalid {
@@ -154,7 +154,7 @@ fn boards(arguments: &Arguments) -> Result<(), CliError> {
         });
     }
     let table = export::board_table(&dataset).map_err(|e| CliError::Output(std::io::Error::other(e)))?;
-    io::write_file(&arguments.out, &table)?;
+    files::write_file(&arguments.out, &table)?;
     print(&format!(
         "wrote {}: {}\n",
         quoted(&arguments.out),

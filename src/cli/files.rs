@@ -1,7 +1,7 @@
 //! Files that several verbs read.
 
 use super::error::CliError;
-use catoptric::io::{self, IoError, dataset};
+use catoptric::files::{self, IoError, dataset};
 use catoptric::model::{Calibration, Characterization, calibration, characterization};
 use catoptric::sim::{Truth, truth};
 use std::path::Path;
@@ -12,21 +12,21 @@ pub(crate) fn read_truth(folder: &Path) -> Result<Option<Truth>, CliError> {
     if !path.exists() {
         return Ok(None);
     }
-    let found: Truth = io::read_json(&path)?;
+    let found: Truth = files::read_json(&path)?;
     require_version(&path, found.schema_version, truth::SCHEMA_VERSION)?;
     Ok(Some(found))
 }
 
 /// A calibration, ours or anybody's.
 pub(crate) fn read_calibration(path: &Path) -> Result<Calibration, CliError> {
-    let found: Calibration = io::read_json(path)?;
+    let found: Calibration = files::read_json(path)?;
     require_version(path, found.schema_version, calibration::SCHEMA_VERSION)?;
     Ok(found)
 }
 
 /// A characterization of the bare sensor.
 pub(crate) fn read_characterization(path: &Path) -> Result<Characterization, CliError> {
-    let found: Characterization = io::read_json(path)?;
+    let found: Characterization = files::read_json(path)?;
     require_version(path, found.schema_version, characterization::SCHEMA_VERSION)?;
     Ok(found)
 }

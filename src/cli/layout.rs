@@ -4,7 +4,7 @@ use super::Context;
 use super::error::CliError;
 use super::interrupt;
 use super::output::{print, quoted};
-use catoptric::io::{self, IoError, scene};
+use catoptric::files::{self, IoError, scene};
 use catoptric::layout::{self, Analysis, Class, Detail, FacetView, Requirement, RequirementError};
 use catoptric::report::{self, Drawn};
 use clap::Args;
@@ -155,10 +155,10 @@ fn write(out: &Path, json: &str, drawn: &[Drawn]) -> Result<(), CliError> {
     std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
     for (name, bytes) in report::layout_pictures(drawn) {
         interrupt::check()?;
-        io::write_file(out.join(name), &bytes)?;
+        files::write_file(out.join(name), &bytes)?;
     }
-    io::write_file(out.join(PAGE), report::layout(drawn).as_bytes())?;
-    io::write_file(out.join(JSON), json.as_bytes())?;
+    files::write_file(out.join(PAGE), report::layout(drawn).as_bytes())?;
+    files::write_file(out.join(JSON), json.as_bytes())?;
     Ok(())
 }
 

@@ -32,8 +32,8 @@ mod validate;
 
 use clap::{ArgAction, Args, Parser, Subcommand};
 use error::CliError;
+use std::ffi::OsString;
 use std::io::Write;
-use std::process::ExitCode;
 
 /// Said at the end of every help.
 const EXIT_CODES: &str = "Exit codes: 0 ok · 1 the verdict is \"not good enough\" · 2 usage or invalid input · \
@@ -132,23 +132,26 @@ impl Context {
     }
 }
 
-/// Runs the program.
-pub(crate) fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+/// Runs the program on its arguments, the first of which is its own name, and returns the code that it exits with.
+///
+/// Results go to standard output, all else to standard error. Ctrl-C is listened to from the first call on; the number
+/// of threads can be chosen by the first call only.
+pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>) -> u8 {
+    let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => {
             // Help on a closed pipe has nobody to read it; there is nothing to add.
             let _ = error.print();
-            return u8::try_from(error.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from);
+            return u8::try_from(error.exit_code()).unwrap_or(1);
         }
     };
-    match run(cli) {
-        Ok(()) => ExitCode::SUCCESS,
+    match dispatch(cli) {
+        Ok(()) => 0,
         Err(error) => error.report(),
     }
 }
 
-fn run(cli: Cli) -> Result<(), CliError> {
+fn dispatch(cli: Cli) -> Result<(), CliError> {
     interrupt::install();
     let context = Context { global: cli.global };
     if let Some(threads) = context.global.threads {

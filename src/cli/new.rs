@@ -2,7 +2,7 @@
 
 use super::error::CliError;
 use super::output::{print, quoted};
-use catoptric::io::scene::{self, Layout};
+use catoptric::files::scene::{self, Layout};
 use clap::{Args, ValueEnum};
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};

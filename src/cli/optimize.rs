@@ -5,8 +5,8 @@ use super::error::CliError;
 use super::interrupt;
 use super::output::{counted, grouped, print, quoted};
 use super::progress::Progress;
-use catoptric::io::template::Template;
-use catoptric::io::{self, IoError, scene};
+use catoptric::files::template::Template;
+use catoptric::files::{self, IoError, scene};
 use catoptric::layout::{Detail, Requirement, RequirementError};
 use catoptric::optimize::{
     Better, Candidate, Goal, GoalError, OptimizeError, Optimum, Options, Wanted, optimize,
@@ -184,12 +184,12 @@ fn write(out: &Path, json: &str, template: &Template, found: &Optimum) -> Result
             candidate,
         )?;
     }
-    io::write_file(out.join(TABLE), table(found)?.as_slice())?;
+    files::write_file(out.join(TABLE), table(found)?.as_slice())?;
     if let Some(picture) = report::front_picture(found) {
-        io::write_file(out.join(PICTURE), picture.as_bytes())?;
+        files::write_file(out.join(PICTURE), picture.as_bytes())?;
     }
-    io::write_file(out.join(PAGE), report::optimum(found).as_bytes())?;
-    io::write_file(out.join(JSON), json.as_bytes())?;
+    files::write_file(out.join(PAGE), report::optimum(found).as_bytes())?;
+    files::write_file(out.join(JSON), json.as_bytes())?;
     Ok(())
 }
 
@@ -205,7 +205,7 @@ fn write_scene(path: &Path, template: &Template, candidate: &Candidate) -> Resul
         if let Some(parent) = mesh.parent() {
             std::fs::create_dir_all(parent).map_err(|e| IoError::write(parent, e))?;
         }
-        io::write_file(mesh, &bytes)?;
+        files::write_file(mesh, &bytes)?;
     }
     let text = template
         .text_with(&choice, &kept)
@@ -220,7 +220,7 @@ fn write_scene(path: &Path, template: &Template, candidate: &Candidate) -> Resul
         template.name(),
         goals.join(", ")
     );
-    io::write_file(path, text.as_bytes())?;
+    files::write_file(path, text.as_bytes())?;
     Ok(())
 }
 

@@ -6,7 +6,7 @@ use super::interrupt;
 use super::output::{counted, print, quoted};
 use super::progress::Progress;
 use catoptric::calib::plan::{self, FacetPlan, Open, Plan, PlannedPose, Request, Situation, Standing};
-use catoptric::io::{self, dataset, scene};
+use catoptric::files::{self, dataset, scene};
 use catoptric::model::Dataset;
 use catoptric::plan::{PlanError, completed, situation, with_poses};
 use catoptric::report;
@@ -126,7 +126,7 @@ fn start(arguments: &Arguments) -> Result<(Start, Situation, usize), CliError> {
             help: None,
         });
     }
-    let dataset = io::read_dataset(&arguments.input)?;
+    let dataset = files::read_dataset(&arguments.input)?;
     let situation = Situation::recorded(&dataset)?;
     // What is recorded next is taken to be recorded as long as what there is: the median, for one odd stretch.
     let mut scans: Vec<usize> = dataset
@@ -208,7 +208,7 @@ fn write(
 ) -> Result<String, CliError> {
     let mut said = String::new();
     if let Some(path) = &arguments.report {
-        io::write_file(path, report::plan(situation, plan).as_bytes())?;
+        files::write_file(path, report::plan(situation, plan).as_bytes())?;
         said += &format!("wrote {}\n", path.display());
     }
     let Some(out) = &arguments.out else {
@@ -246,7 +246,7 @@ fn write(
         message: format!("{}: {e}", out.display()),
         help: None,
     })?;
-    io::write_file(out, text.as_bytes())?;
+    files::write_file(out, text.as_bytes())?;
     let stem = out.file_stem().unwrap_or(out.as_os_str()).to_string_lossy();
     Ok(said
         + &format!(

@@ -5,9 +5,9 @@ use super::error::CliError;
 use super::files::{read_calibration, read_truth};
 use super::interrupt;
 use super::output::print;
-use catoptric::apply::{CloudFrame, apply};
-use catoptric::io;
+use catoptric::files;
 use catoptric::score::score;
+use catoptric::{CloudFrame, apply};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -25,7 +25,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let dataset = io::read_dataset(&arguments.dataset)?;
+    let dataset = files::read_dataset(&arguments.dataset)?;
     let truth = read_truth(&arguments.dataset)?;
     let mut results = Vec::new();
     for path in &arguments.calibrations {
@@ -46,7 +46,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         None => None,
     };
     let html = catoptric::report::report(&dataset, truth.as_ref(), &results, cloud.as_ref());
-    io::write_file(&arguments.out, html.as_bytes())?;
+    files::write_file(&arguments.out, html.as_bytes())?;
     print(&format!(
         "wrote {path}\nnext: open {path} in a browser\n",
         path = arguments.out.display()

@@ -8,8 +8,8 @@ use super::progress::Progress;
 use super::stream::{Made, Stream, Table};
 use super::sub_rays;
 use super::truth_tables::{READINGS_HEADER, RETURNS_HEADER};
-use catoptric::io::folder::StagedFile;
-use catoptric::io::{self, DatasetWriter, IoError, Provenance, dataset, scene};
+use catoptric::files::folder::StagedFile;
+use catoptric::files::{self, DatasetWriter, IoError, Provenance, dataset, scene};
 use catoptric::model::beam;
 use catoptric::sim::{Laboratory, Scene, noise};
 use clap::Args;
@@ -248,7 +248,7 @@ pub(crate) fn record(recording: &Recording<'_>, context: &Context) -> Result<Fig
     let names = manifest.files.keys().map(String::as_str);
     for name in names.chain([dataset::MANIFEST]) {
         let path = recording.out.join(name);
-        let file = std::fs::metadata(&path).map_err(|e| io::IoError::read(&path, e))?;
+        let file = std::fs::metadata(&path).map_err(|e| files::IoError::read(&path, e))?;
         figures.bytes += file.len();
     }
     context.detail(&format!(

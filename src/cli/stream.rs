@@ -5,7 +5,7 @@
 
 use super::error::CliError;
 use super::truth_tables::{ReturnRows, rows_of_readings};
-use catoptric::io::recording::{Encoded, RecordingEncoder};
+use catoptric::files::recording::{Encoded, RecordingEncoder};
 use catoptric::model::Pose;
 use catoptric::sim::laboratory::{Drawn, Memory, Returns, Sight};
 use catoptric::sim::reading::Return;

@@ -6,7 +6,7 @@ use super::interrupt;
 use super::layout::{refused, requirements};
 use super::output::{print, quoted};
 use super::progress::Progress;
-use catoptric::io::{self, IoError, scene};
+use catoptric::files::{self, IoError, scene};
 use catoptric::layout::Requirement;
 use catoptric::sim::SimError;
 use catoptric::tolerance::{self, Bounds, Calibrated, Distribution, Tolerance, Workshop};
@@ -137,9 +137,9 @@ const PAGE: &str = "report.html";
 
 fn write(out: &Path, json: &str, found: &Tolerance) -> Result<(), CliError> {
     std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
-    io::write_file(out.join(PLOT), report::tolerance_plot(found).as_bytes())?;
-    io::write_file(out.join(PAGE), report::tolerance(found).as_bytes())?;
-    io::write_file(out.join(JSON), json.as_bytes())?;
+    files::write_file(out.join(PLOT), report::tolerance_plot(found).as_bytes())?;
+    files::write_file(out.join(PAGE), report::tolerance(found).as_bytes())?;
+    files::write_file(out.join(JSON), json.as_bytes())?;
     Ok(())
 }
 

@@ -3,7 +3,7 @@
 use super::calibrate::summary;
 use super::error::CliError;
 use super::output::{counted, print, quoted};
-use catoptric::io;
+use catoptric::files;
 use catoptric::model::Calibration;
 use catoptric::validate::{Severity, validate};
 use clap::Args;
@@ -18,7 +18,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
     let path = &arguments.calibration;
-    let calibration: Calibration = io::read_json(path)?;
+    let calibration: Calibration = files::read_json(path)?;
     let problems = validate(&calibration);
     let errors = problems.iter().filter(|p| p.severity == Severity::Error).count();
     if errors > 0 {

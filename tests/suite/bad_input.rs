@@ -3,8 +3,8 @@
 //! Positions are computed here from the spoiled text by searching it, not by the code under test.
 
 use crate::common::{VALID, folder_with, run, stderr};
-use catoptric::io::diagnostic::{Diagnostics, Place};
-use catoptric::io::scene::{self, SceneErrors};
+use catoptric::files::diagnostic::{Diagnostics, Place};
+use catoptric::files::scene::{self, SceneErrors};
 
 /// Everything that is wrong with a scene.
 pub(crate) fn problems_with(text: &str, sets: &[&str]) -> Diagnostics {

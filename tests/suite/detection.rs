@@ -8,7 +8,7 @@
 
 use crate::common::{folder_with, run, stderr};
 use crate::scenes::{BARE, scene};
-use catoptric::io::scene as scene_file;
+use catoptric::files::scene as scene_file;
 use catoptric::model::{Stretch, beam};
 use catoptric::sim::cast::{Polygon, Shape};
 use catoptric::sim::optics::{self, Mirrors, Role, Setting};

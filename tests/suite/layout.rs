@@ -5,7 +5,7 @@
 //! `physics` does.
 
 use crate::common::{VALID, folder_with, run, stderr, stdout};
-use catoptric::io::scene as scenes;
+use catoptric::files::scene as scenes;
 use catoptric::layout::{self, Analysis, Class, Detail};
 use catoptric::model::beam;
 use catoptric::sim::cast::{Polygon, Shape};

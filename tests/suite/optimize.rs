@@ -5,7 +5,7 @@
 
 use crate::common::{folder_with, run, stderr, stdout};
 use crate::parametric::PARAMETRIC;
-use catoptric::io::{scene, template::Template};
+use catoptric::files::{scene, template::Template};
 use catoptric::layout::{self, Detail, Requirement};
 use catoptric::optimize::{Goal, Optimum, Options, Wanted, optimize};
 use serde_json::Value;

@@ -4,7 +4,7 @@
 
 use crate::common::{catoptric, run, stderr, stdout};
 use crate::traps::{file, forward, path, ray, trap, way};
-use catoptric::io::{mesh, npy, scene};
+use catoptric::files::{mesh, npy, scene};
 use catoptric::model::beam;
 use catoptric::sim::footprint::Ray;
 use catoptric::sim::noise::{Draws, Purpose};

@@ -4,7 +4,7 @@
 //! the physics to prove.
 
 use crate::common::{run, stderr};
-use catoptric::io::scene;
+use catoptric::files::scene;
 use catoptric::model::beam;
 use catoptric::sim::footprint::{Ray, SubRay, sub_rays};
 use catoptric::sim::optics::Role;

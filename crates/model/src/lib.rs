@@ -51,6 +51,7 @@ pub use bias::{AngleBias, AngleTable, BiasTerms, ColorBias, DistanceBias, RangeB
 pub use board::{BoardPlane, Rectangle};
 pub use calibration::{BeamEstimate, Calibration, Status};
 pub use characterization::Characterization;
+pub use cloud::{CloudFrame, CloudPoint, PointCloud};
 pub use dataset::{
     Dataset, Excerpt, PoseKind, PoseLabel, PoseRecord, SpotNote, Stretch, TestKind, TestNote, Track,
     TrackedFrame,

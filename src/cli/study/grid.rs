@@ -3,7 +3,7 @@
 use super::{StudyArguments, invalid};
 use crate::cli::error::CliError;
 use catoptric::calib::{CalibError, Method};
-use catoptric::io::scene;
+use catoptric::files::scene;
 use catoptric::study::{Cell, Contestant, Program};
 use std::path::Path;
 

@@ -2,7 +2,7 @@
 
 use super::invalid;
 use crate::cli::error::CliError;
-use catoptric::io::{self, scene};
+use catoptric::files::{self, scene};
 use catoptric::study::{Cell, Contestant, Program, SCHEMA_VERSION, Study};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -43,7 +43,7 @@ impl Plan {
             let text = scene::to_toml(&cell.scene).map_err(|e| CliError::Output(std::io::Error::other(e)))?;
             Ok(PlannedCell {
                 values: cell.values.clone(),
-                scene_sha256: io::file::sha256(text.as_bytes()),
+                scene_sha256: files::file::sha256(text.as_bytes()),
             })
         });
         let program = |contestant: &Contestant| match contestant {
@@ -67,7 +67,7 @@ impl Plan {
 
     /// The plan of a folder.
     pub(super) fn read(folder: &Path) -> Result<Self, CliError> {
-        Ok(io::read_json(folder.join(FILE))?)
+        Ok(files::read_json(folder.join(FILE))?)
     }
 
     /// Takes a folder that is new, or of the very same study.
@@ -93,7 +93,7 @@ impl Plan {
             path: out.to_owned(),
             source,
         })?;
-        Ok(io::write_json(out.join(FILE), self)?)
+        Ok(files::write_json(out.join(FILE), self)?)
     }
 
     /// What of another plan is not as here, in words.

@@ -8,7 +8,7 @@ use catoptric::study::{
     ElementAngles, Job, Run, Study, Summary, elements_from_csv, elements_to_csv, from_csv, in_order, merge,
     spread, spread_to_csv, summarize, to_csv,
 };
-use catoptric::{io, report};
+use catoptric::{files, report};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -89,11 +89,11 @@ impl Tables {
 
     /// Writes them, the runs last: with them all is there.
     pub(super) fn write(&self, found: &Found) -> Result<(), CliError> {
-        io::write_file(&self.times, times_to_csv(&found.times)?.as_bytes())?;
+        files::write_file(&self.times, times_to_csv(&found.times)?.as_bytes())?;
         if let Some(elements) = &found.elements {
-            io::write_file(&self.elements, elements_to_csv(elements).as_bytes())?;
+            files::write_file(&self.elements, elements_to_csv(elements).as_bytes())?;
         }
-        Ok(io::write_file(&self.runs, to_csv(&found.runs).as_bytes())?)
+        Ok(files::write_file(&self.runs, to_csv(&found.runs).as_bytes())?)
     }
 
     /// Reads them, the runs being those of some experiments: no fewer, no more.
@@ -132,7 +132,7 @@ impl Tables {
 }
 
 fn parsed<T>(path: &Path, parse: impl FnOnce(&str) -> Result<T, String>) -> Result<T, CliError> {
-    let text = std::fs::read_to_string(path).map_err(|source| io::IoError::Read {
+    let text = std::fs::read_to_string(path).map_err(|source| files::IoError::Read {
         path: path.to_owned(),
         source,
     })?;
@@ -178,12 +178,12 @@ pub(super) fn write(study: &Study, found: &Found, plan: &Plan, out: &Path) -> Re
     let elements = found.elements.as_deref().unwrap_or_default();
     let spreads = spread(elements);
     if found.elements.is_some() {
-        io::write_file(out.join(SPREAD), spread_to_csv(&spreads).as_bytes())?;
+        files::write_file(out.join(SPREAD), spread_to_csv(&spreads).as_bytes())?;
     }
     Tables::of(out).write(found)?;
     let page = report::study(&plan.name, study, &summary, elements);
-    io::write_file(out.join(PAGE), page.as_bytes())?;
-    io::write_json(out.join(RESULT), &summary)?;
+    files::write_file(out.join(PAGE), page.as_bytes())?;
+    files::write_json(out.join(RESULT), &summary)?;
     let mut sums: BTreeMap<(usize, &str), (f64, f64)> = BTreeMap::new();
     for time in &found.times {
         let (sum, count) = sums.entry((time.cell, &time.method)).or_default();
