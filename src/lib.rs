@@ -38,9 +38,10 @@ pub mod testing;
 pub mod tolerance;
 pub mod validate;
 
-pub use apply::{CloudFrame, PointCloud, apply};
+pub use apply::apply;
 pub use catoptric_calib as calib;
 pub use catoptric_model as model;
+pub use catoptric_model::{CloudFrame, PointCloud};
 pub use catoptric_sim as sim;
 pub use compare::{Comparison, Contestant, compare};
 pub use report::report;

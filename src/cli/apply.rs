@@ -4,10 +4,10 @@ use super::Context;
 use super::error::CliError;
 use super::files::read_calibration;
 use super::output::{counted, print};
-use catoptric::apply::{CloudFrame, apply};
 use catoptric::io;
 use catoptric::io::IoError;
 use catoptric::io::cloud::{CloudFormat, cloud_bytes};
+use catoptric::{CloudFrame, apply};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 

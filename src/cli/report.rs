@@ -5,9 +5,9 @@ use super::error::CliError;
 use super::files::{read_calibration, read_truth};
 use super::interrupt;
 use super::output::print;
-use catoptric::apply::{CloudFrame, apply};
 use catoptric::io;
 use catoptric::score::score;
+use catoptric::{CloudFrame, apply};
 use clap::Args;
 use std::path::PathBuf;
 

@@ -3,7 +3,7 @@
 //! Both hold x, y, z in metres as 32-bit floats, the beam as an unsigned 16-bit and the scan as an unsigned 32-bit
 //! integer. The frame stands in a comment of the header.
 
-use crate::apply::{CloudFrame, CloudPoint, PointCloud};
+use catoptric_model::cloud::{CloudFrame, CloudPoint, PointCloud};
 use nalgebra::Point3;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};

@@ -27,9 +27,8 @@ pub use plan::plan;
 pub use study::study;
 pub use tolerance::{tolerance, tolerance_plot};
 
-use crate::apply::PointCloud;
 use crate::score::Score;
-use catoptric_model::{Calibration, Dataset};
+use catoptric_model::{Calibration, Dataset, PointCloud};
 use catoptric_sim::Truth;
 use page::escape;
 use scores::scores;

@@ -1,9 +1,10 @@
 //! The page as a whole: its tags close, its plots have tables, and it says what the scores say.
 
 use super::*;
-use crate::apply::{CloudFrame, apply};
+use crate::apply::apply;
 use crate::sample::{noisy, sample, turned};
 use crate::score::score;
+use catoptric_model::CloudFrame;
 
 fn html(with_truth: bool) -> String {
     let s = sample();

@@ -3,8 +3,7 @@
 use super::super::figure::{self, Axes, GRID, Stroke};
 use super::super::page::{figure as block, number};
 use super::elements::{color_of, facet_of, legend};
-use crate::apply::{CloudFrame, PointCloud};
-use catoptric_model::{Calibration, Dataset, Pose, Status};
+use catoptric_model::{Calibration, CloudFrame, Dataset, PointCloud, Pose, Status};
 use nalgebra::Point3;
 use plotters::style::{BLACK, RGBColor};
 

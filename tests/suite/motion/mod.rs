@@ -10,7 +10,6 @@ mod way;
 
 use crate::common::{folder_with, run, stderr, stdout};
 use crate::scenes::{BARE, PROTOTYPE, TWO_MIRROR, scene, without_errors};
-use catoptric::apply::{CloudFrame, apply};
 use catoptric::calib::{self, Method, Options};
 use catoptric::io;
 use catoptric::io::scene::load;
@@ -24,6 +23,7 @@ use catoptric::sim::scene::{Attitude, ErrorModel, Flight, Waypoint};
 use catoptric::sim::trajectory::Trajectory;
 use catoptric::sim::truth::BeamClass;
 use catoptric::sim::{Laboratory, Scene};
+use catoptric::{CloudFrame, apply};
 use nalgebra::{Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
