@@ -1,37 +1,7 @@
-//! From a planar scan to points in space: Cooper, Eqs. (9) and (10).
+//! From a planar scan to points in space: Cooper, Eqs. (9) and (10); and what such a cloud is.
 
 use crate::beam::{self, Deflection};
 use nalgebra::{Point3, Rotation3, Vector3};
-
-/// The rotation that takes the base beam's direction to the outgoing one: Rz(θ_b + θ_a)·Ry(−φ)·Rz(−θ_b).
-///
-/// The 3-2 sequence of Eq. 9, written for a right-handed frame in which positive elevation points up.
-pub fn rotation(deflection: &Deflection, beam_azimuth: f64) -> Rotation3<f64> {
-    Rotation3::from_axis_angle(&Vector3::z_axis(), beam_azimuth + deflection.azimuth)
-        * Rotation3::from_axis_angle(&Vector3::y_axis(), -deflection.elevation)
-        * Rotation3::from_axis_angle(&Vector3::z_axis(), -beam_azimuth)
-}
-
-/// Where a range of a deflected beam lies, in the sensor frame: PC = R·(P_0 − P_L1) + P_L1 — Eq. (9).
-///
-/// P_0 is the point at that range in the scan plane. A range short of the mirror stays in the plane: it is a
-/// reading of the structure.
-///
-/// ```
-/// use catoptric_model::{cloud, Deflection};
-/// let up = Deflection { azimuth: 0.0, elevation: std::f64::consts::FRAC_PI_2, distance: 0.07 };
-/// let point = cloud::lift(&up, 0.0, 2.07);
-/// assert!((point.z - 2.0).abs() < 1e-12 && (point.x - 0.07).abs() < 1e-12);
-/// ```
-#[doc(alias = "PC_1")]
-pub fn lift(deflection: &Deflection, beam_azimuth: f64, range: f64) -> Point3<f64> {
-    let p_0 = Point3::from(beam::direction(beam_azimuth).into_inner() * range);
-    if range <= deflection.distance {
-        return p_0;
-    }
-    let p_l1 = deflection.deflection_point(beam_azimuth);
-    p_l1 + rotation(deflection, beam_azimuth) * (p_0 - p_l1)
-}
 
 /// Frame of a cloud.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -87,6 +57,36 @@ pub struct PointCloud {
     pub without_direction: usize,
     /// Elements that the calibration gives no direction.
     pub unsolved_elements: usize,
+}
+
+/// The rotation that takes the base beam's direction to the outgoing one: Rz(θ_b + θ_a)·Ry(−φ)·Rz(−θ_b).
+///
+/// The 3-2 sequence of Eq. 9, written for a right-handed frame in which positive elevation points up.
+pub fn rotation(deflection: &Deflection, beam_azimuth: f64) -> Rotation3<f64> {
+    Rotation3::from_axis_angle(&Vector3::z_axis(), beam_azimuth + deflection.azimuth)
+        * Rotation3::from_axis_angle(&Vector3::y_axis(), -deflection.elevation)
+        * Rotation3::from_axis_angle(&Vector3::z_axis(), -beam_azimuth)
+}
+
+/// Where a range of a deflected beam lies, in the sensor frame: PC = R·(P_0 − P_L1) + P_L1 — Eq. (9).
+///
+/// P_0 is the point at that range in the scan plane. A range short of the mirror stays in the plane: it is a
+/// reading of the structure.
+///
+/// ```
+/// use catoptric_model::{cloud, Deflection};
+/// let up = Deflection { azimuth: 0.0, elevation: std::f64::consts::FRAC_PI_2, distance: 0.07 };
+/// let point = cloud::lift(&up, 0.0, 2.07);
+/// assert!((point.z - 2.0).abs() < 1e-12 && (point.x - 0.07).abs() < 1e-12);
+/// ```
+#[doc(alias = "PC_1")]
+pub fn lift(deflection: &Deflection, beam_azimuth: f64, range: f64) -> Point3<f64> {
+    let p_0 = Point3::from(beam::direction(beam_azimuth).into_inner() * range);
+    if range <= deflection.distance {
+        return p_0;
+    }
+    let p_l1 = deflection.deflection_point(beam_azimuth);
+    p_l1 + rotation(deflection, beam_azimuth) * (p_0 - p_l1)
 }
 
 #[cfg(test)]

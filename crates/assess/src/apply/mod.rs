@@ -3,10 +3,8 @@
 use crate::score::residual;
 #[cfg(doc)]
 use catoptric_model::Motion;
-use catoptric_model::{
-    Calibration, CloudFrame, CloudPoint, Dataset, Deflection, PointCloud, Pose, PoseKind, PoseRecord, Status,
-    beam, cloud,
-};
+use catoptric_model::cloud::{self, CloudFrame, CloudPoint, PointCloud};
+use catoptric_model::{Calibration, Dataset, Deflection, Pose, PoseKind, PoseRecord, Status, beam};
 
 /// Why no cloud can be made.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

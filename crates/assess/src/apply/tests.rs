@@ -3,6 +3,7 @@
 use super::*;
 use catoptric_fixtures::{perfect, sample};
 use catoptric_model::{ColorBias, DistanceBias, RangeBias};
+use nalgebra::Point3;
 
 /// Distance of a point from the nearest wall, in metres.
 fn off_wall(dataset: &Dataset, p: &Point3<f64>) -> f64 {
