@@ -40,6 +40,7 @@ pub mod frame;
 pub mod mirror;
 pub mod motion;
 pub mod paper;
+pub mod place;
 pub mod range;
 pub mod session;
 pub mod summary;
