@@ -8,9 +8,10 @@ use super::progress::Progress;
 use catoptric::calib::plan::{self, FacetPlan, Open, Plan, PlannedPose, Request, Situation, Standing};
 use catoptric::files::{self, dataset, scene};
 use catoptric::model::Dataset;
+use catoptric::model::place::nearest;
 use catoptric::plan::{PlanError, completed, situation, with_poses};
 use catoptric::report;
-use catoptric::sim::{Scene, check};
+use catoptric::sim::Scene;
 use clap::{Args, ValueEnum};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -182,7 +183,7 @@ fn facets(arguments: &Arguments, situation: &Situation) -> Result<Vec<String>, C
         });
     }
     if let Some(unknown) = arguments.facet.iter().find(|f| !names.contains(&f.as_str())) {
-        let near = check::nearest(unknown, names.iter().copied());
+        let near = nearest(unknown, names.iter().copied());
         return Err(CliError::Invalid {
             message: format!("no facet is called {unknown:?}; there are {}", names.join(", ")),
             help: near.map(|near| format!("did you mean --facet {near}?")),

@@ -22,6 +22,7 @@ use catoptric_calib::plan::{Placed, Plan, PlannedPose, Situation, facing};
 use catoptric_model::{Dataset, Pose, PoseKind};
 use catoptric_sim::placement::{self, Planned};
 use catoptric_sim::reading::Sensor;
+use catoptric_sim::room::room_from_rig;
 use catoptric_sim::scene::BoardPose;
 use catoptric_sim::{Laboratory, Scene, SimError};
 
@@ -59,7 +60,7 @@ pub fn situation(scene: &Scene) -> Result<Situation, PlanError> {
             })
         })
         .collect();
-    let room_from_rig = placement::room_from_rig(&scene.room);
+    let room_from_rig = room_from_rig(&scene.room);
     Ok(Situation::drawn(&session, &room_from_rig, &placed)?)
 }
 

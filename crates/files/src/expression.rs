@@ -7,7 +7,7 @@
 //! atom    = number | name | [ "sin" | "cos" | "tan" | "sqrt" ] "(" sum ")"      sin, cos and tan of degrees
 //! ```
 
-use catoptric_sim::check::nearest;
+use catoptric_model::place::nearest;
 
 /// How deep parentheses and signs may nest.
 const DEEPEST: usize = 64;

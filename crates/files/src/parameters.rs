@@ -5,7 +5,7 @@
 
 use super::expression::{Flaw, NoValue, evaluate, is_name};
 use super::tree::{Key, Node, Source, Value};
-use catoptric_sim::check::nearest;
+use catoptric_model::place::nearest;
 use serde_json::Value as Json;
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -10,8 +10,9 @@ use super::format;
 use super::mesh;
 use super::parameters;
 use super::tree::{self, Node, Source};
+use catoptric_model::place::{Problem, nearest};
 use catoptric_sim::Scene;
-use catoptric_sim::check::{self, Problem};
+use catoptric_sim::check;
 use catoptric_sim::pattern::{self, Expanded};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -400,7 +401,7 @@ fn similar_file(path: &Path, error: &std::io::Error) -> Option<String> {
         .filter_map(|e| e.ok()?.file_name().into_string().ok())
         .collect();
     let wanted = path.file_name()?.to_str()?;
-    let name = check::nearest(wanted, names.iter().map(String::as_str))?;
+    let name = nearest(wanted, names.iter().map(String::as_str))?;
     let name = folder.map_or(PathBuf::from(name), |f| f.join(name));
     Some(format!("did you mean {}?", name.display()))
 }

@@ -6,7 +6,7 @@
 use super::scene::{self, SceneErrors};
 use super::tree::{self, Node, Source, Value};
 use super::{format, parameters};
-use catoptric_sim::check::Segment;
+use catoptric_model::place::{Problem, Segment};
 use catoptric_sim::scene::Parameter;
 use catoptric_sim::{Scene, check, pattern};
 use std::collections::BTreeSet;
@@ -178,7 +178,7 @@ impl Template {
     }
 }
 
-fn messages(problems: Vec<check::Problem>) -> Vec<String> {
+fn messages(problems: Vec<Problem>) -> Vec<String> {
     problems.into_iter().map(|p| p.message).collect()
 }
 

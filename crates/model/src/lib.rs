@@ -41,6 +41,7 @@ pub mod label;
 pub mod mirror;
 pub mod motion;
 pub mod paper;
+pub mod place;
 pub mod range;
 pub mod session;
 pub mod summary;

@@ -5,18 +5,11 @@
 //! A. Surfaces closer than the pulse is long merge into one echo, others follow one another. Other detectors and the
 //! echoes after the first are in [`echo`](crate::echo).
 
+mod pulse;
 pub(crate) mod root;
 
-use crate::lanes::{LANES, exponential};
-
-/// The light of one sub-ray.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pulse {
-    /// Path length, in metres.
-    pub range: f64,
-    /// Peak power, in watts.
-    pub power: f64,
-}
+pub use pulse::{Pulse, walk};
+pub(crate) use pulse::{height, slope};
 
 /// The first echo that rises through the threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,47 +31,6 @@ pub fn pulse_sd(fwhm_ns: f64) -> f64 {
 /// Full width at half maximum of a pulse of the given standard deviation, both in metres of range.
 pub fn pulse_length(sd: f64) -> f64 {
     sd * (8.0 * std::f64::consts::LN_2).sqrt()
-}
-
-/// How far before its peak a Gaussian pulse of height `peak` crosses the threshold, in units of its σ.
-pub fn walk(peak: f64, threshold: f64) -> f64 {
-    (2.0 * libm::log(peak / threshold)).max(0.0).sqrt()
-}
-
-/// Σ over the pulses of what is made of their distance, power and bell exp(−(x − r)²/2σ²), in their order.
-#[inline(always)]
-fn sum(pulses: &[Pulse], sd: f64, at: f64, mut term: impl FnMut(f64, f64, f64) -> f64) -> f64 {
-    let mut total = -0.0;
-    for group in pulses.chunks(LANES) {
-        let mut exponents = [0.0; LANES];
-        for (exponent, pulse) in exponents.iter_mut().zip(group) {
-            let x = (at - pulse.range) / sd;
-            *exponent = -0.5 * x * x;
-        }
-        let (mut bells, mut rare) = ([0.0; LANES], false);
-        for (bell, exponent) in bells.iter_mut().zip(exponents) {
-            let (value, left) = exponential(exponent);
-            *bell = value;
-            rare |= left;
-        }
-        if rare {
-            bells = exponents.map(libm::exp);
-        }
-        for (pulse, bell) in group.iter().zip(bells) {
-            total += term(pulse.range - at, pulse.power, bell);
-        }
-    }
-    total
-}
-
-/// The echo at a range, in watts.
-pub(crate) fn height(pulses: &[Pulse], sd: f64, at: f64) -> f64 {
-    sum(pulses, sd, at, |_, power, bell| power * bell)
-}
-
-/// Slope of the echo, up to the positive factor 1/σ².
-pub(crate) fn slope(pulses: &[Pulse], sd: f64, at: f64) -> f64 {
-    sum(pulses, sd, at, |distance, power, bell| distance * power * bell)
 }
 
 /// Whether a sum of pulses reaches the threshold anywhere: whether there is a [`leading_edge`].

@@ -1,6 +1,5 @@
 //! From a facet as a person describes it to its corners in the nominal sensor frame.
 
-use crate::pattern::plate_azimuth_deg;
 use crate::scene::{FacetShape, Plate, RectangleShape, Wedge};
 use catoptric_model::beam;
 use catoptric_model::mirror;
@@ -51,6 +50,12 @@ fn wedge_corners(wedge: &Wedge) -> Option<Vec<Point3<f64>>> {
         corners.reverse();
     }
     Some(corners)
+}
+
+/// Azimuth of the beam that a plate is drawn about, in degrees.
+pub(crate) fn plate_azimuth_deg(plate: &Plate) -> Option<f64> {
+    let of_beam = |b: u32| beam::azimuth(b as usize).to_degrees();
+    plate.azimuth_deg.or(plate.beam.map(of_beam))
 }
 
 /// The rectangle about the point where the beam meets it.

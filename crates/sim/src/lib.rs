@@ -1,5 +1,6 @@
 //! The virtual laboratory: a 2D LiDAR with mirrors, target boards and motion capture, simulated ray by ray.
 
+mod board;
 pub mod cast;
 pub mod check;
 pub mod color;
@@ -20,6 +21,7 @@ pub mod phase;
 pub mod placement;
 pub mod power;
 pub mod reading;
+pub mod room;
 pub mod scanner;
 pub mod scene;
 pub mod spot;

@@ -9,9 +9,10 @@
 //! a turn by τ:                 azimuths α → α + τ
 //! ```
 
-use crate::check::{Path, Problem, Segment, nearest};
-use crate::scene::{Exchange, Facet, FacetShape, Pattern, Plate, Scene};
+use crate::layout::plate_azimuth_deg;
+use crate::scene::{Exchange, Facet, FacetShape, Pattern, Scene};
 use catoptric_model::beam;
+use catoptric_model::place::{Path, Problem, Segment, nearest};
 
 /// The last beam of the scan, the first's mirror image.
 const LAST_BEAM: u32 = 1080;
@@ -184,12 +185,6 @@ pub fn turned(facet: &Facet, name: String, turn_deg: f64) -> Facet {
         shape,
         two_sided: facet.two_sided,
     }
-}
-
-/// Azimuth of the beam that a plate is drawn about, in degrees.
-pub(crate) fn plate_azimuth_deg(plate: &Plate) -> Option<f64> {
-    let of_beam = |b: u32| beam::azimuth(b as usize).to_degrees();
-    plate.azimuth_deg.or(plate.beam.map(of_beam))
 }
 
 fn left_right(mut shape: FacetShape) -> FacetShape {

@@ -8,7 +8,7 @@ use crate::error::SimError;
 use crate::footprint::Ray;
 use crate::laboratory::wall_targets;
 use crate::optics::{Bounce, Course, End, Mirrors, Setting};
-use crate::placement;
+use crate::room::room_from_rig;
 use crate::scene::Scene;
 use crate::stage::Stage;
 use crate::structure::Structure;
@@ -65,7 +65,7 @@ impl Scenery {
             (Structure::empty(), None)
         } else {
             let structure = Structure::as_built(scene, scene.seed)?;
-            let pose = placement::room_from_rig(&scene.room) * structure.rig_from_sensor;
+            let pose = room_from_rig(&scene.room) * structure.rig_from_sensor;
             (structure, Some(pose))
         };
         let frame_from_room = room_from_frame.map_or_else(Pose::identity, |p| p.inverse());

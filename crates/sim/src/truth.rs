@@ -1,5 +1,7 @@
 //! The truth: what was really simulated, kept apart from what was observed.
 
+pub use crate::reading::BeamClass;
+
 use crate::scene::Mishap;
 use catoptric_model::beam::{self, Deflection};
 use catoptric_model::{PoseData, PoseKind, RangeBias};
@@ -45,24 +47,6 @@ pub struct TrueFacet {
     pub offset_m: f64,
     /// Corners, in metres.
     pub corners_m: Vec<[f64; 3]>,
-}
-
-/// What the structure does to a beam.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum BeamClass {
-    /// All of it passes by.
-    Direct,
-    /// All of it leaves by one facet.
-    Deflected,
-    /// Its parts take different ways.
-    Split,
-    /// All of it leaves after more than one facet.
-    MultiBounce,
-    /// All of it ends on the structure.
-    Blocked,
-    /// All of it is still between mirrors after the last bounce allowed.
-    Lost,
 }
 
 /// What became of a beam's light at the structure. Angles are those of the chief ray.

@@ -4,7 +4,7 @@
 //! lists by place. `*` in the place of a facet's name means every facet.
 
 use super::Analysis;
-use catoptric_sim::check::nearest;
+use catoptric_model::place::nearest;
 use serde_json::Value;
 use std::fmt;
 

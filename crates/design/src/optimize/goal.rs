@@ -3,7 +3,7 @@
 use super::Stated;
 use crate::layout::{Analysis, Requirement};
 use catoptric_model::beam;
-use catoptric_sim::check::nearest;
+use catoptric_model::place::nearest;
 use nalgebra::{Unit, Vector3};
 use serde::Serialize;
 

@@ -6,7 +6,7 @@ mod table;
 mod units;
 
 use super::tree::{Node, Source, Value};
-use catoptric_sim::check::{Path, Segment};
+use catoptric_model::place::{Path, Segment};
 use serde_json::Value as Json;
 
 /// A departure from the schema.

@@ -3,7 +3,7 @@
 use super::super::tree::Node;
 use super::Walk;
 use super::units::{split_unit, unit_sign};
-use catoptric_sim::check::{Path, Segment};
+use catoptric_model::place::{Path, Segment};
 use serde_json::Value as Json;
 
 impl Walk<'_> {

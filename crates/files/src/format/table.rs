@@ -3,7 +3,7 @@
 use super::super::tree::{Node, Value};
 use super::units::{other_unit, split_unit};
 use super::{Finding, Walk};
-use catoptric_sim::check::{Path, nearest};
+use catoptric_model::place::{Path, nearest};
 use serde_json::Value as Json;
 
 impl<'a> Walk<'a> {

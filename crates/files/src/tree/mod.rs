@@ -4,7 +4,7 @@ mod json;
 mod set;
 mod toml;
 
-use catoptric_sim::check::{Path, Segment};
+use catoptric_model::place::{Path, Segment};
 use std::ops::Range;
 
 pub(super) use self::json::from_json;

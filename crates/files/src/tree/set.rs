@@ -2,7 +2,7 @@
 
 use super::toml::node;
 use super::{Key, Node, Source, Value};
-use catoptric_sim::check::{Segment, nearest};
+use catoptric_model::place::{Segment, nearest};
 use toml::de::DeValue;
 
 /// The table whose entries are set by name alone.

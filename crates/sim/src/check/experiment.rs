@@ -1,11 +1,12 @@
 //! Room and procedure: whether everything has its place, and whether beams meet the boards.
 
+use super::findings::{Findings, suggestion};
 use super::outline::{Meets, Obstacles, nominal_room_from_sensor};
 use super::structure::{SCAN_HALF_DEG, rounded};
-use super::{Findings, Path, suggestion};
-use crate::placement::{before_beam, stands_in};
+use crate::board::{before_beam, stands_in};
 use crate::scene::{Board, BoardPose, Scene, SensorTest};
 use catoptric_model::frame::yaw_pitch_roll;
+use catoptric_model::place::Path;
 use catoptric_model::{BoardPlane, Pose, Rectangle, beam};
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 

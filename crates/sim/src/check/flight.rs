@@ -1,13 +1,14 @@
 //! Flights: whether time goes on, a scan fits in, the turns are clear, and the way stays in the room.
 
 use super::experiment::{outside, room_extent};
+use super::findings::Findings;
 use super::structure::rounded;
 use super::values::distinct;
-use super::{Findings, Path};
 use crate::layout;
 use crate::scene::{Flight, Scene};
 use crate::structure;
 use crate::trajectory::{self, Trajectory};
+use catoptric_model::place::Path;
 use nalgebra::{Point3, Vector3};
 
 /// Turns from waypoint to waypoint must fall this short of half a turn, in degrees: there either arc is the shorter.

@@ -1,8 +1,9 @@
 //! Mishaps: whether each is one thing that can happen. That its pose is recorded with a board shows when it is set up.
 
-use super::{Findings, Path, suggestion};
-use crate::laboratory::board_markers;
+use super::findings::{Findings, suggestion};
+use crate::board::board_markers;
 use crate::scene::{Mishap, Scene};
+use catoptric_model::place::Path;
 
 pub(super) fn check(scene: &Scene, found: &mut Findings) {
     let mishaps = &scene.experiment.mishap;

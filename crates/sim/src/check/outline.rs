@@ -3,7 +3,7 @@
 use crate::cast::Shape;
 use crate::footprint::Ray;
 use crate::layout;
-use crate::placement;
+use crate::room::room_from_rig;
 use crate::scene::Scene;
 use crate::structure;
 use catoptric_model::beam;
@@ -222,5 +222,5 @@ impl Obstacles {
 
 /// Where the drawing puts the sensor in the room.
 pub(super) fn nominal_room_from_sensor(scene: &Scene) -> Pose {
-    placement::room_from_rig(&scene.room) * structure::nominal_mount(scene)
+    room_from_rig(&scene.room) * structure::nominal_mount(scene)
 }

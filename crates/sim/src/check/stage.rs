@@ -1,10 +1,11 @@
 //! What stands in the room by itself, the material of mirrors, and whether there is enough of a scene at all.
 
+use super::findings::Findings;
 use super::structure::check_outline;
 use super::values::distinct;
-use super::{Findings, Path};
 use crate::scene::{PlaneRectangle, PlaneShape, Scene, SurfaceShape};
 use crate::stage;
+use catoptric_model::place::Path;
 use nalgebra::{Point3, Vector3};
 
 pub(super) fn check(scene: &Scene, found: &mut Findings) {

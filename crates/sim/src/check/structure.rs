@@ -1,11 +1,12 @@
 //! Mirrors, posts and markers: whether each is a body, and whether light can reach it.
 
+use super::findings::Findings;
 use super::outline::{Face, Meets, Obstacles};
 use super::values::distinct;
-use super::{Findings, Path};
 use crate::layout;
 use crate::scene::{Facet, FacetShape, Marker, Plate, RectangleShape, Scanner, Scene, Wedge};
 use catoptric_model::beam;
+use catoptric_model::place::Path;
 use nalgebra::{Point3, Unit, Vector3};
 
 /// Corners nearer than this are one corner, and a polygon narrower than this is a line: no cutter is better.

@@ -1,9 +1,10 @@
 //! Names, colors, tables and pairs of limits.
 
-use super::{Findings, Path, suggestion};
+use super::findings::{Findings, suggestion};
 use crate::color;
 use crate::scene::{Detector, EchoChoice, MocapProfile, NoiseTable, Preset, Principle, Scene};
 use catoptric_model::dataset::RIG_SUBJECT;
+use catoptric_model::place::Path;
 
 pub(super) fn check(scene: &Scene, found: &mut Findings) {
     names(scene, found);

@@ -10,7 +10,7 @@
 //! no result depends on which way it was found. The exception is an interval with more than one root, which a quarter of
 //! σ holds only where two tops are about to merge: then another of its roots may be found.
 
-use super::{Pulse, height, slope, sum};
+use super::pulse::{Pulse, height, slope, sum};
 
 /// Steps after which halving is left to itself.
 const STEPS: usize = 12;

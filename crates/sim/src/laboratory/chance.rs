@@ -3,7 +3,7 @@
 //! Every draw is a function of (seed, purpose, scan, beam) alone. Correlated noise begins anew with each stretch, so
 //! that scan k of a stretch follows exactly from the innovations of its scans 0 to k and from nothing else.
 
-use super::Laboratory;
+use super::setup::Laboratory;
 use crate::noise::{Columns, Draws, Purpose};
 use crate::reading::{Chance, MAX_ECHOES};
 use crate::scene::{Correlated, ErrorModel, Scene};

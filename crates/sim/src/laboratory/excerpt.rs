@@ -6,7 +6,8 @@
 
 use super::chance::{Luck, Memory, ScanLuck};
 use super::recorder::{Digest, Readings};
-use super::{Laboratory, Returns};
+use super::setup::Laboratory;
+use super::sight::Returns;
 use crate::noise::Columns;
 use crate::reading::Chance;
 use catoptric_model::dataset::nanoseconds;

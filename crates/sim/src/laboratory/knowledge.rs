@@ -1,14 +1,15 @@
 //! What the experimenter knows: the drawing, the surveys, and what steps 1 and 3 found out.
 
-use super::{Laboratory, room};
+use super::setup::Laboratory;
+use crate::board::board_markers;
 use crate::error::SimError;
 use crate::noise::{Draws, Purpose};
 use crate::optics::{Mirrors, Setting};
 use crate::placement;
-use crate::scene::{ErrorModel, Marker, Scene};
+use crate::scene::{ErrorModel, Marker};
 use crate::structure::{self, Structure};
 use catoptric_model::session::{self, Session};
-use catoptric_model::{PoseData, PoseKind, PoseRecord, RangeBias, Summary, beam};
+use catoptric_model::{PoseData, PoseKind, PoseRecord, Summary, beam};
 use nalgebra::{Unit, Vector3};
 
 /// Bare readings beyond this are not of the structure, in metres.
@@ -64,7 +65,7 @@ impl Laboratory {
                     width_mm: b.width_mm,
                     height_mm: b.height_mm,
                     color: b.color.clone(),
-                    markers: known_markers(&room::board_markers(b)),
+                    markers: known_markers(&board_markers(b)),
                 })
                 .collect(),
         })
@@ -231,28 +232,6 @@ impl Laboratory {
         ];
         terms.iter().map(|mm| mm * mm * 1e-6).sum()
     }
-}
-
-/// The biases as step 1 found them: the true ones, missed by the characterization's uncertainty.
-pub(super) fn believed_bias(scene: &Scene, seed: u64, truth: &RangeBias) -> RangeBias {
-    let mut believed = truth.clone();
-    if *truth == RangeBias::default() {
-        return believed;
-    }
-    let known = &scene.characterization;
-    let mut draws = Draws::new(seed, Purpose::Characterization, 0);
-    for error in &mut believed.distance.error_mm {
-        *error += known.distance_sd_mm * draws.normal();
-    }
-    draws.seek(1 << 20);
-    let gain = known.angle_gain_sd_mm * draws.normal();
-    believed.angle.gain_mm += gain;
-    believed.angle.offset_mm -= gain;
-    for (column, color) in believed.color.values_mut().enumerate() {
-        draws.seek((1 << 21) + column as u64);
-        color.offset_mm += known.color_sd_mm * draws.normal();
-    }
-    believed
 }
 
 fn known_markers(markers: &[Marker]) -> Vec<session::Marker> {

@@ -1,6 +1,7 @@
 //! Mishaps: a board that moves while it is scanned, labels that sit on the wrong markers.
 
-use super::{Laboratory, board_markers, room};
+use super::setup::Laboratory;
+use crate::board::{board_markers, points};
 use crate::error::SimError;
 use crate::scene::{Board, Mishap};
 use catoptric_model::tracking::solve_pose;
@@ -49,7 +50,7 @@ impl Laboratory {
         if swapped.is_none() && astray.is_none() {
             return;
         }
-        let template = room::points(&markers);
+        let template = points(&markers);
         for frame in &mut track.frames {
             if let Some((a, b)) = swapped {
                 frame.markers.swap(a, b);

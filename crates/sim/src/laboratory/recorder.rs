@@ -1,7 +1,8 @@
 //! A stretch in the making: chance is added scan by scan to what the sensor sees.
 
-use super::chance::ScanLuck;
-use super::{Chances, Laboratory, Returns};
+use super::chance::{Chances, ScanLuck};
+use super::setup::Laboratory;
+use super::sight::Returns;
 use crate::scene::EchoChoice;
 use catoptric_model::range::NO_RETURN;
 use catoptric_model::{Stretch, beam};

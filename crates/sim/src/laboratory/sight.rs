@@ -3,7 +3,8 @@
 //! In a flight beam i of scan k is cast from where the sensor is at k·T + i·step after the first waypoint; all the rest
 //! is as where nothing moves. Every scan is a function of the scene, the seed and its number alone.
 
-use super::{Laboratory, Returns, wall_targets};
+use super::setup::Laboratory;
+use super::targets::wall_targets;
 use crate::cast::BUNDLE;
 use crate::color;
 use crate::error::SimError;
@@ -13,6 +14,9 @@ use crate::stage::Stage;
 use crate::trajectory::Trajectory;
 use catoptric_model::{Pose, PoseKind, beam};
 use rayon::prelude::*;
+
+/// What a beam met during a scan, free of chance; `None` without an echo.
+pub type Returns = Vec<Option<Return>>;
 
 /// A stretch with an index over everything that light can meet in it.
 pub struct Sight<'a> {

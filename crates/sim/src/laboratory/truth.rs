@@ -1,9 +1,9 @@
 //! The truth as the laboratory knows it.
 
-use super::Laboratory;
+use super::setup::Laboratory;
 use crate::error::SimError;
 use crate::optics::{End, Mirrors, Setting};
-use crate::placement;
+use crate::room::room_from_rig;
 use crate::trajectory::Trajectory;
 use crate::truth::{self, TrueBeam, TrueFacet, TruePose, Truth};
 use catoptric_model::{Deflection, PoseData, beam};
@@ -25,7 +25,7 @@ impl Laboratory {
             schema_version: truth::SCHEMA_VERSION,
             name: self.scene.name.clone(),
             seed: self.seed,
-            room_from_rig: PoseData::from(&placement::room_from_rig(&self.scene.room)),
+            room_from_rig: PoseData::from(&room_from_rig(&self.scene.room)),
             rig_from_sensor: PoseData::from(&self.structure.rig_from_sensor),
             bias: self.sensor.bias().clone(),
             facets: facets

@@ -2,9 +2,8 @@
 //!
 //! A column's words are one block of ChaCha, so that a row is one run of the stream.
 
-use super::{Draws, Purpose, WORDS_PER_COLUMN, standard_uniform};
+use super::draws::{Draws, Purpose, WORDS_PER_COLUMN, box_muller, standard_uniform};
 use crate::lanes::{LANES, cosine, logarithm};
-use rand::rand_core::Rng;
 
 /// Bytes of a column.
 const BLOCK: usize = 4 * WORDS_PER_COLUMN;
@@ -19,7 +18,7 @@ impl Columns {
     /// Draws a row of so many columns in place of what was here.
     pub fn draw(&mut self, columns: usize, seed: u64, purpose: Purpose, row: u64) {
         self.bytes.resize(columns * BLOCK, 0);
-        Draws::new(seed, purpose, row).rng.fill_bytes(&mut self.bytes);
+        Draws::new(seed, purpose, row).fill(&mut self.bytes);
     }
 
     /// Forgets the row: there are no columns.
@@ -62,7 +61,7 @@ impl Columns {
         }
         for block in groups.remainder().chunks_exact(BLOCK) {
             let uniform = |after| standard_uniform(word(block, after));
-            out.push(scalar(uniform(after), uniform(after + 1)));
+            out.push(box_muller(uniform(after), uniform(after + 1)));
         }
     }
 }
@@ -74,13 +73,7 @@ fn word(block: &[u8], index: usize) -> u64 {
     u64::from_le_bytes(bytes)
 }
 
-/// Box and Muller's transform as [`Draws::normal`] has it.
-pub(super) fn scalar(first: f64, second: f64) -> f64 {
-    let radius = (-2.0 * libm::log(first)).sqrt();
-    radius * libm::cos(std::f64::consts::TAU * second)
-}
-
-/// The same of several pairs of numbers from (0, 1].
+/// [`box_muller`] of several pairs.
 fn normal(first: &[f64; LANES], second: &[f64; LANES]) -> [f64; LANES] {
     let mut out = [0.0; LANES];
     let mut rare = false;
@@ -91,7 +84,7 @@ fn normal(first: &[f64; LANES], second: &[f64; LANES]) -> [f64; LANES] {
         out[lane] = (-2.0 * logarithm(first[lane])).sqrt() * cosine;
     }
     if rare {
-        return std::array::from_fn(|lane| scalar(first[lane], second[lane]));
+        return std::array::from_fn(|lane| box_muller(first[lane], second[lane]));
     }
     out
 }
@@ -145,7 +138,7 @@ mod tests {
             for first in [[0.3; LANES], second] {
                 let made = normal(&first, &second);
                 for lane in 0..LANES {
-                    let exact = scalar(first[lane], second[lane]);
+                    let exact = box_muller(first[lane], second[lane]);
                     assert_eq!(
                         made[lane].to_bits(),
                         exact.to_bits(),

@@ -4,7 +4,8 @@
 //! its legs. So a facet that is moved concerns the ways that met it where it was and those that pass the box around where it
 //! is now.
 
-use super::{End, Path, Setting};
+use super::path::{End, Path};
+use super::setting::Setting;
 use crate::footprint::Ray;
 use nalgebra::{Point3, Vector3};
 

@@ -3,7 +3,8 @@
 //! Scanner and structure are rigid: what a sub-ray does until it leaves the structure for good, or ends on it, is the same
 //! wherever the sensor is and whatever is around it, as long as nothing of the room comes within the structure itself.
 
-use super::{Course, End, Meeting, Setting};
+use super::path::{Course, End, Meeting};
+use super::setting::Setting;
 use crate::cast::Rays;
 use crate::footprint::Ray;
 use rayon::prelude::*;

@@ -4,8 +4,8 @@
 //! room is in the sensor frame of the flight's start. Every leg is cast into both, each time from where the sensor is
 //! then, and the nearer surface counts.
 
-use super::MAX_BOUNCES;
 use super::clearance::Extent;
+use super::path::MAX_BOUNCES;
 use crate::cast::{Contact, Hit, Rays, Shape, World, placed};
 use crate::color::{self, Paint};
 use crate::error::SimError;

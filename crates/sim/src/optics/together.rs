@@ -1,9 +1,9 @@
 //! The ways of the rays of a beam, leg by leg together: rays that left one mirror are a beam again.
 
-use super::{Bounce, Course, End, MAX_BOUNCES, Path, Setting};
+use super::path::{Bounce, Course, Path};
+use super::setting::Setting;
 use crate::cast::Rays;
 use crate::footprint::Ray;
-use nalgebra::Point3;
 
 impl Setting<'_> {
     /// The ways of some rays, as [`Setting::trace`] follows each of them; faster if they are a narrow beam.
@@ -56,49 +56,5 @@ impl Setting<'_> {
             going = next;
         }
         courses
-    }
-}
-
-impl Course {
-    pub(super) fn begin(ray: &Ray) -> Self {
-        Self {
-            count: 0,
-            length: 0.0,
-            silvered: 0,
-            gain: 1.0,
-            last: *ray,
-            end: End::Escaped,
-        }
-    }
-}
-
-impl Path {
-    pub(super) fn begin(ray: &Ray) -> Self {
-        Self {
-            count: 0,
-            facets: [0; MAX_BOUNCES],
-            points: [Point3::origin(); MAX_BOUNCES],
-            meetings: [None; MAX_BOUNCES],
-            silvered: 0,
-            gain: 1.0,
-            length: 0.0,
-            last: *ray,
-            end: End::Escaped,
-        }
-    }
-
-    pub(super) fn add(&mut self, bounce: &Bounce) {
-        self.facets[self.count] = bounce.facet;
-        self.points[self.count] = bounce.point;
-        self.meetings[self.count] = Some(bounce.meeting);
-        self.count += 1;
-    }
-
-    pub(super) fn end(&mut self, course: &Course) {
-        self.silvered = course.silvered;
-        self.gain = course.gain;
-        self.length = course.length;
-        self.last = course.last;
-        self.end = course.end;
     }
 }

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::layout::{area_vector, corners};
+use crate::scene::Plate;
 use crate::scene::{CopyList, FacetCopy, MirrorImage, PolygonShape, RectangleShape, Ring, Wedge};
 use nalgebra::{Point3, Rotation3, Vector3};
 

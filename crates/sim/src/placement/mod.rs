@@ -5,53 +5,27 @@
 //! and catch the whole group with some margin. The mirrors as built are not known here.
 
 mod groups;
+mod planned;
 mod poses;
 mod sensor_tests;
 
 pub use groups::served_beams;
-pub(crate) use poses::stands_in;
-pub(crate) use sensor_tests::before_beam;
+pub use planned::Planned;
 
+use crate::board::attitude;
 use crate::error::SimError;
 use crate::noise::{Draws, Purpose};
 use crate::optics::{Mirrors, Path, Setting};
 use crate::reading::Sensor;
-use crate::scene::{BoardPose, Design, Room, Scene};
+use crate::room::room_from_rig;
+use crate::scene::{BoardPose, Design, Scene};
 use crate::structure::{self, Structure};
-use catoptric_model::frame::{tangent_basis, yaw_pitch_roll};
-use catoptric_model::{Pose, PoseKind, TestNote, beam};
+use catoptric_model::frame::tangent_basis;
+use catoptric_model::{PoseKind, beam};
 use groups::{Group, direct_groups, facet_groups};
-use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
-use poses::{attitude, place, place_at_random};
-
-/// A stretch as it is meant to be recorded.
-#[derive(Debug, Clone)]
-pub struct Planned {
-    /// What it is for.
-    pub kind: PoseKind,
-    /// Scans.
-    pub scans: usize,
-    /// Facet in whose fan the board stands, by its index.
-    pub facet: Option<usize>,
-    /// First and last beam it is set up for.
-    pub beams: Option<[usize; 2]>,
-    /// The board, by its index, and where it is meant to stand.
-    pub board: Option<(usize, Pose)>,
-    /// Whether it is put exactly there.
-    pub exact: bool,
-    /// What is tested of the bare sensor.
-    pub test: Option<TestNote>,
-    /// The flight, by its index.
-    pub flight: Option<usize>,
-}
-
-/// Where rig and nominal sensor stand in the room.
-pub fn room_from_rig(room: &Room) -> Pose {
-    Pose::from_parts(
-        Translation3::from(Vector3::from(room.rig_position_m)),
-        yaw_pitch_roll(room.rig_yaw_deg.to_radians(), 0.0, 0.0),
-    )
-}
+use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
+use planned::no_place_before;
+use poses::{place, place_at_random};
 
 /// The whole procedure: bare structure, empty room, tests of the bare sensor, boards before undeflected beams, boards
 /// before every facet, flights.
@@ -175,14 +149,6 @@ fn no_place(scene: &Scene, board: usize, group: &Group, reason: String) -> SimEr
         None => format!("beams {} to {}", group.first, group.last),
     };
     no_place_before(scene, board, target, reason)
-}
-
-fn no_place_before(scene: &Scene, board: usize, target: String, reason: String) -> SimError {
-    SimError::Placement {
-        board: scene.board[board].name.clone(),
-        target,
-        reason,
-    }
 }
 
 /// A pose that the scene gives itself.

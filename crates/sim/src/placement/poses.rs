@@ -1,15 +1,10 @@
 //! Where one board stands, and how it is turned.
 
 use super::groups::Group;
-use crate::footprint::Ray;
+use crate::board::{facing, stands_in};
 use crate::noise::Draws;
 use crate::scene::{Board, Experiment, Room};
-use catoptric_model::frame::tangent_basis;
-use catoptric_model::{Pose, Rectangle};
-use nalgebra::{Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
-
-/// Least distance between a board and the shell of the room, in metres.
-const WALL_CLEARANCE: f64 = 0.03;
+use catoptric_model::Pose;
 
 /// Least distance between a board and the mirror it stands before, in metres.
 const LEAST_RANGE: f64 = 0.4;
@@ -117,66 +112,4 @@ pub(super) fn place_at_random(
     Err(format!(
         "of {ATTEMPTS} poses by chance, none stands within the room's walls, floor and ceiling"
     ))
-}
-
-/// A board on a ray, tilted against it; its x axis lies along the fan as far as the tilt allows.
-pub(super) fn facing(ray: &Ray, fan: Vector3<f64>, distance: f64, tilt: f64, turn: f64) -> Pose {
-    let (across, up) = tangent_basis(&ray.direction);
-    let (sin_turn, cos_turn) = libm::sincos(turn);
-    let (sin_tilt, cos_tilt) = libm::sincos(tilt);
-    let sideways = across.into_inner() * cos_turn + up.into_inner() * sin_turn;
-    let normal = Unit::new_normalize(sideways * sin_tilt - ray.direction.into_inner() * cos_tilt);
-    attitude(ray.origin + ray.direction.into_inner() * distance, &normal, fan)
-}
-
-/// The pose of a board with a given center and normal whose x axis is as near to `along` as it can be.
-pub(super) fn attitude(center: Point3<f64>, normal: &Unit<Vector3<f64>>, along: Vector3<f64>) -> Pose {
-    let flat = |v: Vector3<f64>| Unit::try_new(v - normal.into_inner() * normal.dot(&v), 1e-9);
-    let x = flat(along).unwrap_or_else(|| tangent_basis(normal).0);
-    let y = normal.cross(&x);
-    let rotation =
-        Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x.into_inner(), y, normal.into_inner()]));
-    Pose::from_parts(
-        Translation3::from(center.coords),
-        UnitQuaternion::from_rotation_matrix(&rotation),
-    )
-}
-
-/// Whether all corners of a board lie inside the room.
-pub(crate) fn stands_in(board: &Board, room_from_board: &Pose, room: &Room) -> bool {
-    let outline = Rectangle {
-        width: board.width_mm * 1e-3,
-        height: board.height_mm * 1e-3,
-    };
-    let [x, y, z] = room.size_m;
-    outline.corners().iter().all(|corner| {
-        let p = room_from_board * corner;
-        p.x.abs() <= 0.5 * x - WALL_CLEARANCE
-            && p.y.abs() <= 0.5 * y - WALL_CLEARANCE
-            && p.z >= WALL_CLEARANCE
-            && p.z <= z - WALL_CLEARANCE
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use catoptric_model::beam;
-
-    #[test]
-    fn a_board_faces_its_ray_under_the_wanted_tilt() {
-        let ray = Ray {
-            origin: Point3::new(0.1, 0.2, 1.5),
-            direction: beam::spherical(1.0, 0.6),
-        };
-        for k in 0..7 {
-            let pose = facing(&ray, Vector3::y(), 1.2, 0.7, f64::from(k));
-            let normal = pose * Vector3::z();
-            assert!((beam::angle_between(&Unit::new_normalize(-normal), &ray.direction) - 0.7).abs() < 1e-12);
-            assert!(
-                (pose.translation.vector - (ray.origin + ray.direction.into_inner() * 1.2).coords).norm()
-                    < 1e-12
-            );
-        }
-    }
 }

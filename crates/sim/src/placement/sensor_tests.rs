@@ -1,13 +1,10 @@
 //! Where the boards of step 1 are put: before one undeflected beam, at wanted distances under wanted incidences.
 
-use super::poses::{facing, stands_in};
-use super::{Planned, no_place_before};
+use super::planned::{Planned, no_place_before};
+use crate::board::{before_beam, stands_in};
 use crate::error::SimError;
-use crate::footprint::Ray;
-use crate::scene::{Scene, SensorTest};
-use catoptric_model::frame::tangent_basis;
-use catoptric_model::{Pose, PoseKind, TestNote, beam};
-use nalgebra::Point3;
+use crate::scene::Scene;
+use catoptric_model::{Pose, PoseKind, TestNote};
 
 /// Every stretch of every test, trial after trial.
 pub(super) fn plan(scene: &Scene, room_from_sensor: &Pose) -> Result<Vec<Planned>, SimError> {
@@ -51,26 +48,4 @@ pub(super) fn plan(scene: &Scene, room_from_sensor: &Pose) -> Result<Vec<Planned
         }
     }
     Ok(planned)
-}
-
-/// A board whose center is on the test's beam, in the room frame; its x axis is as nearly along the scan as can be.
-pub(crate) fn before_beam(
-    test: &SensorTest,
-    range: f64,
-    incidence_deg: f64,
-    room_from_sensor: &Pose,
-) -> Pose {
-    let ray = Ray {
-        origin: Point3::origin(),
-        direction: beam::direction(test.azimuth_deg.to_radians()),
-    };
-    let (across, _) = tangent_basis(&ray.direction);
-    room_from_sensor
-        * facing(
-            &ray,
-            across.into_inner(),
-            range,
-            incidence_deg.to_radians(),
-            test.direction_deg.to_radians(),
-        )
 }

@@ -2,7 +2,8 @@
 //! and sub-rays that go one way to one surface are added in a row.
 
 use super::part::{Parts, Place};
-use super::{Return, Sensor, is_chief};
+use super::returned::Return;
+use super::sensor::{Sensor, is_chief};
 use crate::cast::Contact;
 use crate::detect::Pulse;
 use crate::footprint;

@@ -1,25 +1,122 @@
 //! Which echoes a beam's light makes, and what the detector reads in each of them.
 
-use super::Sensor;
 use super::part::{Part, Parts};
+use super::returned::{MAX_ECHOES, Return};
+use super::sensor::Sensor;
+use crate::detect;
 use crate::echo::Echo;
+use crate::optics::Setting;
 use crate::phase;
-use crate::scene::{Detector, EchoChoice, Principle};
+use crate::scene::{Detector, EchoChoice, ErrorModel, Principle};
 
 /// Echoes this many σ of the receiver's noise below the threshold are never detected: the chance is below 3e-7.
 const FAINTEST: f64 = 5.0;
 
 /// An echo as it is read: the part that dominates it, and what the detector makes of it.
-pub(super) struct Seen<'a> {
-    pub(super) part: &'a Part,
-    pub(super) mixed: f64,
-    pub(super) detection: f64,
-    pub(super) probability: f64,
+struct Seen<'a> {
+    part: &'a Part,
+    mixed: f64,
+    detection: f64,
+    probability: f64,
 }
 
 impl Sensor {
+    /// What the detector makes of a beam's light.
+    pub(super) fn receive(&self, setting: &Setting<'_>, parts: &[Part]) -> Option<Return> {
+        let physical = matches!(self.errors.model, ErrorModel::Physical | ErrorModel::Both);
+        if !self.takes_one_edge() {
+            let seen = match self.detection.principle {
+                Principle::Pulsed => self.receive_pulses(parts, physical),
+                Principle::Phase => self.receive_phase(parts, physical),
+            };
+            let mut found = seen.iter().filter_map(|seen| self.returned(setting, seen));
+            let mut first = found.next()?;
+            // Echoes that are surely detected and alone reported never need a substitute.
+            if self.detection.echo == EchoChoice::All || self.detection.noise_over_threshold > 0.0 {
+                first.others = found.take(MAX_ECHOES - 1).collect();
+            }
+            return Some(first);
+        }
+        let (part, mixed, detection) = match parts {
+            [] => return None,
+            // One surface reads its own range, wherever on its edge that is.
+            [only] if !physical => {
+                if !detect::is_seen(&only.pulses, self.receiver.sd, self.receiver.threshold) {
+                    return None;
+                }
+                (only, 0.0, 0.0)
+            }
+            _ => self.detect(parts, physical)?,
+        };
+        self.returned(
+            setting,
+            &Seen {
+                part,
+                mixed,
+                detection,
+                probability: 1.0,
+            },
+        )
+    }
+
+    /// An echo with everything that it says of its surface; `None` beyond the longest range.
+    fn returned(&self, setting: &Setting<'_>, seen: &Seen<'_>) -> Option<Return> {
+        let part = seen.part;
+        let place = part.place();
+        let (geometric, cos_incidence) = (place.range, place.cos_incidence);
+        let paint = setting.paint(part.surface);
+        let found = Return {
+            role: setting.role(part.surface),
+            facets: part.facets().to_vec(),
+            geometric,
+            cos_incidence,
+            facet_cos_incidence: place.facets[..part.facets().len()].to_vec(),
+            power: part.power,
+            share: part.share,
+            mixed: seen.mixed,
+            detection: seen.detection,
+            bias: self.bias.terms(geometric, cos_incidence, &paint.name),
+            noise_sd: paint.noise.sd(geometric),
+            probability: seen.probability,
+            others: Vec::new(),
+        };
+        (found.range() <= self.limits.range_max_m).then_some(found)
+    }
+
+    /// The part that dominates the first echo, the shift that the others cause, and the detector's own.
+    ///
+    /// Where the detector is not to show itself, both edges have their walk undone, so that a single surface reads its
+    /// own range and only the mixture shifts it.
+    fn detect<'a>(&self, parts: &'a [Part], physical: bool) -> Option<(&'a Part, f64, f64)> {
+        let all = Parts::pulses(parts);
+        let edge = detect::leading_edge(&all, self.receiver.sd, self.receiver.threshold)?;
+        let first = edge.compensated(self.receiver.sd, self.receiver.threshold);
+        let pulse_length = detect::pulse_length(self.receiver.sd);
+        let in_echo = |p: &&Part| p.power > 0.0 && p.mean.range <= first + pulse_length;
+        let part = parts
+            .iter()
+            .filter(in_echo)
+            .max_by(|a, b| a.power.total_cmp(&b.power))?;
+        let geometric = part.place().range;
+        let read = |edge: &detect::Edge| {
+            if physical {
+                edge.crossing + self.reference_walk
+            } else {
+                edge.compensated(self.receiver.sd, self.receiver.threshold)
+            }
+        };
+        let alone = match parts {
+            [_] => read(&edge),
+            // A surface too dim to be seen without the others stands for its own range.
+            _ => detect::leading_edge(&part.pulses, self.receiver.sd, self.receiver.threshold)
+                .map_or(geometric, |edge| read(&edge)),
+        };
+        let detection = if physical { alone - geometric } else { 0.0 };
+        Some((part, read(&edge) - alone, detection))
+    }
+
     /// Whether the first leading edge is all that counts: it is found faster than all echoes are.
-    pub(super) fn takes_one_edge(&self) -> bool {
+    fn takes_one_edge(&self) -> bool {
         let d = &self.detection;
         d.principle == Principle::Pulsed
             && d.detector == Detector::LeadingEdge
@@ -44,7 +141,7 @@ impl Sensor {
     }
 
     /// The echoes of pulsed light in the order of `detection.echo`.
-    pub(super) fn receive_pulses<'a>(&self, parts: &'a [Part], physical: bool) -> Vec<Seen<'a>> {
+    fn receive_pulses<'a>(&self, parts: &'a [Part], physical: bool) -> Vec<Seen<'a>> {
         let all = Parts::pulses(parts);
         let mut echoes = self.receiver.echoes(&all, self.faintest());
         match self.detection.echo {
@@ -82,7 +179,7 @@ impl Sensor {
     }
 
     /// The one range of modulated light.
-    pub(super) fn receive_phase<'a>(&self, parts: &'a [Part], physical: bool) -> Vec<Seen<'a>> {
+    fn receive_phase<'a>(&self, parts: &'a [Part], physical: bool) -> Vec<Seen<'a>> {
         let ambiguity = phase::ambiguity(self.detection.modulation_hz);
         let all = Parts::pulses(parts);
         let strongest = parts.iter().max_by(|a, b| a.power.total_cmp(&b.power));

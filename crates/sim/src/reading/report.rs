@@ -1,10 +1,8 @@
 //! What the scanner reports in one scan: everything by chance, then rounding and codes.
 
-use super::{Return, Sensor};
+use super::returned::{MAX_ECHOES, Return};
+use super::sensor::Sensor;
 use crate::scene::ErrorModel;
-
-/// Most echoes of a beam that have their own chance of being detected.
-pub const MAX_ECHOES: usize = 8;
 
 /// Everything by chance in one reading, each contribution by itself.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -2,7 +2,7 @@
 //!
 //! The beam's echo is made of the same light: whatever is listed here with a power is one of its pulses.
 
-use super::Sensor;
+use super::sensor::Sensor;
 use crate::footprint::{self, SubRay};
 use crate::optics::{End, Meeting, Path, Setting};
 use crate::power::{self, Illumination};

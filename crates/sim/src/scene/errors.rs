@@ -1,5 +1,6 @@
 //! Errors of the sensor, and how well they are known.
 
+use super::omit::is_zero;
 use catoptric_model::bias::{AngleBias, ColorBias, DistanceBias, interpolate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -89,11 +90,6 @@ impl Default for Errors {
             dropout: 0.0,
         }
     }
-}
-
-/// What is not there keeps out of files.
-fn is_zero(sd: &f64) -> bool {
-    *sd == 0.0
 }
 
 /// An error that dies away while the scanner gets warm: a·exp(−t/τ), t since the recording began.

@@ -8,16 +8,17 @@ mod detection;
 mod errors;
 mod flight;
 mod mishap;
+mod omit;
 mod parameter;
 mod pattern;
 mod room;
 mod scanner;
+mod shape;
 mod superstructure;
 mod test;
 
 pub use body::{
-    MeshShape, MeshUnits, PlanePolygon, PlaneRectangle, PlaneShape, PostCylinder, PostShape, RoomBox,
-    RoomCylinder, RoomMirror, RoomSurface, SurfaceShape,
+    PlanePolygon, PlaneRectangle, PlaneShape, RoomBox, RoomCylinder, RoomMirror, RoomSurface, SurfaceShape,
 };
 pub use detection::{Detection, Detector, EchoChoice, Principle};
 pub use errors::{Characterization, Correlated, ErrorModel, Errors, Interference, NoiseTable, WarmUp};
@@ -27,6 +28,7 @@ pub use parameter::Parameter;
 pub use pattern::{CopyList, Exchange, FacetCopy, MirrorImage, Pattern, Ring};
 pub use room::{Board, BoardPose, Color, Design, Experiment, MarkerNoise, Mocap, MocapProfile, Room};
 pub use scanner::{BeamShape, HousingBox, Light, Limits, Mount, Preset, Scanner};
+pub use shape::{MeshShape, MeshUnits, PostCylinder, PostShape};
 pub use superstructure::{
     AsBuilt, Facet, FacetShape, Glass, Marker, Mirror, Plate, PolygonShape, Post, RectangleShape,
     Superstructure, Wedge,

@@ -73,7 +73,7 @@ pub struct FacetCopy {
     /// Its name.
     pub name: String,
     /// Turn about the scanner's axis, in degrees, counter-clockwise.
-    #[serde(default, skip_serializing_if = "super::superstructure::is_zero")]
+    #[serde(default, skip_serializing_if = "super::omit::is_zero")]
     #[schemars(range(min = -360.0, max = 360.0))]
     pub turn_deg: f64,
     /// What is exchanged before that.

@@ -1,7 +1,8 @@
 //! What is built around the scanner: mirrors, posts, markers, and how far they are from the drawing.
 
-use super::body::PostShape;
+use super::omit::{is_false, is_zero};
 use super::pattern::Pattern;
+use super::shape::PostShape;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -49,14 +50,6 @@ impl Default for Superstructure {
             max_bounces: four(),
         }
     }
-}
-
-pub(super) fn is_false(value: &bool) -> bool {
-    !value
-}
-
-pub(super) fn is_zero(value: &f64) -> bool {
-    *value == 0.0
 }
 
 /// A plane mirror.
