@@ -245,7 +245,7 @@ mod tests {
         let mut by_mirror = noisy(&s.truth, 1e-4, 1);
         let mut noise = Noise::new(9);
         for facet in &s.dataset.session.facets {
-            let lift = 2e-3 * noise.next();
+            let lift = 2e-3 * noise.draw();
             let of = by_mirror
                 .beams
                 .iter_mut()
