@@ -438,7 +438,7 @@ fn json_goes_through_the_same_checks() {
 
 #[test]
 fn the_resolved_scene_reads_back_as_itself() {
-    let templates = scene::Layout::ALL.map(scene::scene_template);
+    let templates = scene::Template::ALL.map(scene::Template::text);
     for text in templates.into_iter().chain([VALID]) {
         let scene = scene::parse(text, "scene.toml", &[]).unwrap();
         let resolved = scene::to_toml(&scene).unwrap();

@@ -480,7 +480,7 @@ waypoint = [{ time_s = 0, position_m = [0, 0, 1.8] }, { time_s = 0.025, position
 pose = 3
 moved_mm = [0, 0, 4]
 "#;
-    let small = scene::scene_template(Layout::TwoMirror).to_owned() + flight;
+    let small = Template::TwoMirror.text().to_owned() + flight;
     let small = scene::parse(&small, "two-mirror.toml", &quick).unwrap();
     let laboratory = sim::Laboratory::new(&small, small.seed).unwrap();
     let (dataset, truth) = (laboratory.dataset().unwrap(), laboratory.truth().unwrap());

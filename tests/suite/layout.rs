@@ -85,7 +85,7 @@ fn classes_are_those_of_the_truth_in_every_scene() {
     let scenes = recordable();
     assert!(scenes.len() > 30, "{}", scenes.len());
     for layout in scenes::Layout::ALL {
-        let drawn = scenes::parse(scenes::scene_template(layout), "template.toml", &[]).unwrap();
+        let drawn = scenes::parse(layout.text(), "template.toml", &[]).unwrap();
         assert!(
             scenes.iter().any(|(_, scene)| *scene == drawn),
             "{layout:?} is missing"

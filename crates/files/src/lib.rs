@@ -36,9 +36,9 @@ mod format;
 #[cfg(feature = "scene")]
 mod parameters;
 #[cfg(feature = "scene")]
-pub mod scene;
+pub mod parametric;
 #[cfg(feature = "scene")]
-pub mod template;
+pub mod scene;
 #[cfg(feature = "scene")]
 mod tree;
 
@@ -51,6 +51,8 @@ pub mod mesh;
 pub mod npy;
 #[cfg(feature = "scene")]
 pub mod rays;
+pub mod results;
+pub mod shell;
 
 #[cfg(feature = "recording")]
 pub use dataset::{DatasetWriter, read_dataset, read_session};
@@ -61,6 +63,9 @@ pub use manifest::{Manifest, Provenance};
 pub use playback::read_recording;
 #[cfg(feature = "recording")]
 pub use recording::RecordingWriter;
+#[cfg(all(feature = "recording", feature = "scene"))]
+pub use results::read_truth;
+pub use results::{read_calibration, read_characterization};
 
 #[cfg(all(test, feature = "recording", feature = "scene"))]
 mod tests;

@@ -15,7 +15,7 @@ use std::path::Path;
 
 /// A scene file with its parameters still open.
 #[derive(Debug)]
-pub struct Template {
+pub struct ParametricScene {
     text: String,
     name: String,
     /// As written, changed by `--set`.
@@ -30,7 +30,7 @@ pub struct Template {
 /// Parameters and the numbers that are chosen for them.
 pub type Choice<'a> = &'a [(&'a str, f64)];
 
-impl Template {
+impl ParametricScene {
     /// Reads a scene file, and changes it by `KEY=VALUE` arguments.
     ///
     /// # Errors
@@ -48,9 +48,9 @@ impl Template {
     /// The same from the text of a file that names no meshes.
     ///
     /// ```
-    /// use catoptric_files::template::Template;
+    /// use catoptric_files::parametric::ParametricScene;
     /// let text = include_str!("../../../scenes/prototype-parametric.toml");
-    /// let template = Template::parse(text, "prototype-parametric.toml", &[])?;
+    /// let template = ParametricScene::parse(text, "prototype-parametric.toml", &[])?;
     /// let narrower = template.with(&[("gap_deg", 1.0)]).expect("it is within its limits");
     /// assert_eq!(narrower.parameters["second_deg"].value, 78.0);
     /// assert!(template.with(&[("gap_deg", 9.0)]).is_err());
@@ -62,6 +62,14 @@ impl Template {
     pub fn parse(text: &str, file_name: &str, sets: &[String]) -> Result<Self, SceneErrors> {
         let scene = scene::parse(text, file_name, sets)?;
         Self::new(text.to_owned(), file_name, sets, scene)
+    }
+
+    /// The same from a scene that has been read from this text with these settings.
+    ///
+    /// # Errors
+    /// None where the scene is what the text comes to.
+    pub fn of(text: &str, name: &str, sets: &[String], scene: &Scene) -> Result<Self, SceneErrors> {
+        Self::new(text.to_owned(), name, sets, scene.clone())
     }
 
     fn new(text: String, name: &str, sets: &[String], scene: Scene) -> Result<Self, SceneErrors> {

@@ -43,9 +43,9 @@ pub enum SceneErrors {
     },
 }
 
-/// Published layouts that are built in.
+/// Built-in scenes to start from, each around a published mirror layout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Layout {
+pub enum Template {
     /// Eight facets around the scanner, after Cooper's Figure 5.
     Prototype,
     /// Two mirrors beside a 270° scanner.
@@ -56,18 +56,28 @@ pub enum Layout {
     Altimeter,
 }
 
-impl Layout {
+impl Template {
     /// All of them.
     pub const ALL: [Self; 4] = [Self::Prototype, Self::TwoMirror, Self::Pyramid, Self::Altimeter];
-}
 
-/// A commented scene to start from.
-pub fn scene_template(layout: Layout) -> &'static str {
-    match layout {
-        Layout::Prototype => include_str!("../../../scenes/prototype.toml"),
-        Layout::TwoMirror => include_str!("../../../scenes/two-mirror.toml"),
-        Layout::Pyramid => include_str!("../../../scenes/gallery/pyramid.toml"),
-        Layout::Altimeter => include_str!("../../../scenes/gallery/altimeter.toml"),
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Prototype => "prototype",
+            Self::TwoMirror => "two-mirror",
+            Self::Pyramid => "pyramid",
+            Self::Altimeter => "altimeter",
+        }
+    }
+
+    /// The commented scene, as TOML.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Prototype => include_str!("../../../scenes/prototype.toml"),
+            Self::TwoMirror => include_str!("../../../scenes/two-mirror.toml"),
+            Self::Pyramid => include_str!("../../../scenes/gallery/pyramid.toml"),
+            Self::Altimeter => include_str!("../../../scenes/gallery/altimeter.toml"),
+        }
     }
 }
 
@@ -76,6 +86,14 @@ pub fn scene_template(layout: Layout) -> &'static str {
 /// # Errors
 /// [`SceneErrors`]: a file cannot be read, or everything that is wrong with it.
 pub fn load(path: &Path, sets: &[String]) -> Result<Scene, SceneErrors> {
+    Ok(load_text(path, sets)?.1)
+}
+
+/// As [`load`], with the text of the file.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_text(path: &Path, sets: &[String]) -> Result<(String, Scene), SceneErrors> {
     let bytes = std::fs::read(path).map_err(|source| SceneErrors::Read {
         help: similar_file(path, &source),
         path: path.to_owned(),
@@ -84,25 +102,8 @@ pub fn load(path: &Path, sets: &[String]) -> Result<Scene, SceneErrors> {
     let name = path.display().to_string();
     match String::from_utf8(bytes) {
         Ok(text) => {
-            let mut scene = parse(&text, &name, sets)?;
-            read_meshes(&mut scene, parent(path))?;
-            let problems = if scene.meshes.0.is_empty() {
-                Vec::new()
-            } else {
-                // A body that is a mesh is not looked at without it.
-                check::problems(&scene)
-            };
-            let keyed = problems.into_iter().map(|p| Diagnostic {
-                place: Place::Key(p.path.to_string()),
-                message: p.message,
-                help: p.help,
-            });
-            let keyed: Vec<Diagnostic> = keyed.collect();
-            if keyed.is_empty() {
-                Ok(scene)
-            } else {
-                Err(invalid(&name, &text, keyed))
-            }
+            let scene = parse_in(&text, &name, parent(path), sets)?;
+            Ok((text, scene))
         }
         Err(error) => {
             let valid = error.utf8_error().valid_up_to();
@@ -118,6 +119,30 @@ pub fn load(path: &Path, sets: &[String]) -> Result<Scene, SceneErrors> {
                 }],
             ))
         }
+    }
+}
+
+/// Reads a scene from text, and the meshes that it names from a folder.
+///
+/// # Errors
+/// As [`load`].
+pub fn parse_in(text: &str, file_name: &str, folder: &Path, sets: &[String]) -> Result<Scene, SceneErrors> {
+    let mut scene = parse(text, file_name, sets)?;
+    read_meshes(&mut scene, folder)?;
+    if scene.meshes.0.is_empty() {
+        return Ok(scene);
+    }
+    // A body that is a mesh is not looked at without it.
+    let keyed = check::problems(&scene).into_iter().map(|p| Diagnostic {
+        place: Place::Key(p.path.to_string()),
+        message: p.message,
+        help: p.help,
+    });
+    let keyed: Vec<Diagnostic> = keyed.collect();
+    if keyed.is_empty() {
+        Ok(scene)
+    } else {
+        Err(invalid(file_name, text, keyed))
     }
 }
 

@@ -44,6 +44,7 @@ pub mod paper;
 pub mod place;
 pub mod range;
 pub mod session;
+pub mod stop;
 pub mod summary;
 pub mod tracking;
 
@@ -62,5 +63,6 @@ pub use mirror::MirrorPlane;
 pub use motion::Motion;
 pub use range::{CorrectedRange, RawRange};
 pub use session::Session;
+pub use stop::{Stop, Stopped};
 pub use summary::{Summary, Window};
 pub use tracking::{Track, TrackedFrame, Watched};

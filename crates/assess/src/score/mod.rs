@@ -72,8 +72,9 @@ pub const DISHONEST_NEES: f64 = 6.0;
 /// Distances behind the mirror at which point errors are given, in metres.
 pub const POINT_RANGES_M: [f64; 3] = [1.0, 4.0, 10.0];
 
-/// Scores a calibration against the truth; without one, against boards and walls only.
-pub fn score(dataset: &Dataset, calibration: &Calibration, truth: Option<&Truth>) -> Score {
+/// Scores a calibration against the truth, `&truth`; without one, `None`, against boards and walls only.
+pub fn score<'t>(dataset: &Dataset, calibration: &Calibration, truth: impl Into<Option<&'t Truth>>) -> Score {
+    let truth = truth.into();
     let knowable = truth.map(|truth| knowable(dataset, truth));
     score_by(dataset, calibration, truth.zip(knowable.as_ref()))
 }

@@ -27,35 +27,46 @@
 //! ```
 
 mod elements;
+mod error;
+pub mod folder;
+mod grid;
 mod merge;
 mod oracle;
+mod part;
+mod plan;
 #[cfg(feature = "recording")]
 mod program;
 mod run;
+mod shards;
 mod spread;
 mod statistics;
 mod summary;
 mod table;
 
 pub use elements::{ELEMENTS_HEADER, ElementAngles, elements_from_csv, elements_to_csv};
+pub use error::StudyError;
+pub use grid::{Axis, grid};
 pub use merge::{in_order, merge};
 pub use oracle::Oracle;
+pub use part::Part;
+pub use plan::Plan;
 #[cfg(feature = "recording")]
 pub use program::Program;
 #[cfg(feature = "testing")]
 pub(crate) use run::drawn;
 pub use run::{Run, run, run_with_elements};
+pub use shards::gather;
 pub use spread::{Spread, spread, spread_to_csv};
 #[cfg(feature = "testing")]
 pub(crate) use statistics::{mean_bounds, share_bounds};
 pub use summary::{MethodSummary, Summary, summarize};
 pub use table::{HEADER, from_csv, to_csv};
 
-use catoptric_calib::{Calibrator, Method};
+use catoptric_calib::{CalibError, Calibrator, Method};
+use catoptric_model::Stop;
 use catoptric_sim::Scene;
 use std::fmt;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 /// Version of `study.json`.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -101,7 +112,7 @@ pub struct Study {
     /// Who calibrates each experiment.
     pub contestants: Vec<Contestant>,
     /// Once it is set, programs under way are ended; what they were at is then no result.
-    pub stop: Arc<AtomicBool>,
+    pub stop: Stop,
 }
 
 /// One experiment: a cell and a seed.
@@ -114,6 +125,17 @@ pub struct Job {
 }
 
 impl Contestant {
+    /// One of our methods, or "oracle", by its name.
+    ///
+    /// # Errors
+    /// [`CalibError::UnknownMethod`] lists the names.
+    pub fn named(name: &str) -> Result<Self, CalibError> {
+        match name {
+            "oracle" => Ok(Self::Oracle),
+            method => Ok(Self::Method(method.parse()?)),
+        }
+    }
+
     /// What tables call it.
     pub fn name(&self) -> String {
         match self {
@@ -137,7 +159,7 @@ impl Study {
             }],
             seeds,
             contestants,
-            stop: Arc::default(),
+            stop: Stop::default(),
         }
     }
 
@@ -147,8 +169,8 @@ impl Study {
         (0..self.cells.len()).flat_map(move |cell| (1..=seeds).map(move |seed| Job { cell, seed }))
     }
 
-    /// The experiments of one of several parts, `part` from 1 on: every `parts`-th, so that all parts take about as long.
-    pub fn jobs_of_part(&self, [part, parts]: [usize; 2]) -> Vec<Job> {
+    /// The experiments of a part: every `parts`-th, so that all parts take about as long.
+    pub fn jobs_of_part(&self, Part { part, parts }: Part) -> Vec<Job> {
         self.jobs()
             .skip(part.saturating_sub(1))
             .step_by(parts.max(1))

@@ -2,12 +2,11 @@
 
 use crate::validate::{Severity, validate};
 use catoptric_files::{dataset::DatasetWriter, manifest::Provenance};
-use catoptric_model::Calibration;
+use catoptric_model::{Calibration, Stop};
 use catoptric_sim::{Laboratory, noise};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Characters of a program's own words that are passed on.
@@ -47,7 +46,7 @@ impl Program {
     /// # Errors
     /// In words, which do not depend on where the folder was: the program cannot be started, fails, hangs, or what it writes
     /// is no sane calibration.
-    pub fn calibrate(&self, laboratory: &Laboratory, stop: &AtomicBool) -> Result<Calibration, String> {
+    pub fn calibrate(&self, laboratory: &Laboratory, stop: &Stop) -> Result<Calibration, String> {
         let folder = tempfile::tempdir().map_err(|e| format!("no folder can be made for it: {e}"))?;
         self.calibrate_in(folder.path(), laboratory, stop)
             .map_err(|words| shortened(&anywhere(folder.path(), words)))
@@ -57,7 +56,7 @@ impl Program {
         &self,
         folder: &Path,
         laboratory: &Laboratory,
-        stop: &AtomicBool,
+        stop: &Stop,
     ) -> Result<Calibration, String> {
         let (dataset, out) = (folder.join("dataset"), folder.join("calibration.json"));
         record(laboratory, &dataset).map_err(|e| format!("its dataset cannot be written: {e}"))?;
@@ -90,7 +89,7 @@ impl Program {
         words
     }
 
-    fn run(&self, dataset: &Path, out: &Path, stop: &AtomicBool) -> Result<(), String> {
+    fn run(&self, dataset: &Path, out: &Path, stop: &Stop) -> Result<(), String> {
         let words = self.words(dataset, out);
         let said = tempfile::tempfile().map_err(|e| e.to_string())?;
         let errors = said.try_clone().map_err(|e| e.to_string())?;
@@ -105,7 +104,7 @@ impl Program {
         let status = loop {
             match child.try_wait() {
                 Ok(Some(status)) => break status,
-                Ok(None) if stop.load(Ordering::SeqCst) => {
+                Ok(None) if stop.is_requested() => {
                     end(&mut child);
                     return Err("it was stopped".to_owned());
                 }

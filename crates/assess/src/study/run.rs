@@ -5,10 +5,9 @@ use super::{Contestant, ElementAngles, Job, Study};
 use crate::score::{ElementError, Knowable, knowable, score_by};
 use catoptric_calib::Calibrator;
 use catoptric_model::bias::DistanceBias;
-use catoptric_model::{Calibration, Dataset, Deflection, RangeBias};
+use catoptric_model::{Calibration, Dataset, Deflection, RangeBias, Stop};
 use catoptric_sim::truth::BeamClass;
 use catoptric_sim::{Laboratory, SimError, Truth};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// What one contestant made of one experiment. Angles are in radians; figures that do not exist are NaN.
@@ -99,11 +98,9 @@ impl Experiment {
         })
     }
 
-    fn calibrate(&self, contestant: &Contestant, stop: &AtomicBool) -> Result<Calibration, String> {
+    fn calibrate(&self, contestant: &Contestant, stop: &Stop) -> Result<Calibration, String> {
         let words = |e: catoptric_calib::CalibError| e.to_string();
-        if stop.load(Ordering::SeqCst) {
-            return Err("stopped".to_owned());
-        }
+        stop.check().map_err(|e| e.to_string())?;
         match contestant {
             Contestant::Method(method) => Calibrator::calibrate(method, &self.dataset).map_err(words),
             Contestant::Uncorrected(method) => {

@@ -3,7 +3,7 @@
 //! Every number is a simple one plus a whole number of steps, so that it is round and shrinks to the simple one; every
 //! choice shrinks to its first.
 
-use catoptric_files::scene::{Layout, scene_template};
+use catoptric_files::scene::Template;
 use catoptric_sim::scene::{
     BeamShape, Board, ErrorModel, Experiment, Facet, FacetShape, Limits, Mocap, MocapProfile, Preset, Room,
     Scanner, Wedge,
@@ -22,7 +22,7 @@ fn around(simple: f64, step: f64, steps: RangeInclusive<i32>) -> impl Strategy<V
 
 /// The scene that everything is put into.
 fn base() -> Scene {
-    let parsed = toml::from_str(scene_template(Layout::Prototype));
+    let parsed = toml::from_str(Template::Prototype.text());
     parsed.expect("the built-in scene is one")
 }
 

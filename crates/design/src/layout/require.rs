@@ -57,6 +57,16 @@ const SIGNS: [(&str, Comparison); 4] = [
     ("<", Comparison::Below),
 ];
 
+impl RequirementError {
+    /// What to do about it, where that is known.
+    pub fn help(&self) -> Option<String> {
+        match self {
+            Self::Form { .. } => None,
+            Self::Unknown { help, .. } => Some(help.clone()),
+        }
+    }
+}
+
 impl Requirement {
     /// Reads a requirement.
     ///

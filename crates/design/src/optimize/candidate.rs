@@ -3,7 +3,7 @@
 use super::goal::{Goal, requires_accuracy};
 use super::{Open, OptimizeError, Options};
 use crate::layout::{self, Analysis, Layout};
-use catoptric_files::template::Template;
+use catoptric_files::parametric::ParametricScene;
 use catoptric_sim::Scene;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -59,7 +59,7 @@ impl Candidate {
 
 /// What looks at candidates.
 pub(super) struct Judge<'a> {
-    template: &'a Template,
+    template: &'a ParametricScene,
     parameters: &'a [Open],
     options: &'a Options,
     accuracy: bool,
@@ -70,7 +70,7 @@ pub(super) struct Judge<'a> {
 impl<'a> Judge<'a> {
     /// Checks that goals and requirements are about something.
     pub(super) fn new(
-        template: &'a Template,
+        template: &'a ParametricScene,
         parameters: &'a [Open],
         options: &'a Options,
     ) -> Result<Self, OptimizeError> {

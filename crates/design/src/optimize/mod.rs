@@ -30,7 +30,7 @@ pub use goal::{Better, Goal, GoalError, Wanted};
 
 use crate::layout::{Detail, Requirement, RequirementError};
 use candidate::Judge;
-use catoptric_files::template::Template;
+use catoptric_files::parametric::ParametricScene;
 use catoptric_sim::SimError;
 use search::Search;
 use serde::Serialize;
@@ -74,6 +74,23 @@ pub enum OptimizeError {
     /// The swarm stopped for a reason of its own.
     #[error("the search ended early: {0}")]
     Search(String),
+}
+
+impl OptimizeError {
+    /// What to do about it, where that is known.
+    pub fn help(&self) -> Option<String> {
+        match self {
+            Self::Goal(GoalError::Unknown { help, .. } | GoalError::Figure { help, .. }) => {
+                Some(help.clone())
+            }
+            Self::Requirement(error) => error.help(),
+            Self::Goal(GoalError::Direction { .. } | GoalError::Directions)
+            | Self::NothingOpen
+            | Self::NoGoal
+            | Self::Setup(_)
+            | Self::Search(_) => None,
+        }
+    }
 }
 
 /// A parameter that was open.
@@ -146,13 +163,13 @@ pub struct Progress {
 /// Searches; `watch` is told of every batch and stops the search by returning `false`.
 ///
 /// ```
-/// use catoptric_files::template::Template;
+/// use catoptric_files::parametric::ParametricScene;
 /// use catoptric_design::layout::Detail;
 /// use catoptric_design::optimize::{Goal, Options, optimize};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let text = include_str!("../../../../scenes/prototype-parametric.toml");
-/// let template = Template::parse(text, "prototype-parametric.toml", &[])?;
+/// let template = ParametricScene::parse(text, "prototype-parametric.toml", &[])?;
 /// let options = Options {
 ///     goals: vec![Goal::parse("field_of_regard", &[])?, Goal::parse("size", &[])?],
 ///     requirements: Vec::new(),
@@ -169,7 +186,7 @@ pub struct Progress {
 /// # Errors
 /// [`OptimizeError`]: nothing to choose or to look for, or goals and requirements that no layout has.
 pub fn optimize(
-    template: &Template,
+    template: &ParametricScene,
     options: &Options,
     watch: &mut dyn FnMut(Progress) -> bool,
 ) -> Result<Optimum, OptimizeError> {

@@ -3,13 +3,14 @@
 //! A stretch is opened once: what its sensor sees while nothing moves is traced then. Its excerpts are drawn and recorded
 //! side by side, linked in order between the two, and encoded on the thread that recorded them.
 
-use super::error::CliError;
-use super::truth_tables::{ReturnRows, rows_of_readings};
-use catoptric::files::recording::{Encoded, RecordingEncoder};
-use catoptric::model::Pose;
-use catoptric::sim::laboratory::{Drawn, Memory, Returns, Sight};
-use catoptric::sim::reading::Return;
-use catoptric::sim::{Laboratory, SimError};
+use super::tables::{ReturnRows, rows_of_readings};
+use crate::Error;
+use catoptric_files::recording::{Encoded, RecordingEncoder};
+use catoptric_model::Pose;
+use catoptric_model::Stop;
+use catoptric_sim::laboratory::{Drawn, Memory, Returns, Sight};
+use catoptric_sim::reading::Return;
+use catoptric_sim::{Laboratory, SimError};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
@@ -23,17 +24,18 @@ const PER_THREAD: usize = 2;
 
 /// A table of the truth that is written row by row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Table {
+pub(crate) enum Table {
     Returns,
     Readings,
     SubRays,
 }
 
 /// The excerpts of a recording, in order.
-pub(super) struct Stream<'a> {
+pub(crate) struct Stream<'a> {
     laboratory: &'a Laboratory,
     encoder: &'a RecordingEncoder,
     tables: Vec<Table>,
+    stop: &'a Stop,
     /// The next excerpt: stretch and scan.
     next: (usize, usize),
     /// The stretch that the last excerpt was of.
@@ -51,27 +53,33 @@ struct Open<'a> {
 }
 
 /// An excerpt as it is to be written.
-pub(super) struct Made<'a> {
+pub(crate) struct Made<'a> {
     open: Arc<Open<'a>>,
-    pub(super) number: usize,
-    pub(super) scans: Range<usize>,
-    pub(super) encoded: Encoded,
+    pub(crate) number: usize,
+    pub(crate) scans: Range<usize>,
+    pub(crate) encoded: Encoded,
     /// Rows of the tables that are wanted, but those of sub-rays.
-    pub(super) texts: Vec<String>,
+    pub(crate) texts: Vec<String>,
     /// Straight pieces of the beams that were traced for it.
-    pub(super) segments: usize,
-    pub(super) trace: Duration,
-    pub(super) sample: Duration,
-    pub(super) encode: Duration,
+    pub(crate) segments: usize,
+    pub(crate) trace: Duration,
+    pub(crate) sample: Duration,
+    pub(crate) encode: Duration,
 }
 
 impl<'a> Stream<'a> {
     /// The excerpts of a recording with the rows of some tables.
-    pub(super) fn new(laboratory: &'a Laboratory, encoder: &'a RecordingEncoder, tables: Vec<Table>) -> Self {
+    pub(crate) fn new(
+        laboratory: &'a Laboratory,
+        encoder: &'a RecordingEncoder,
+        tables: Vec<Table>,
+        stop: &'a Stop,
+    ) -> Self {
         Self {
             laboratory,
             encoder,
             tables,
+            stop,
             next: (0, 0),
             open: None,
             memory: Memory::default(),
@@ -79,7 +87,7 @@ impl<'a> Stream<'a> {
     }
 
     /// The next excerpts, as many as keep so many threads at work; none after the last.
-    pub(super) fn next(&mut self, threads: usize) -> Result<Vec<Made<'a>>, CliError> {
+    pub(crate) fn next(&mut self, threads: usize) -> Result<Vec<Made<'a>>, Error> {
         let laboratory = self.laboratory;
         let excerpts: Vec<_> = std::iter::from_fn(|| self.step())
             .take(PER_THREAD * threads)
@@ -137,7 +145,7 @@ impl<'a> Stream<'a> {
         Some((number, scan..end))
     }
 
-    fn make(&self, open: Arc<Open<'a>>, drawn: &Drawn) -> Result<Made<'a>, CliError> {
+    fn make(&self, open: Arc<Open<'a>>, drawn: &Drawn) -> Result<Made<'a>, Error> {
         let (laboratory, number, scans) = (self.laboratory, drawn.number(), drawn.scans());
         let wanted = |table| self.tables.contains(&table);
         let moves = open.sight.moves();
@@ -153,6 +161,7 @@ impl<'a> Stream<'a> {
         let mut flown = Returns::new();
         let mut clock = Clock::new();
         for scan in scans.clone() {
+            self.stop.check()?;
             let seen = match open.seen.iter().rfind(|(from, _)| *from <= scan) {
                 Some((_, seen)) => seen,
                 None => {
@@ -238,7 +247,7 @@ impl<'a> Open<'a> {
 
 impl<'a> Made<'a> {
     /// What the sensor sees during the stretch.
-    pub(super) fn sight(&self) -> &Sight<'a> {
+    pub(crate) fn sight(&self) -> &Sight<'a> {
         &self.open.sight
     }
 }

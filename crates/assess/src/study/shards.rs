@@ -1,18 +1,19 @@
-//! `catoptric study merge`: the shards of a study, put together.
+//! The shards of a study, put together.
 
+use super::folder::{Found, Tables};
 use super::plan::Plan;
-use super::results::{self, Found, Tables};
-use super::{MergeArguments, invalid};
-use crate::cli::error::CliError;
-use crate::cli::output::counted;
-use std::path::Path;
+use super::{Part, Study, StudyError};
+use std::path::{Path, PathBuf};
 
-pub(super) fn merge(arguments: &MergeArguments) -> Result<(), CliError> {
-    let plans = arguments
-        .shards
+/// The plan, the study and all runs of the shards in some folders.
+///
+/// # Errors
+/// [`StudyError`] if they are not all the shards of one study, or one of them is not finished.
+pub fn gather(folders: &[PathBuf]) -> Result<(Plan, Study, Found), StudyError> {
+    let plans = folders
         .iter()
         .map(|folder| Ok((folder.as_path(), Plan::read(folder)?)))
-        .collect::<Result<Vec<_>, CliError>>()?;
+        .collect::<Result<Vec<_>, StudyError>>()?;
     let whole = one_study(&plans)?;
     let study = whole.study()?;
     let mut found = Found::default();
@@ -22,13 +23,13 @@ pub(super) fn merge(arguments: &MergeArguments) -> Result<(), CliError> {
     for (folder, plan) in &plans {
         let tables = Tables::of(folder);
         if !tables.runs.exists() {
-            return Err(invalid(
+            return Err(StudyError::invalid(
                 format!("{} is not finished", folder.display()),
                 "the command that began it goes on with it",
             ));
         }
         if with_elements && !tables.elements.exists() {
-            return Err(invalid(
+            return Err(StudyError::invalid(
                 format!(
                     "{} has no list of elements, and other shards have",
                     folder.display()
@@ -39,28 +40,26 @@ pub(super) fn merge(arguments: &MergeArguments) -> Result<(), CliError> {
         found.extend(tables.read(&study, &study.jobs_of_part(plan.shard))?);
     }
     found.sort(&study)?;
-    whole.claim(&arguments.out)?;
-    let summary = results::write(&study, &found, &whole, &arguments.out)?;
-    results::tell(&summary, &arguments.out, arguments.json)
+    Ok((whole, study, found))
 }
 
 /// The plan of the whole, if these are all its parts.
-fn one_study(plans: &[(&Path, Plan)]) -> Result<Plan, CliError> {
+fn one_study(plans: &[(&Path, Plan)]) -> Result<Plan, StudyError> {
     let Some((first, plan)) = plans.first() else {
-        return Err(invalid(
+        return Err(StudyError::invalid(
             "no shard is given".to_owned(),
             "catoptric study merge part-1 part-2 --out whole",
         ));
     };
     let mut whole = plan.clone();
-    whole.shard = [1, 1];
+    whole.shard = Part::WHOLE;
     let mut seen: Vec<usize> = Vec::new();
     for (folder, plan) in plans {
-        let [part, parts] = plan.shard;
+        let Part { part, parts } = plan.shard;
         let mut alike = plan.clone();
-        alike.shard = [1, 1];
+        alike.shard = Part::WHOLE;
         if alike != whole {
-            return Err(invalid(
+            return Err(StudyError::invalid(
                 format!(
                     "{} is a part of another study than {}: {}",
                     folder.display(),
@@ -71,7 +70,7 @@ fn one_study(plans: &[(&Path, Plan)]) -> Result<Plan, CliError> {
             ));
         }
         if seen.contains(&part) {
-            return Err(invalid(
+            return Err(StudyError::invalid(
                 format!(
                     "shard {part}/{parts} is given twice, the second time as {}",
                     folder.display()
@@ -80,12 +79,11 @@ fn one_study(plans: &[(&Path, Plan)]) -> Result<Plan, CliError> {
             ));
         }
         if parts != plans.len() {
-            return Err(invalid(
+            return Err(StudyError::invalid(
                 format!(
-                    "{} is one of {}, and {} given",
+                    "{} is one of {parts} shards, and {} folders are given",
                     folder.display(),
-                    counted(parts, "shard"),
-                    counted(plans.len(), "folder")
+                    plans.len()
                 ),
                 "give every shard once",
             ));

@@ -1,32 +1,34 @@
 //! What was asked for, in the folder of the study: what makes two folders parts of one study.
 
-use super::invalid;
-use crate::cli::error::CliError;
-use catoptric::files::{self, scene};
-use catoptric::study::{Cell, Contestant, Program, SCHEMA_VERSION, Study};
+#[cfg(feature = "recording")]
+use super::Program;
+use super::{Cell, Contestant, Part, SCHEMA_VERSION, Study, StudyError};
+use catoptric_files::scene::{self, Template};
+use catoptric_files::{IoError, file, read_json, write_json};
+use catoptric_model::Stop;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use std::sync::Arc;
 
 const FILE: &str = "plan.json";
 
 /// A study and a part of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Plan {
+pub struct Plan {
     schema_version: u32,
     version: String,
     /// Name of the scene.
-    pub(super) name: String,
+    pub name: String,
     /// Every cell's values and the SHA-256 of its scene.
     cells: Vec<PlannedCell>,
     seeds: u64,
     contestants: Vec<String>,
     /// Those of the contestants that are programs.
+    #[cfg(feature = "recording")]
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     programs: Vec<Program>,
     /// Which part of how many.
-    pub(super) shard: [usize; 2],
+    pub shard: Part,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -38,14 +40,17 @@ struct PlannedCell {
 
 impl Plan {
     /// The plan of a part of a study.
-    pub(super) fn of(study: &Study, shard: [usize; 2]) -> Result<Self, CliError> {
+    pub fn of(study: &Study, shard: Part) -> Result<Self, StudyError> {
         let cells = study.cells.iter().map(|cell| {
-            let text = scene::to_toml(&cell.scene).map_err(|e| CliError::Output(std::io::Error::other(e)))?;
+            let text = scene::to_toml(&cell.scene).map_err(|e| {
+                StudyError::invalid(format!("the scene cannot be written: {e}"), "see `schema`")
+            })?;
             Ok(PlannedCell {
                 values: cell.values.clone(),
-                scene_sha256: files::file::sha256(text.as_bytes()),
+                scene_sha256: file::sha256(text.as_bytes()),
             })
         });
+        #[cfg(feature = "recording")]
         let program = |contestant: &Contestant| match contestant {
             Contestant::Program(program) => Some(program.clone()),
             _ => None,
@@ -57,48 +62,45 @@ impl Plan {
                 .cells
                 .first()
                 .map_or(String::new(), |c| c.scene.name.clone()),
-            cells: cells.collect::<Result<_, CliError>>()?,
+            cells: cells.collect::<Result<_, StudyError>>()?,
             seeds: study.seeds,
             contestants: study.contestants.iter().map(Contestant::name).collect(),
+            #[cfg(feature = "recording")]
             programs: study.contestants.iter().filter_map(program).collect(),
             shard,
         })
     }
 
     /// The plan of a folder.
-    pub(super) fn read(folder: &Path) -> Result<Self, CliError> {
-        Ok(files::read_json(folder.join(FILE))?)
+    pub fn read(folder: &Path) -> Result<Self, StudyError> {
+        Ok(read_json(folder.join(FILE))?)
     }
 
     /// Takes a folder that is new, or of the very same study.
-    pub(super) fn claim(&self, out: &Path) -> Result<(), CliError> {
+    pub fn claim(&self, out: &Path) -> Result<(), StudyError> {
         if out.join(FILE).exists() {
             let there = Self::read(out)?;
             if there == *self {
                 return Ok(());
             }
             let what = there.difference(self);
-            return Err(invalid(
+            return Err(StudyError::invalid(
                 format!("{} holds another study: {what}", out.display()),
                 "give another --out, or the same arguments to go on with it",
             ));
         }
         if out.read_dir().is_ok_and(|mut entries| entries.next().is_some()) {
-            return Err(invalid(
+            return Err(StudyError::invalid(
                 format!("{} is not empty and holds no study", out.display()),
                 "give another --out",
             ));
         }
-        std::fs::create_dir_all(out).map_err(|source| CliError::Write {
-            path: out.to_owned(),
-            source,
-        })?;
-        Ok(files::write_json(out.join(FILE), self)?)
+        std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
+        Ok(write_json(out.join(FILE), self)?)
     }
 
     /// What of another plan is not as here, in words.
-    pub(super) fn difference(&self, wanted: &Self) -> String {
-        let shard = |[part, parts]: [usize; 2]| format!("{part}/{parts}");
+    pub fn difference(&self, wanted: &Self) -> String {
         if self.version != wanted.version {
             format!(
                 "it was begun by version {}, this is {}",
@@ -109,10 +111,10 @@ impl Plan {
         } else if self.contestants != wanted.contestants {
             let names = |plan: &Self| plan.contestants.join(",");
             format!("methods {}, {} asked for", names(self), names(wanted))
-        } else if self.programs != wanted.programs {
+        } else if self.programs_differ(wanted) {
             "a program's command or its time differs".to_owned()
         } else if self.shard != wanted.shard {
-            format!("shard {}, {} asked for", shard(self.shard), shard(wanted.shard))
+            format!("shard {}, {} asked for", self.shard, wanted.shard)
         } else if self.cells.len() == wanted.cells.len()
             && self
                 .cells
@@ -127,13 +129,10 @@ impl Plan {
     }
 
     /// The study as far as names and values go; its scenes are not needed any more.
-    pub(super) fn study(&self) -> Result<Study, CliError> {
-        let scene = scene::parse(
-            scene::scene_template(scene::Layout::Prototype),
-            "prototype.toml",
-            &[],
-        )?;
+    pub fn study(&self) -> Result<Study, StudyError> {
+        let scene = scene::parse(Template::Prototype.text(), "prototype.toml", &[])?;
         let contestant = |name: &String| {
+            #[cfg(feature = "recording")]
             if let Some(program) = self.programs.iter().find(|p| p.name == *name) {
                 return Ok(Contestant::Program(program.clone()));
             }
@@ -143,7 +142,7 @@ impl Plan {
             match (name.parse(), name.strip_suffix(" uncorrected").map(str::parse)) {
                 (Ok(method), _) => Ok(Contestant::Method(method)),
                 (_, Some(Ok(method))) => Ok(Contestant::Uncorrected(method)),
-                _ => Err(invalid(
+                _ => Err(StudyError::invalid(
                     format!("{FILE}: {name:?} is no method of ours and no program of the plan"),
                     "a plan is written by `catoptric study`; do the study again",
                 )),
@@ -164,7 +163,17 @@ impl Plan {
                 .iter()
                 .map(contestant)
                 .collect::<Result<_, _>>()?,
-            stop: Arc::default(),
+            stop: Stop::default(),
         })
+    }
+
+    #[cfg(feature = "recording")]
+    fn programs_differ(&self, other: &Self) -> bool {
+        self.programs != other.programs
+    }
+
+    #[cfg(not(feature = "recording"))]
+    fn programs_differ(&self, _: &Self) -> bool {
+        false
     }
 }

@@ -1,20 +1,20 @@
 //! The tables of the truth: what every beam met, and every error of every reading.
 
-use super::error::CliError;
-use catoptric::sim::laboratory::Returns;
-use catoptric::sim::optics::Role;
-use catoptric::sim::reading::{Chance, Return};
-use catoptric::sim::scene::ErrorModel;
-use catoptric::sim::{Laboratory, Scene};
+use crate::Error;
+use catoptric_sim::laboratory::Returns;
+use catoptric_sim::optics::Role;
+use catoptric_sim::reading::{Chance, Return};
+use catoptric_sim::scene::ErrorModel;
+use catoptric_sim::{Laboratory, Scene};
 use std::fmt::Write as _;
 
 /// Takes rows on.
-pub(crate) type Tell<'a> = &'a mut dyn FnMut(&str) -> Result<(), CliError>;
+pub(crate) type Tell<'a> = &'a mut dyn FnMut(&str) -> Result<(), Error>;
 
 /// First line of truth/returns.csv. A reading is geometric + mixed + detection + the three biases, then what
 /// truth/readings.csv lists, rounded; a beam without an echo has no row, one with several has one for each. `scan` is
 /// empty where nothing moves and the row holds for every scan; the incidence on the facets is joined as they are.
-pub(super) const RETURNS_HEADER: &str = "pose,beam,surface,facets,geometric_m,cos_incidence,power_w,share,mixed_m,detection_m,\
+pub(crate) const RETURNS_HEADER: &str = "pose,beam,surface,facets,geometric_m,cos_incidence,power_w,share,mixed_m,detection_m,\
                               distance_bias_m,angle_bias_m,color_bias_m,noise_sd_m,echo,detection_probability,\
                               facet_cos_incidence,scan\n";
 
@@ -67,14 +67,14 @@ impl Column {
 }
 
 /// The rows of what every beam met, in order of the beams.
-pub(super) struct ReturnRows<'a> {
+pub(crate) struct ReturnRows<'a> {
     names: Vec<&'a str>,
     before_echo: [Column; 10],
     probability: Column,
 }
 
 impl<'a> ReturnRows<'a> {
-    pub(super) fn new(laboratory: &'a Laboratory) -> Self {
+    pub(crate) fn new(laboratory: &'a Laboratory) -> Self {
         Self {
             names: mirror_names(laboratory.scene()),
             before_echo: Default::default(),
@@ -83,7 +83,7 @@ impl<'a> ReturnRows<'a> {
     }
 
     /// Appends the rows of a scan; `scan` is empty where they hold for every scan.
-    pub(super) fn add(&mut self, pose: usize, returns: &Returns, scan: &str, text: &mut String) {
+    pub(crate) fn add(&mut self, pose: usize, returns: &Returns, scan: &str, text: &mut String) {
         for (beam, found) in returns.iter().enumerate() {
             for (echo, r) in found.iter().flat_map(Return::echoes).enumerate() {
                 // Writing to a string never fails.
@@ -117,11 +117,11 @@ impl<'a> ReturnRows<'a> {
 
 /// First line of truth/readings.csv. `echo` is the one of truth/returns.csv that was reported, empty where none was
 /// detected; a reading is that echo's range plus the six errors, rounded, unless `lost` is 1.
-pub(super) const READINGS_HEADER: &str =
+pub(crate) const READINGS_HEADER: &str =
     "pose,scan,beam,echo,lost,drift_m,warm_up_m,noise_m,correlated_m,interference_m,reading_m,element_m\n";
 
 /// The rows of a scan from what it saw, what was by chance in it, and what was read.
-pub(super) fn rows_of_readings(
+pub(crate) fn rows_of_readings(
     laboratory: &Laboratory,
     (pose, scan): (usize, usize),
     returns: &Returns,

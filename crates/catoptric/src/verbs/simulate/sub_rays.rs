@@ -1,12 +1,12 @@
 //! The table of the truth about every sub-ray: `truth/sub_rays.csv`.
 
-use super::error::CliError;
-use super::truth_tables::{Tell, field, mirror_names, role_name, way};
-use catoptric::model::beam;
-use catoptric::sim::Laboratory;
-use catoptric::sim::laboratory::Sight;
-use catoptric::sim::optics::Setting;
-use catoptric::sim::reading::{Stop, SubRayEnd, SubRayLight};
+use super::tables::{Tell, field, mirror_names, role_name, way};
+use crate::Error;
+use catoptric_model::beam;
+use catoptric_sim::Laboratory;
+use catoptric_sim::laboratory::Sight;
+use catoptric_sim::optics::Setting;
+use catoptric_sim::reading::{Stop, SubRayEnd, SubRayLight};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -25,7 +25,7 @@ pub(crate) fn rows(
     mut scans: Range<usize>,
     sight: &Sight<'_>,
     tell: Tell<'_>,
-) -> Result<(), CliError> {
+) -> Result<(), Error> {
     if !sight.moves() {
         return match scans.start {
             0 => rows_of_scan(laboratory, pose, sight, None, tell),
@@ -42,7 +42,7 @@ fn rows_of_scan(
     sight: &Sight<'_>,
     scan: Option<usize>,
     tell: Tell<'_>,
-) -> Result<(), CliError> {
+) -> Result<(), Error> {
     let setting = sight.setting();
     let mirrors = mirror_names(laboratory.scene());
     let names = setting.names();
