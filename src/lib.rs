@@ -40,6 +40,7 @@ pub mod validate;
 
 pub use apply::{CloudFrame, PointCloud, apply};
 pub use catoptric_calib as calib;
+pub use catoptric_cast as cast;
 pub use catoptric_model as model;
 pub use catoptric_sim as sim;
 pub use compare::{Comparison, Contestant, compare};

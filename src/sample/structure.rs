@@ -1,5 +1,6 @@
 //! Eight mirrors around a scanner, and what they do to each beam.
 
+use catoptric_cast::area_vector;
 use catoptric_model::{MirrorPlane, beam};
 use catoptric_sim::layout;
 use catoptric_sim::scene::{FacetShape, Wedge};
@@ -45,7 +46,7 @@ pub(super) fn mirrors() -> Vec<Mirror> {
             height_mm: 14.0,
         }))
         .expect("it is a mirror");
-        let normal = Unit::new_normalize(layout::area_vector(&corners));
+        let normal = Unit::new_normalize(area_vector(&corners));
         Mirror {
             name,
             plane: MirrorPlane::through(corners[0], normal),

@@ -5,10 +5,10 @@
 //! `physics` does.
 
 use crate::common::{VALID, folder_with, run, stderr, stdout};
+use catoptric::cast::{Polygon, Shape};
 use catoptric::io::scene as scenes;
 use catoptric::layout::{self, Analysis, Class, Detail};
 use catoptric::model::beam;
-use catoptric::sim::cast::{Polygon, Shape};
 use catoptric::sim::footprint::{self, SubRay};
 use catoptric::sim::optics::{Mirrors, Role, Setting, Target};
 use catoptric::sim::reading::Sensor;
