@@ -5,10 +5,10 @@
 //! (every triangle a polygon of a world, so many rays as one beam) and `parry` (in f64).
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
+use catoptric::cast::Mesh;
+use catoptric::cast::Ray;
+use catoptric::cast::{Contact, Met, Polygon, Rays, Shape, Triangles, World};
 use catoptric::model::Pose;
-use catoptric::sim::cast::{Contact, Met, Polygon, Rays, Shape, Triangles, World};
-use catoptric::sim::footprint::Ray;
-use catoptric::sim::mesh::Mesh;
 use nalgebra::{Point3, Unit, Vector3};
 use std::fs;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -8,9 +8,9 @@
 
 use crate::common::{folder_with, run, stderr};
 use crate::scenes::{BARE, scene};
+use catoptric::cast::{Polygon, Shape};
 use catoptric::files::scene as scene_file;
 use catoptric::model::{Stretch, beam};
-use catoptric::sim::cast::{Polygon, Shape};
 use catoptric::sim::optics::{self, Mirrors, Role, Setting};
 use catoptric::sim::reading::{Return, Sensor};
 use catoptric::sim::scene::{BeamShape, Detector, ErrorModel, Preset};

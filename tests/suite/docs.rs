@@ -4,7 +4,7 @@
 //! the sentences around it are true; the examples of the guide are run as doc tests.
 
 use crate::common::{run, stdout};
-use catoptric::files::scene::{self, Layout};
+use catoptric::files::scene::{self, Template};
 use catoptric::model::assessment::{Assessment, HeldOut, SharedParameter, VarianceComponent};
 use catoptric::model::calibration::{FacetEstimate, MountEstimate};
 use catoptric::model::{AngleTable, BeamEstimate, Calibration, RangeBias, Status};

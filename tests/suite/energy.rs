@@ -3,8 +3,8 @@
 //! This proves the accounts of energy, not where it goes: that is for `physics` and `tracing`.
 
 use crate::scenes::{BARE, scene};
+use catoptric::cast::{Polygon, Shape};
 use catoptric::model::beam;
-use catoptric::sim::cast::{Polygon, Shape};
 use catoptric::sim::noise::{Draws, Purpose};
 use catoptric::sim::optics::{Mirrors, Role, Setting, Target};
 use catoptric::sim::reading::{Return, Sensor, Stop, SubRayEnd};

@@ -3,12 +3,12 @@
 //! `tests/export_peers.py` opens the same files with readers that others wrote.
 
 use crate::common::{run, stderr, stdout};
+use catoptric::cast::volume;
 use catoptric::export::{self, Part, Solid};
 use catoptric::files::mesh::read_mesh;
 use catoptric::files::scene as scenes;
 use catoptric::layout::{Detail, Drawing, analyze};
 use catoptric::sim::Scene;
-use catoptric::sim::cast::volume;
 use std::collections::BTreeMap;
 use std::path::Path;
 

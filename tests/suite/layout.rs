@@ -5,10 +5,10 @@
 //! `physics` does.
 
 use crate::common::{VALID, folder_with, run, stderr, stdout};
+use catoptric::cast::{Polygon, Shape};
 use catoptric::files::scene as scenes;
 use catoptric::layout::{self, Analysis, Class, Detail};
 use catoptric::model::beam;
-use catoptric::sim::cast::{Polygon, Shape};
 use catoptric::sim::footprint::{self, SubRay};
 use catoptric::sim::optics::{Mirrors, Role, Setting, Target};
 use catoptric::sim::reading::Sensor;
@@ -84,7 +84,7 @@ fn assert_is_the_truth(scene: &Scene, analysis: &Analysis, name: &str) {
 fn classes_are_those_of_the_truth_in_every_scene() {
     let scenes = recordable();
     assert!(scenes.len() > 30, "{}", scenes.len());
-    for layout in scenes::Layout::ALL {
+    for layout in scenes::Template::ALL {
         let drawn = scenes::parse(layout.text(), "template.toml", &[]).unwrap();
         assert!(
             scenes.iter().any(|(_, scene)| *scene == drawn),

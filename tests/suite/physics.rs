@@ -4,10 +4,10 @@
 //! error tables are those of a real sensor; `paper` compares with those.
 
 use crate::scenes::{BARE, scene, set_board_ahead};
+use catoptric::cast::Ray;
+use catoptric::cast::{Polygon, Shape};
 use catoptric::model::{MirrorPlane, beam};
-use catoptric::sim::cast::{Polygon, Shape};
 use catoptric::sim::color;
-use catoptric::sim::footprint::Ray;
 use catoptric::sim::noise::{Draws, Purpose};
 use catoptric::sim::optics::{End, Mirrors, Path, Role, Setting, Target};
 use catoptric::sim::scene::{ErrorModel, Facet, FacetShape, PolygonShape};

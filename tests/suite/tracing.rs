@@ -4,9 +4,9 @@
 
 use crate::common::{catoptric, run, stderr, stdout};
 use crate::traps::{file, forward, path, ray, trap, way};
+use catoptric::cast::Ray;
 use catoptric::files::{mesh, npy, scene};
 use catoptric::model::beam;
-use catoptric::sim::footprint::Ray;
 use catoptric::sim::noise::{Draws, Purpose};
 use catoptric::sim::optics::Role;
 use catoptric::sim::scene::{Glass, PlanePolygon, PlaneRectangle, PlaneShape, RoomMirror};

@@ -4,9 +4,10 @@
 //! the physics to prove.
 
 use crate::common::{run, stderr};
+use catoptric::cast::Ray;
 use catoptric::files::scene;
 use catoptric::model::beam;
-use catoptric::sim::footprint::{Ray, SubRay, sub_rays};
+use catoptric::sim::footprint::{SubRay, sub_rays};
 use catoptric::sim::optics::Role;
 use catoptric::sim::reading::{Return, Stop};
 use catoptric::sim::scene::{BeamShape, Limits, Preset};

@@ -48,7 +48,7 @@
 //!
 //! # The rooms
 //!
-//! [`model`] is the vocabulary, [`sim`] the world, [`calib`] the estimator, [`files`] every file format; [`testing`]
+//! [`model`] is the vocabulary, [`cast`] rays against surfaces, [`sim`] the world, [`calib`] the estimator, [`files`] every file format; [`testing`]
 //! (feature `testing`) has property tests and gates for CI. The [`guide`] explains it chapter by chapter.
 #![cfg_attr(not(feature = "testing"), doc = "\n[`testing`]: https://docs.rs/catoptric")]
 
@@ -65,6 +65,7 @@ pub use catoptric_assess::{
 };
 pub use catoptric_calib as calib;
 pub use catoptric_calib::Method;
+pub use catoptric_cast as cast;
 #[cfg(feature = "design")]
 pub use catoptric_design::{export, layout, optimize, plan, tolerance};
 pub use catoptric_files as files;

@@ -3,7 +3,7 @@
 use super::error::IoError;
 use super::file::StagedOutput;
 use super::npy::{self, Float};
-use catoptric_sim::footprint::Ray;
+use catoptric_cast::Ray;
 use catoptric_sim::trace::{Fate, Vertex};
 use nalgebra::{Point3, Unit, Vector3};
 use std::fs::File;

@@ -1,7 +1,7 @@
 //! A board: its outline, its markers, and how it stands in the room.
 
-use crate::footprint::Ray;
 use crate::scene::{Board, Marker, Room, SensorTest};
+use catoptric_cast::Ray;
 use catoptric_model::frame::tangent_basis;
 use catoptric_model::{Pose, Rectangle, beam};
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};

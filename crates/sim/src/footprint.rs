@@ -11,6 +11,7 @@
 //! 256, 1024 and 4096 rays. Outside the contour the light is one ring up to 1056 rays, then two and three.
 
 use crate::scene::BeamShape;
+use catoptric_cast::Ray;
 use catoptric_model::beam;
 use nalgebra::{Point3, Unit, Vector3};
 
@@ -23,15 +24,6 @@ pub struct SubRay {
     pub narrow: f64,
     /// Share of the beam's energy.
     pub weight: f64,
-}
-
-/// A ray in the sensor frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Ray {
-    /// Where it starts.
-    pub origin: Point3<f64>,
-    /// Where it goes.
-    pub direction: Unit<Vector3<f64>>,
 }
 
 /// Energy of a Gaussian beam inside its 1/e² contour: 1 − e⁻².

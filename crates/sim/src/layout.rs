@@ -1,6 +1,7 @@
 //! From a facet as a person describes it to its corners in the nominal sensor frame.
 
 use crate::scene::{FacetShape, Plate, RectangleShape, Wedge};
+use catoptric_cast::area_vector;
 use catoptric_model::beam;
 use catoptric_model::mirror;
 use nalgebra::{Point3, Unit, Vector3};
@@ -102,12 +103,6 @@ pub(crate) fn rectangle(
         center + x + y,
         center - x + y,
     ])
-}
-
-/// Twice the vector area of a polygon (Newell): its direction is the normal seen counter-clockwise.
-pub fn area_vector(corners: &[Point3<f64>]) -> Vector3<f64> {
-    let closed = corners.iter().zip(corners.iter().cycle().skip(1));
-    closed.map(|(a, b)| a.coords.cross(&b.coords)).sum()
 }
 
 #[cfg(test)]

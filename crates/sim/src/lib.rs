@@ -1,7 +1,6 @@
 //! The virtual laboratory: a 2D LiDAR with mirrors, target boards and motion capture, simulated ray by ray.
 
 mod board;
-pub mod cast;
 pub mod check;
 pub mod color;
 pub mod detect;
@@ -12,7 +11,6 @@ pub mod glass;
 pub mod laboratory;
 mod lanes;
 pub mod layout;
-pub mod mesh;
 pub mod mocap;
 pub mod noise;
 pub mod optics;
@@ -31,8 +29,8 @@ pub mod trace;
 pub mod trajectory;
 pub mod truth;
 
+pub use catoptric_cast::Mesh;
 pub use error::SimError;
 pub use laboratory::Laboratory;
-pub use mesh::{Mesh, Meshes};
-pub use scene::Scene;
+pub use scene::{Meshes, Scene};
 pub use truth::Truth;

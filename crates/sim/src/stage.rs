@@ -3,11 +3,11 @@
 //! All of it is exactly where the scene puts it. It is seen by every ray that is cast into the room; the drawing of
 //! the structure, its beams and the truth about them know nothing of it.
 
-use crate::cast::{Block, Cylinder, Polygon, Shape};
 use crate::error::SimError;
 use crate::layout;
 use crate::scene::{PlaneRectangle, PlaneShape, RoomMirror, RoomSurface, Scene, SurfaceShape};
 use crate::structure::{BuiltFacet, Part, mesh_shape};
+use catoptric_cast::{Block, Cylinder, Polygon, Shape};
 use catoptric_model::Pose;
 use catoptric_model::frame::yaw_pitch_roll;
 use nalgebra::{Point3, Translation3, Vector3};

@@ -4,11 +4,11 @@
 //! the laser's own frame sits a little off in its housing: everything bolted to the housing then moves in the true
 //! sensor frame.
 
-use crate::cast::{Block, Cylinder, Polygon, Shape, Triangles};
 use crate::error::SimError;
 use crate::layout;
 use crate::noise::{Draws, Purpose};
 use crate::scene::{Facet, Glass, MeshShape, Post, PostShape, Scene};
+use catoptric_cast::{Block, Cylinder, Polygon, Shape, Triangles};
 use catoptric_model::Pose;
 use catoptric_model::frame::yaw_pitch_roll;
 use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};

@@ -5,13 +5,13 @@
 
 use crate::color;
 use crate::error::SimError;
-use crate::footprint::Ray;
 use crate::laboratory::wall_targets;
 use crate::optics::{Bounce, Course, End, Mirrors, Setting};
 use crate::room::room_from_rig;
 use crate::scene::Scene;
 use crate::stage::Stage;
 use crate::structure::Structure;
+use catoptric_cast::Ray;
 use catoptric_model::Pose;
 use nalgebra::{Point3, Unit, Vector3};
 

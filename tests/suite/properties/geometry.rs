@@ -2,10 +2,10 @@
 
 use super::{cases, direction, vector};
 use crate::scenes::scene;
+use catoptric::cast::Ray;
 use catoptric::model::frame::yaw_pitch_roll;
 use catoptric::model::{BoardPlane, Deflection, MirrorPlane, Pose, PoseData, beam, cloud, mirror, range};
 use catoptric::sim::Scene;
-use catoptric::sim::footprint::Ray;
 use catoptric::sim::scene::{PlanePolygon, PlaneShape, RoomBox, RoomMirror, RoomSurface, SurfaceShape};
 use catoptric::sim::trace::{Fate, Scenery, Vertex};
 use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};

@@ -100,8 +100,11 @@ mod tests {
     #[test]
     fn parts_share_the_experiments_out() {
         let study = study();
-        let mut all: Vec<Job> = [1, 2].iter().flat_map(|i| study.jobs_of_part([*i, 2])).collect();
-        assert_eq!(study.jobs_of_part([1, 2]).len(), 2);
+        let mut all: Vec<Job> = [1, 2]
+            .iter()
+            .flat_map(|i| study.jobs_of_part([*i, 2].into()))
+            .collect();
+        assert_eq!(study.jobs_of_part([1, 2].into()).len(), 2);
         all.sort();
         assert_eq!(all, study.jobs().collect::<Vec<_>>());
     }

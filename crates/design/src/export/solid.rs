@@ -1,6 +1,6 @@
 //! Closed bodies as triangles.
 
-use catoptric_sim::cast::Triangle;
+use catoptric_cast::Triangle;
 use nalgebra::{Point3, Unit, Vector3};
 
 /// A closed body in the sensor frame; its triangles run counter-clockwise seen from outside.
@@ -48,9 +48,9 @@ impl Solid {
     /// An upright disc between two heights.
     pub(super) fn disc(name: &str, radius: f64, [bottom, top]: [f64; 2]) -> Self {
         let corners = |z: f64| -> Vec<Point3<f64>> {
-            (0..catoptric_sim::cast::CYLINDER_FACES)
+            (0..catoptric_cast::CYLINDER_FACES)
                 .map(|k| {
-                    let turn = std::f64::consts::TAU * k as f64 / catoptric_sim::cast::CYLINDER_FACES as f64;
+                    let turn = std::f64::consts::TAU * k as f64 / catoptric_cast::CYLINDER_FACES as f64;
                     let (sin, cos) = libm::sincos(turn);
                     Point3::new(radius * cos, radius * sin, z)
                 })

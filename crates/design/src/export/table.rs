@@ -1,8 +1,8 @@
 //! The drawing as a table: one row for every corner of every mirror, with the mirror's angles and tolerances.
 
 use crate::layout::{Drawing, plate_thickness};
+use catoptric_cast::area_vector;
 use catoptric_sim::Scene;
-use catoptric_sim::layout::area_vector;
 
 /// Columns of the table; tolerances are 1σ.
 const HEADER: [&str; 20] = [

@@ -4,8 +4,8 @@
 //! place for every pose.
 
 use super::drawing::Drawing;
+use catoptric_cast::Ray;
 use catoptric_model::{Pose, beam};
-use catoptric_sim::footprint::Ray;
 use catoptric_sim::trace::{Fate, Scenery, Tracer, Vertex};
 use catoptric_sim::{Scene, SimError};
 use nalgebra::{Point3, Unit, Vector3};

@@ -9,8 +9,8 @@
 //! ```
 
 use super::footprint::Footprint;
+use catoptric_cast::Ray;
 use catoptric_model::beam;
-use catoptric_sim::footprint::Ray;
 use catoptric_sim::optics::{End, Path, Setting, Trail};
 use catoptric_sim::reading::{Sensor, class};
 use catoptric_sim::structure::Structure;

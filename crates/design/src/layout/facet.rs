@@ -4,8 +4,8 @@ use super::element::{Class, Element, Traced, exit};
 use super::field::Cell;
 use super::footprint::Footprint;
 use super::sensitivity::{RANGE_M, Shift, shifts};
+use catoptric_cast::area_vector;
 use catoptric_model::beam;
-use catoptric_sim::layout::area_vector;
 use catoptric_sim::structure::Structure;
 use serde::Serialize;
 

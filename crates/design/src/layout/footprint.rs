@@ -5,9 +5,10 @@
 //! edge cuts is whole and its margin negative. Glass moves a footprint by less than its own thickness; it is left out.
 
 use super::element::Traced;
+use catoptric_cast::Polygon;
+use catoptric_cast::Ray;
 use catoptric_model::{beam, mirror};
-use catoptric_sim::cast::Polygon;
-use catoptric_sim::footprint::{Ray, SubRay, ray};
+use catoptric_sim::footprint::{SubRay, ray};
 use catoptric_sim::reading::Sensor;
 use catoptric_sim::structure::Structure;
 use nalgebra::{Point3, Vector3};

@@ -11,9 +11,9 @@
 //! which the mirrors behind it turn like any direction. A turn about the normal and a shift along the plane move nothing.
 //! Glass moves with its facet, so it does not count here; it adds a walk of its own millimetres times the turn.
 
+use catoptric_cast::Polygon;
 use catoptric_model::beam;
 use catoptric_model::frame::tangent_basis;
-use catoptric_sim::cast::Polygon;
 use nalgebra::{Matrix3, Matrix3x2, Point3, Vector3};
 
 /// Reading for which it is stated, in metres from the scanner.

@@ -1,8 +1,8 @@
 //! Size, mirror area and mass of the structure. Mirrors use no power.
 
+use catoptric_cast::area_vector;
+use catoptric_cast::volume;
 use catoptric_sim::Scene;
-use catoptric_sim::cast::volume;
-use catoptric_sim::layout::area_vector;
 use catoptric_sim::scene::Preset;
 use catoptric_sim::structure::Structure;
 use nalgebra::{Point3, Vector3};

@@ -1,11 +1,11 @@
 //! What every beam meets in the drawing.
 
-use crate::cast::Shape;
-use crate::footprint::Ray;
 use crate::layout;
 use crate::room::room_from_rig;
 use crate::scene::Scene;
 use crate::structure;
+use catoptric_cast::Ray;
+use catoptric_cast::Shape;
 use catoptric_model::beam;
 use catoptric_model::frame::yaw_pitch_roll;
 use catoptric_model::{Deflection, MirrorPlane, Pose};
@@ -106,7 +106,7 @@ impl Solid {
 impl Face {
     /// `None` if the corners span no plane.
     pub(super) fn new(corners: Vec<Point3<f64>>) -> Option<Self> {
-        let normal = Unit::try_new(layout::area_vector(&corners), f64::MIN_POSITIVE)?;
+        let normal = Unit::try_new(catoptric_cast::area_vector(&corners), f64::MIN_POSITIVE)?;
         let plane = MirrorPlane::through(*corners.first()?, normal);
         Some(Self { corners, plane })
     }

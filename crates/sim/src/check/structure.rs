@@ -255,7 +255,7 @@ pub(super) fn check_outline(corners: &[Point3<f64>], path: &Path, found: &mut Fi
         );
         return false;
     }
-    let area = layout::area_vector(corners);
+    let area = catoptric_cast::area_vector(corners);
     // The two lobes of a bow tie cancel; what rounding leaves of them has no direction.
     let Some(normal) = Unit::try_new(area, CUTTING_ERROR_M * spread(corners)) else {
         found.add(

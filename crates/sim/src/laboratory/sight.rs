@@ -5,13 +5,13 @@
 
 use super::setup::Laboratory;
 use super::targets::wall_targets;
-use crate::cast::BUNDLE;
 use crate::color;
 use crate::error::SimError;
 use crate::optics::{Mirrors, Rig, Setting};
 use crate::reading::{Parts, Return, SubRayEnd};
 use crate::stage::Stage;
 use crate::trajectory::Trajectory;
+use catoptric_cast::BUNDLE;
 use catoptric_model::{Pose, PoseKind, beam};
 use rayon::prelude::*;
 

@@ -2,12 +2,12 @@
 
 use super::setup::Laboratory;
 use crate::board::outline;
-use crate::cast::{Polygon, Shape};
 use crate::color::{self, Paint};
 use crate::error::SimError;
 use crate::optics::{Role, Target};
 use crate::room;
 use crate::scene::Scene;
+use catoptric_cast::{Polygon, Shape};
 use catoptric_model::Pose;
 use nalgebra::Point3;
 

@@ -5,7 +5,7 @@
 
 mod grid;
 
-use crate::cast::{Polygon, Shape};
+use catoptric_cast::{Polygon, Shape};
 use grid::Grid;
 use nalgebra::{Point3, Vector3};
 
@@ -86,7 +86,7 @@ fn around(points: impl Iterator<Item = Point3<f64>>) -> Extent {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cast::Block;
+    use catoptric_cast::Block;
     use catoptric_model::Pose;
 
     #[test]

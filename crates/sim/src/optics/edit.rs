@@ -6,7 +6,7 @@
 
 use super::path::{End, Path};
 use super::setting::Setting;
-use crate::footprint::Ray;
+use catoptric_cast::Ray;
 use nalgebra::{Point3, Vector3};
 
 /// Where the rays of a beam went over the structure.

@@ -2,8 +2,8 @@
 
 use super::path::{Bounce, Course, End, Meeting, Path};
 use super::setting::{Leg, Setting};
-use crate::footprint::Ray;
 use crate::glass;
+use catoptric_cast::Ray;
 use catoptric_model::mirror;
 use nalgebra::Point3;
 

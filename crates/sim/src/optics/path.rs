@@ -1,8 +1,8 @@
 //! The way of a ray, and what it is made of: bounces, and how it ends.
 
-use crate::cast::{Hit, placed};
-use crate::footprint::Ray;
 use crate::glass::Passage;
+use catoptric_cast::Ray;
+use catoptric_cast::{Hit, placed};
 use catoptric_model::Pose;
 use nalgebra::{Point3, Vector3};
 

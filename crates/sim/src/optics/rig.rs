@@ -5,8 +5,8 @@
 
 use super::path::{Course, End, Meeting};
 use super::setting::Setting;
-use crate::cast::Rays;
-use crate::footprint::Ray;
+use catoptric_cast::Ray;
+use catoptric_cast::Rays;
 use rayon::prelude::*;
 use std::ops::Range;
 

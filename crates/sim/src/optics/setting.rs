@@ -6,13 +6,13 @@
 
 use super::clearance::Extent;
 use super::path::MAX_BOUNCES;
-use crate::cast::{Contact, Hit, Rays, Shape, World, placed};
 use crate::color::{self, Paint};
 use crate::error::SimError;
-use crate::footprint::Ray;
 use crate::scene::Scene;
 use crate::stage::Stage;
 use crate::structure::{Back, BuiltFacet, Part, Structure};
+use catoptric_cast::Ray;
+use catoptric_cast::{Contact, Hit, Rays, Shape, World, placed};
 use catoptric_model::Pose;
 use nalgebra::{Point3, Unit, Vector3};
 use std::borrow::Cow;

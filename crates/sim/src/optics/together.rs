@@ -2,8 +2,8 @@
 
 use super::path::{Bounce, Course, Path};
 use super::setting::Setting;
-use crate::cast::Rays;
-use crate::footprint::Ray;
+use catoptric_cast::Ray;
+use catoptric_cast::Rays;
 
 impl Setting<'_> {
     /// The ways of some rays, as [`Setting::trace`] follows each of them; faster if they are a narrow beam.

@@ -1,9 +1,10 @@
 //! Copies against the closed form of what they are: reflected and turned corners.
 
 use super::*;
-use crate::layout::{area_vector, corners};
+use crate::layout::corners;
 use crate::scene::Plate;
 use crate::scene::{CopyList, FacetCopy, MirrorImage, PolygonShape, RectangleShape, Ring, Wedge};
+use catoptric_cast::area_vector;
 use nalgebra::{Point3, Rotation3, Vector3};
 
 fn facet(name: &str, shape: FacetShape) -> Facet {

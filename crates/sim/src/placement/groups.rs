@@ -1,8 +1,8 @@
 //! Which beams one board serves.
 
-use crate::footprint::Ray;
 use crate::optics::{End, Path};
 use crate::scene::Board;
+use catoptric_cast::Ray;
 use catoptric_model::{Pose, Rectangle, beam};
 use nalgebra::Unit;
 

@@ -4,9 +4,10 @@ use super::part::{Parts, Place};
 use super::returned::Return;
 use super::sensor::{Sensor, is_chief};
 use super::sub_ray::Arrival;
-use crate::footprint::{Ray, SubRay};
+use crate::footprint::SubRay;
 use crate::optics::{End, Path, Role, Setting};
 use crate::power;
+use catoptric_cast::Ray;
 
 /// A part of a beam's light, as fractions of all of it.
 #[derive(Debug, Clone, PartialEq)]

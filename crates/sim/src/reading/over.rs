@@ -4,11 +4,11 @@
 use super::part::{Parts, Place};
 use super::returned::Return;
 use super::sensor::{Sensor, is_chief};
-use crate::cast::Contact;
 use crate::detect::Pulse;
 use crate::footprint;
 use crate::optics::{Rig, Run, Setting, Then, Ways};
 use crate::power::{self, Target};
+use catoptric_cast::Contact;
 use catoptric_model::beam;
 use std::ops::Range;
 

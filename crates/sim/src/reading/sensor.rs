@@ -4,10 +4,11 @@ use crate::color;
 use crate::detect;
 use crate::echo::Receiver;
 use crate::error::SimError;
-use crate::footprint::{self, Ray, SubRay};
+use crate::footprint::{self, SubRay};
 use crate::optics::{MAX_BOUNCES, Path, Setting};
 use crate::power::{self, Illumination};
 use crate::scene::{BeamShape, Detection, ErrorModel, Errors, Light, Limits, Scene};
+use catoptric_cast::Ray;
 use catoptric_model::{RangeBias, beam};
 
 /// The scanner with everything resolved that does not depend on where it looks.

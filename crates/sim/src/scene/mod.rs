@@ -7,6 +7,7 @@ mod body;
 mod detection;
 mod errors;
 mod flight;
+mod meshes;
 mod mishap;
 mod omit;
 mod parameter;
@@ -23,6 +24,7 @@ pub use body::{
 pub use detection::{Detection, Detector, EchoChoice, Principle};
 pub use errors::{Characterization, Correlated, ErrorModel, Errors, Interference, NoiseTable, WarmUp};
 pub use flight::{Attitude, Flight, Waypoint};
+pub use meshes::Meshes;
 pub use mishap::{Mishap, Mislabelled};
 pub use parameter::Parameter;
 pub use pattern::{CopyList, Exchange, FacetCopy, MirrorImage, Pattern, Ring};
@@ -35,7 +37,6 @@ pub use superstructure::{
 };
 pub use test::SensorTest;
 
-use crate::mesh::Meshes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

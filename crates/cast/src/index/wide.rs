@@ -3,49 +3,47 @@
 //! Everything is in f32 and errs outwards: a box holds its triangles whatever was rounded. What is found here is a
 //! candidate that f64 decides about.
 
-use super::build;
 use fearless_simd::f32x8;
 use fearless_simd::{Simd, prelude::*};
-use nalgebra::Point3;
 
 /// Children of a node and triangles of a leaf.
-pub(super) const WIDTH: usize = 8;
+pub(crate) const WIDTH: usize = 8;
 
-/// Half a unit in the last place of 1 in f32: the relative error of one operation.
-pub(super) const ROUNDING: f32 = f32::EPSILON / 2.0;
+/// Levels of nodes at most: below [`SORTED`] parts are halved by number.
+pub(crate) const DEEPEST: usize = 20;
 
 /// Most entries that a walk through the index holds: seven siblings on each of the levels that the builder allows.
-const STACK: usize = (WIDTH - 1) * build::DEEPEST + 1;
+const STACK: usize = (WIDTH - 1) * DEEPEST + 1;
 
 /// Eight boxes and what is in them.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
-pub(super) struct Node {
+pub(crate) struct Node {
     /// By axis: the low sides and the high sides. A child that is none has them exchanged, far apart.
-    pub(super) bounds: [[[f32; WIDTH]; 2]; 3],
-    pub(super) children: [Child; WIDTH],
+    pub(crate) bounds: [[[f32; WIDTH]; 2]; 3],
+    pub(crate) children: [Child; WIDTH],
 }
 
 /// A node or a leaf by its number; a leaf also has its number of triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Child(u32);
+pub(crate) struct Child(u32);
 
 /// Up to eight triangles.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
-pub(super) struct Leaf {
+pub(crate) struct Leaf {
     /// By corner and axis.
-    pub(super) corners: [[[f32; WIDTH]; 3]; 3],
+    pub(crate) corners: [[[f32; WIDTH]; 3]; 3],
     /// Their numbers in the mesh.
-    pub(super) triangles: [u32; WIDTH],
+    pub(crate) triangles: [u32; WIDTH],
 }
 
 /// The index.
-pub(super) struct Wide {
-    pub(super) nodes: Vec<Node>,
-    pub(super) leaves: Vec<Leaf>,
+pub(crate) struct Wide {
+    pub(crate) nodes: Vec<Node>,
+    pub(crate) leaves: Vec<Leaf>,
     /// Greatest coordinate of a vertex, whatever its sign: the measure of all rounding.
-    pub(super) reach: f32,
+    pub(crate) reach: f32,
 }
 
 /// Bits of a child's number.
@@ -53,27 +51,27 @@ const NUMBER_BITS: u32 = 28;
 
 impl Child {
     /// No child: behind a box that nothing meets.
-    pub(super) const NONE: Self = Self(0);
+    pub(crate) const NONE: Self = Self(0);
 
-    pub(super) fn node(number: usize) -> Self {
+    pub(crate) fn node(number: usize) -> Self {
         Self(narrow(number))
     }
 
-    pub(super) fn leaf(number: usize, count: usize) -> Self {
+    pub(crate) fn leaf(number: usize, count: usize) -> Self {
         debug_assert!((1..=WIDTH).contains(&count));
         Self(1 << 31 | narrow(count - 1) << NUMBER_BITS | narrow(number))
     }
 
-    pub(super) fn is_leaf(self) -> bool {
+    pub(crate) fn is_leaf(self) -> bool {
         self.0 >> 31 == 1
     }
 
-    pub(super) fn number(self) -> usize {
+    pub(crate) fn number(self) -> usize {
         (self.0 & ((1 << NUMBER_BITS) - 1)) as usize
     }
 
     /// Triangles of a leaf.
-    pub(super) fn count(self) -> usize {
+    pub(crate) fn count(self) -> usize {
         (self.0 >> NUMBER_BITS & 7) as usize + 1
     }
 }
@@ -87,7 +85,7 @@ fn narrow(number: usize) -> u32 {
 
 impl Node {
     /// Without children.
-    pub(super) fn empty() -> Self {
+    pub(crate) fn empty() -> Self {
         // Finite, so that a product with zero is none that is not a number.
         const FAR: f32 = 1e30;
         Self {
@@ -98,7 +96,7 @@ impl Node {
 }
 
 /// What is still to be looked into, the nearest on top.
-pub(super) struct Walk {
+pub(crate) struct Walk {
     stack: [Entry; STACK],
     height: usize,
 }
@@ -108,7 +106,7 @@ type Entry = (f32, Child);
 
 impl Walk {
     #[inline(always)]
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             stack: [(f32::INFINITY, Child::NONE); STACK],
             height: 0,
@@ -117,14 +115,14 @@ impl Walk {
 
     /// The root; nothing else is left.
     #[inline(always)]
-    pub(super) fn start(&mut self) -> Child {
+    pub(crate) fn start(&mut self) -> Child {
         self.height = 0;
         Child::node(0)
     }
 
     /// The nearest thing before `limit` that is left.
     #[inline(always)]
-    pub(super) fn next(&mut self, limit: f32) -> Option<Child> {
+    pub(crate) fn next(&mut self, limit: f32) -> Option<Child> {
         loop {
             self.height = self.height.checked_sub(1)?;
             let (near, child) = self.stack[self.height];
@@ -136,7 +134,7 @@ impl Walk {
 
     /// The nearest of the children that are met; the others are left for later.
     #[inline(always)]
-    pub(super) fn enter<S: Simd>(&mut self, node: &Node, mut met: u32, near: f32x8<S>) -> Option<Child> {
+    pub(crate) fn enter<S: Simd>(&mut self, node: &Node, mut met: u32, near: f32x8<S>) -> Option<Child> {
         const LANE: usize = WIDTH - 1;
         if met == 0 {
             return None;
@@ -170,12 +168,5 @@ impl Walk {
                 return Some(nearest.1);
             }
         }
-    }
-}
-
-impl Wide {
-    /// Indexes triangles over vertices, in metres.
-    pub(super) fn new(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Self {
-        build::index(vertices, triangles)
     }
 }

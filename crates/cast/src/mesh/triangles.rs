@@ -4,17 +4,17 @@
 //! share an edge; the answer is the same with any instruction set, alone or in a beam. Of triangles that are met at the
 //! very same distance the first counts.
 
-use super::beam::{self, Found};
-use super::bundle::{Bundle, Caster, cast_all};
-use super::each;
-use super::exact::Judge;
-use super::finish::{MetInRow, finish};
-use super::lanes::inlined;
-use super::rays::Rays;
-use super::rows::LANES;
-use super::wide::Wide;
-use crate::footprint::Ray;
-use crate::mesh::Mesh;
+use crate::index::wide::Wide;
+use crate::lanes::inlined;
+use crate::mesh::beam::{self, Found};
+use crate::mesh::data::Mesh;
+use crate::mesh::each;
+use crate::mesh::exact::{Judge, Met};
+use crate::mesh::finish::{MetInRow, finish};
+use crate::packet::bundle::{Bundle, Caster, cast_all};
+use crate::packet::rays::Rays;
+use crate::packet::rows::LANES;
+use crate::ray::Ray;
 use catoptric_model::Pose;
 use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::{Point3, Unit, Vector3};
@@ -25,15 +25,6 @@ pub struct Triangles {
     vertices: Vec<Point3<f64>>,
     triangles: Vec<[u32; 3]>,
     wide: Wide,
-}
-
-/// Where a ray meets a mesh.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Met {
-    /// Number of the triangle.
-    pub triangle: u32,
-    /// Distance from the ray's origin, in metres.
-    pub distance: f64,
 }
 
 impl std::fmt::Debug for Triangles {
@@ -55,26 +46,26 @@ impl Triangles {
         }
     }
 
-    pub(super) fn corners(&self, triangle: usize) -> [Point3<f64>; 3] {
+    pub(crate) fn corners(&self, triangle: usize) -> [Point3<f64>; 3] {
         self.triangles[triangle].map(|v| self.vertices[v as usize])
     }
 
     /// The vertices, in metres.
-    pub(crate) fn vertices(&self) -> &[Point3<f64>] {
+    pub fn vertices(&self) -> &[Point3<f64>] {
         &self.vertices
     }
 
     /// Its triangles one by one, in metres.
-    pub(crate) fn each(&self) -> impl Iterator<Item = [Point3<f64>; 3]> {
+    pub fn each(&self) -> impl Iterator<Item = [Point3<f64>; 3]> {
         (0..self.triangles.len()).map(|t| self.corners(t))
     }
 
     /// All of its triangles, in metres.
-    pub(super) fn skin(&self) -> Vec<[Point3<f64>; 3]> {
+    pub(crate) fn skin(&self) -> Vec<[Point3<f64>; 3]> {
         self.each().collect()
     }
 
-    pub(super) fn judge(&self) -> Judge<'_> {
+    pub(crate) fn judge(&self) -> Judge<'_> {
         Judge {
             vertices: &self.vertices,
             triangles: &self.triangles,
@@ -115,7 +106,7 @@ impl Triangles {
     /// Tells what the rays of a bundle meet, row by row, and under which incidence if that is asked for; it may be made for
     /// things that reach farther than the mesh.
     #[inline(always)]
-    pub(super) fn nearest_of_bundle<S: Simd, const R: usize, const CLOSING: bool>(
+    pub(crate) fn nearest_of_bundle<S: Simd, const R: usize, const CLOSING: bool>(
         &self,
         simd: S,
         bundle: &Bundle<'_, R>,
@@ -128,30 +119,30 @@ impl Triangles {
     }
 
     /// Normal of a triangle, for a ray that meets it.
-    pub(super) fn normal(&self, triangle: u32, ray: &Ray) -> Unit<Vector3<f64>> {
+    pub(crate) fn normal(&self, triangle: u32, ray: &Ray) -> Unit<Vector3<f64>> {
         self.judge().normal(triangle, ray)
     }
 
     /// Product of the direction of a ray with the normal of a triangle that it meets.
-    pub(super) fn closing(&self, triangle: u32, ray: &Ray) -> f64 {
+    pub(crate) fn closing(&self, triangle: u32, ray: &Ray) -> f64 {
         self.judge().closing(triangle, ray)
     }
 
     /// Distance and normal of the nearest triangle along a ray.
-    pub(super) fn cast(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
+    pub(crate) fn cast(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
         let met = self.nearest(ray)?;
         Some((met.distance, self.normal(met.triangle, ray)))
     }
 }
 
 /// A mesh, with what the machine has.
-pub(super) struct InMesh<'a> {
+pub(crate) struct InMesh<'a> {
     mesh: &'a Triangles,
     level: Level,
 }
 
 impl<'a> InMesh<'a> {
-    pub(super) fn new(mesh: &'a Triangles, level: Level) -> Self {
+    pub(crate) fn new(mesh: &'a Triangles, level: Level) -> Self {
         Self { mesh, level }
     }
 }
@@ -185,9 +176,9 @@ impl Caster<Option<Met>> for InMesh<'_> {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use super::*;
-    use crate::noise::{Draws, Purpose};
+    use crate::random::Draws;
     use rayon::prelude::*;
     use std::collections::BTreeMap;
 
@@ -195,7 +186,7 @@ pub(super) mod tests {
     const RAYS: u64 = 10_000_000;
 
     /// A closed mesh that can be seen whole from the origin: a divided octahedron, every vertex at a random distance.
-    pub(in crate::cast) fn random_star(seed: u64, divisions: u32) -> Mesh {
+    pub(crate) fn random_star(seed: u64, divisions: u32) -> Mesh {
         let mut vertices: Vec<Point3<f64>> = [
             [1.0, 0.0, 0.0],
             [-1.0, 0.0, 0.0],
@@ -228,7 +219,7 @@ pub(super) mod tests {
                 })
                 .collect();
         }
-        let mut draws = Draws::new(seed, Purpose::Placement, 0);
+        let mut draws = Draws::new(seed, 0);
         for vertex in &mut vertices {
             vertex.coords *= 0.5 + draws.uniform();
         }
@@ -243,7 +234,7 @@ pub(super) mod tests {
         assert_eq!(placed.triangles.len(), 2048);
         const BATCH: u64 = 10_000;
         (0..RAYS / 2 / BATCH).into_par_iter().for_each(|batch| {
-            let mut draws = Draws::new(3, Purpose::Placement, batch);
+            let mut draws = Draws::new(3, batch);
             for shot in 0..BATCH {
                 // A point inside: the star holds a ball of a third of its least radius.
                 let inside = place * Point3::from(draws.normal3().normalize() * (0.1 * draws.uniform()));
@@ -281,7 +272,7 @@ pub(super) mod tests {
 
     /// A cube of so many units whose faces are unit squares, each cut in two along either diagonal.
     fn lattice_cube(units: u32, seed: u64) -> Mesh {
-        let mut draws = Draws::new(seed, Purpose::Placement, 0);
+        let mut draws = Draws::new(seed, 0);
         let (mut numbers, mut triangles) = (BTreeMap::new(), Vec::new());
         for (axis, side, a, b) in (0..3).flat_map(|axis| {
             let cells = (0..units).flat_map(move |a| (0..units).map(move |b| (a, b)));
@@ -346,7 +337,7 @@ pub(super) mod tests {
     fn a_ray_meets_a_triangle_where_its_plane_is() {
         let mesh = random_star(5, 2);
         let placed = Triangles::new(&mesh, 2.0, &Pose::identity());
-        let mut draws = Draws::new(9, Purpose::Placement, 0);
+        let mut draws = Draws::new(9, 0);
         for _ in 0..10_000 {
             let ray = Ray {
                 origin: Point3::origin(),
@@ -368,7 +359,7 @@ pub(super) mod tests {
 
     #[test]
     fn damaged_meshes_are_refused() {
-        use crate::mesh::MeshError;
+        use crate::mesh::data::MeshError;
         let corner = |x: f64| Point3::new(x, 0.0, 0.0);
         assert_eq!(Mesh::new(vec![], vec![]), Err(MeshError::Empty));
         let found = Mesh::new(vec![corner(0.0); 3], vec![[0, 1, 3]]);

@@ -4,15 +4,16 @@
 //! the farthest corner is not longer than all that there is, the longest edge not longer than two that meet. One of the
 //! edges is what the others leave of N·d, and has the errors of the three.
 
-use super::build::rounded;
-use super::lanes::{cross, dot, inlined, less, size};
-use super::wide::{Leaf, Node, ROUNDING, WIDTH};
-use crate::footprint::Ray;
+use crate::index::wide::{Leaf, Node, WIDTH};
+use crate::lanes::{cross, dot, inlined, less, size};
+use crate::ray::Ray;
+use crate::rounding::ROUNDING;
+use crate::rounding::rounded;
 use fearless_simd::f32x8;
 use fearless_simd::{Simd, prelude::*};
 
 /// The ray in f32.
-pub(super) struct Line {
+pub(crate) struct Line {
     start: [f32; 3],
     direction: [f32; 3],
     /// By axis, whether the ray comes to a box's low side (0) or high side (1) first.
@@ -29,18 +30,18 @@ pub(super) struct Line {
 
 /// What eight triangles are to the ray.
 #[derive(Default)]
-pub(super) struct Outcome {
+pub(crate) struct Outcome {
     /// Bounds of the way to each.
-    pub(super) low: [f32; WIDTH],
-    pub(super) high: [f32; WIDTH],
+    pub(crate) low: [f32; WIDTH],
+    pub(crate) high: [f32; WIDTH],
     /// Lanes that the ray may meet, and those that it surely meets.
-    pub(super) may: u32,
-    pub(super) surely: u32,
+    pub(crate) may: u32,
+    pub(crate) surely: u32,
 }
 
 impl Line {
     #[inline(always)]
-    pub(super) fn new(ray: &Ray, reach: f32) -> Self {
+    pub(crate) fn new(ray: &Ray, reach: f32) -> Self {
         let start: [f32; 3] = std::array::from_fn(|k| rounded(ray.origin[k]));
         let direction: [f32; 3] = std::array::from_fn(|k| rounded(ray.direction[k]));
         let greatest = start.iter().fold(0.0_f32, |m, c| c.abs().max(m));
@@ -70,7 +71,7 @@ impl Line {
 
     /// Which of eight boxes the ray meets before `limit`, and where.
     #[inline(always)]
-    pub(super) fn boxes<S: Simd>(&self, simd: S, node: &Node, limit: f32) -> (u32, f32x8<S>) {
+    pub(crate) fn boxes<S: Simd>(&self, simd: S, node: &Node, limit: f32) -> (u32, f32x8<S>) {
         let splat = inlined(
             #[inline(always)]
             |x: f32| f32x8::splat(simd, x),
@@ -100,7 +101,7 @@ impl Line {
     }
 
     #[inline(always)]
-    pub(super) fn triangles<S: Simd>(
+    pub(crate) fn triangles<S: Simd>(
         &self,
         simd: S,
         leaf: &Leaf,

@@ -18,17 +18,20 @@
 //! place; whatever overlaps is decided in f64 at once ([`Judge`]); the ways themselves are found at the
 //! end ([`finish`](super::finish)).
 
-use super::bundle::{Bundle, around};
-use super::exact::Judge;
-use super::lanes::{cross, dot, inlined, less, size};
-use super::rows::{InRows, LANES, Rows, Vectors, whole};
-use super::wide::{Leaf, ROUNDING, WIDTH, Walk, Wide};
-use super::{FARTHEST, NONE};
+use crate::hit::NONE;
+use crate::index::wide::{Leaf, WIDTH, Walk, Wide};
+use crate::lanes::{cross, dot, inlined, less, size};
+use crate::mesh::exact::Judge;
+use crate::packet::bundle::Bundle;
+use crate::packet::in_rows::InRows;
+use crate::packet::rows::{LANES, Rows, Vectors, whole};
+use crate::ray::FARTHEST;
+use crate::rounding::{ROUNDING, around, downwards, upwards};
 use fearless_simd::{Simd, prelude::*};
 use fearless_simd::{f32x8, f32x16, u32x16};
 
 /// What a bundle has met so far.
-pub(super) struct Found<const R: usize> {
+pub(crate) struct Found<const R: usize> {
     /// Bounds of the nearest way.
     low: Rows<f32, R>,
     high: Rows<f32, R>,
@@ -57,10 +60,10 @@ impl At {
 }
 
 impl<const R: usize> Found<R> {
-    pub(super) fn new(count: usize) -> Self {
-        let farthest = super::build::upwards(FARTHEST);
+    pub(crate) fn new(count: usize) -> Self {
+        let farthest = upwards(FARTHEST);
         let mut found = Self {
-            low: Rows::of(super::build::downwards(FARTHEST)),
+            low: Rows::of(downwards(FARTHEST)),
             high: Rows::of(farthest),
             triangle: Rows::of(NONE),
             limit: farthest,
@@ -93,14 +96,14 @@ impl<const R: usize> Found<R> {
     }
 
     /// The nearest triangle of every ray, [`NONE`] where there is none.
-    pub(super) fn triangles(&self) -> &[[u32; LANES]; R] {
+    pub(crate) fn triangles(&self) -> &[[u32; LANES]; R] {
         &self.triangle.0
     }
 }
 
 /// Follows a bundle through the index.
 #[inline(always)]
-pub(super) fn follow<S: Simd, const R: usize>(
+pub(crate) fn follow<S: Simd, const R: usize>(
     simd: S,
     wide: &Wide,
     bundle: &Bundle<'_, R>,

@@ -7,22 +7,31 @@
 //! computes in f32 and falls back to f64 where a function is zero, the sign of a function that rounding could have
 //! changed is found from the exact products (fused multiply-add). The distance is that to the triangle's plane.
 
-use super::FARTHEST;
-use super::lanes::{less, unfused};
-use crate::footprint::Ray;
+use crate::lanes::{less, unfused};
+use crate::ray::FARTHEST;
+use crate::ray::Ray;
 use fearless_simd::{Simd, prelude::*};
 use fearless_simd::{f64x8, mask64x8};
 use nalgebra::{Point3, Unit, Vector3};
 
+/// Where a ray meets a mesh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Met {
+    /// Number of the triangle.
+    pub triangle: u32,
+    /// Distance from the ray's origin, in metres.
+    pub distance: f64,
+}
+
 /// Decides in f64 which triangles of a mesh rays meet.
-pub(super) struct Judge<'a> {
-    pub(super) vertices: &'a [Point3<f64>],
-    pub(super) triangles: &'a [[u32; 3]],
+pub(crate) struct Judge<'a> {
+    pub(crate) vertices: &'a [Point3<f64>],
+    pub(crate) triangles: &'a [[u32; 3]],
 }
 
 /// A triangle's plane.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Plane {
+pub(crate) struct Plane {
     corner: Point3<f64>,
     /// (B − A)×(C − A).
     normal: Vector3<f64>,
@@ -32,16 +41,16 @@ pub(super) struct Plane {
 
 /// Least part of a triangle's greatest extent squared that its normal along a ray has where the way is that to the plane:
 /// of slivers, and for rays along the plane, it is the mean of the corners' ways.
-pub(super) const STEEP: f64 = 1e-7;
+pub(crate) const STEEP: f64 = 1e-7;
 
 impl Judge<'_> {
     /// Distance at which a ray meets a triangle.
-    pub(super) fn meet(&self, ray: &Ray, triangle: u32) -> Option<f64> {
+    pub(crate) fn meet(&self, ray: &Ray, triangle: u32) -> Option<f64> {
         meet(ray, &self.corners(triangle))
     }
 
     /// Distance to a triangle that the ray surely meets: what [`Judge::meet`] gives, to the bit.
-    pub(super) fn way(&self, ray: &Ray, triangle: u32) -> f64 {
+    pub(crate) fn way(&self, ray: &Ray, triangle: u32) -> f64 {
         let corners = self.corners(triangle);
         let plane = Plane::new(&corners);
         match plane.way(ray) {
@@ -51,13 +60,13 @@ impl Judge<'_> {
     }
 
     /// Normal of a triangle, for a ray that meets it.
-    pub(super) fn normal(&self, triangle: u32, ray: &Ray) -> Unit<Vector3<f64>> {
+    pub(crate) fn normal(&self, triangle: u32, ray: &Ray) -> Unit<Vector3<f64>> {
         // A sliver without an area has no normal; any that looks back does.
         Unit::try_new(self.plane(triangle).normal, f64::MIN_POSITIVE).unwrap_or(-ray.direction)
     }
 
     /// Product of a ray's direction with the normal of a triangle that it meets: the cosine of the incidence, with a sign.
-    pub(super) fn closing(&self, triangle: u32, ray: &Ray) -> f64 {
+    pub(crate) fn closing(&self, triangle: u32, ray: &Ray) -> f64 {
         let plane = self.plane(triangle);
         let inverse = plane.inverse();
         if inverse.is_finite() {
@@ -69,12 +78,12 @@ impl Judge<'_> {
     }
 
     #[inline(always)]
-    pub(super) fn plane(&self, triangle: u32) -> Plane {
+    pub(crate) fn plane(&self, triangle: u32) -> Plane {
         Plane::new(&self.corners(triangle))
     }
 
     #[inline(always)]
-    pub(super) fn corners(&self, triangle: u32) -> [Point3<f64>; 3] {
+    pub(crate) fn corners(&self, triangle: u32) -> [Point3<f64>; 3] {
         let [a, b, c] = self.triangles[triangle as usize];
         [
             self.vertices[a as usize],
@@ -103,18 +112,18 @@ impl Plane {
     }
 
     /// One over the normal's length.
-    pub(super) fn inverse(&self) -> f64 {
+    pub(crate) fn inverse(&self) -> f64 {
         1.0 / self.normal.norm()
     }
 
     /// N·(A − O).
-    pub(super) fn height(&self, origin: &Point3<f64>) -> f64 {
+    pub(crate) fn height(&self, origin: &Point3<f64>) -> f64 {
         self.normal.dot(&(self.corner - origin))
     }
 
     /// [`Plane::way`] of eight rays, the products of their directions with the normal, and where both are good.
     #[inline(always)]
-    pub(super) fn ways<S: Simd>(
+    pub(crate) fn ways<S: Simd>(
         &self,
         simd: S,
         height: f64x8<S>,
@@ -127,7 +136,7 @@ impl Plane {
 
     /// [`Plane::height`] of eight rays.
     #[inline(always)]
-    pub(super) fn heights<S: Simd>(&self, simd: S, origin: &[f64x8<S>; 3]) -> f64x8<S> {
+    pub(crate) fn heights<S: Simd>(&self, simd: S, origin: &[f64x8<S>; 3]) -> f64x8<S> {
         let corner = [
             f64x8::splat(simd, self.corner.x),
             f64x8::splat(simd, self.corner.y),

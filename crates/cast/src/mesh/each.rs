@@ -1,14 +1,14 @@
 //! Rays through the index over triangles, each by itself. The ways to what they met are found in f64 eight at a time.
 
-use super::FARTHEST;
-use super::bundle::around;
-use super::exact::Judge;
-use super::lanes::inlined;
-use super::pending::{Pending, Settled};
-use super::single::{Line, Outcome};
-use super::triangles::Met;
-use super::wide::{Leaf, WIDTH, Walk, Wide};
-use crate::footprint::Ray;
+use crate::index::wide::{Leaf, WIDTH, Walk, Wide};
+use crate::lanes::inlined;
+use crate::mesh::exact::Judge;
+use crate::mesh::exact::Met;
+use crate::mesh::pending::{Pending, Settled};
+use crate::mesh::single::{Line, Outcome};
+use crate::ray::FARTHEST;
+use crate::ray::Ray;
+use crate::rounding::around;
 use fearless_simd::Simd;
 
 /// What a ray has met so far.
@@ -74,7 +74,7 @@ impl Nearest {
 
 /// Follows so many rays through the index and tells what each meets, in no order.
 #[inline(always)]
-pub(super) fn follow<S: Simd, F: FnMut(usize, Option<Met>)>(
+pub(crate) fn follow<S: Simd, F: FnMut(usize, Option<Met>)>(
     simd: S,
     wide: &Wide,
     judge: &Judge<'_>,

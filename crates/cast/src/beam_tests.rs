@@ -1,12 +1,17 @@
 //! Beams against rays alone, against every triangle by itself, and against parry.
 
-use super::bundle::{Caster, cast_all};
-use super::triangles::InMesh;
-use super::triangles::tests::random_star;
-use super::{Block, Cylinder, Met, Polygon, Rays, Shape, Triangles, World};
-use crate::footprint::Ray;
-use crate::mesh::Mesh;
-use crate::noise::{Draws, Purpose};
+use crate::mesh::data::Mesh;
+use crate::mesh::exact::Met;
+use crate::mesh::triangles::tests::random_star;
+use crate::mesh::triangles::{InMesh, Triangles};
+use crate::packet::bundle::{Caster, cast_all};
+use crate::packet::rays::Rays;
+use crate::random::Draws;
+use crate::ray::{FARTHEST, Ray};
+use crate::shape::Shape;
+use crate::solid::block::to_glam;
+use crate::solid::{Block, Cylinder, Polygon};
+use crate::world::World;
 use catoptric_model::Pose;
 use fearless_simd::Level;
 use nalgebra::{Point3, Unit, Vector3};
@@ -65,7 +70,7 @@ fn tried(mesh: &Triangles, ray: &Ray, count: u32) -> Option<Met> {
 
 /// Triangles of all sizes, needles and doubles among them, some on a common grid.
 fn soup(seed: u64, count: u32) -> Mesh {
-    let mut draws = Draws::new(seed, Purpose::Placement, 0);
+    let mut draws = Draws::new(seed, 0);
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
     for _ in 0..count {
         let size = libm::pow(10.0, -3.0 * draws.uniform());
@@ -99,7 +104,7 @@ fn beams_and_rays_find_what_trying_all_finds_with_any_lanes() {
         let place = if number % 3 == 2 { 300.0 } else { 0.3 };
         let mesh = Triangles::new(&source, 1.0, &Pose::translation(place, -0.2 * place, 0.4 * place));
         let count = u32::try_from(source.triangles().len()).expect("a small mesh");
-        let mut draws = Draws::new(seed, Purpose::Placement, 1);
+        let mut draws = Draws::new(seed, 1);
         let mut hits = 0;
         for shot in 0..60 {
             // Some rays start or aim exactly at a vertex, or at the middle of an edge.
@@ -144,7 +149,7 @@ fn no_beam_leaks_out_of_a_closed_mesh() {
     let place = Pose::new(Vector3::new(0.3, -1.2, 0.7), Vector3::new(0.4, 0.1, -0.8));
     let mesh = Triangles::new(&source, 1.0, &place);
     (0..2048_usize).into_par_iter().for_each(|triangle| {
-        let mut draws = Draws::new(5, Purpose::Placement, triangle as u64);
+        let mut draws = Draws::new(5, triangle as u64);
         let [a, b, c] = mesh.corners(triangle);
         let inside = place * Point3::from(draws.normal3().normalize() * (0.1 * draws.uniform()));
         for target in [a, nalgebra::center(&a, &b), nalgebra::center(&b, &c)] {
@@ -161,27 +166,20 @@ fn parry_agrees() {
     const BEAMS: u64 = 8_000;
     let source = random_star(3, 5);
     let mesh = Triangles::new(&source, 1.0, &Pose::identity());
-    let points = source
-        .vertices()
-        .iter()
-        .map(|p| super::to_glam(&p.coords))
-        .collect();
+    let points = source.vertices().iter().map(|p| to_glam(&p.coords)).collect();
     let parry = parry3d::shape::TriMesh::new(points, source.triangles().to_vec()).expect("it is a mesh");
     let off: usize = (0..BEAMS)
         .into_par_iter()
         .map(|beam| {
             use parry3d::query::RayCast;
-            let mut draws = Draws::new(8, Purpose::Placement, beam);
+            let mut draws = Draws::new(8, beam);
             let (from, towards) = (vector(&mut draws, 3.0), vector(&mut draws, 0.8));
             let rays = cone(&mut draws, Point3::from(from), Point3::from(towards), 64, 0.0);
             let mut met = vec![None; rays.len()];
             mesh.nearest_of_beam(&rays, &mut met);
             let off = rays.iter().zip(&met).filter(|(ray, met)| {
-                let ray = parry3d::query::Ray::new(
-                    super::to_glam(&ray.origin.coords),
-                    super::to_glam(&ray.direction),
-                );
-                let expected = parry.cast_local_ray(&ray, super::FARTHEST, false);
+                let ray = parry3d::query::Ray::new(to_glam(&ray.origin.coords), to_glam(&ray.direction));
+                let expected = parry.cast_local_ray(&ray, FARTHEST, false);
                 let difference = match (met, expected) {
                     (Some(met), Some(expected)) => (met.distance - expected).abs(),
                     (None, None) => 0.0,
@@ -208,7 +206,7 @@ fn a_world_answers_a_beam_as_it_answers_its_rays() {
         &Pose::translation(2.0, 0.0, 0.0),
     ));
     for seed in 0..30 {
-        let mut draws = Draws::new(seed, Purpose::Placement, 0);
+        let mut draws = Draws::new(seed, 0);
         let mut shapes = vec![
             Shape::Mesh(Arc::clone(&star)),
             Shape::Block(Block::new(
@@ -255,7 +253,7 @@ fn a_world_answers_a_beam_as_it_answers_its_rays() {
 #[test]
 fn nothing_is_met_in_an_empty_world_and_by_no_rays() {
     let world = World::new(Vec::new());
-    let mut draws = Draws::new(1, Purpose::Placement, 0);
+    let mut draws = Draws::new(1, 0);
     let rays = cone(&mut draws, Point3::origin(), Point3::new(1.0, 0.0, 0.0), 16, 0.0);
     let mut hits = vec![None; 16];
     world.cast_beam(&rays, None, &mut hits);

@@ -1,12 +1,6 @@
 //! Triangle meshes as data: what a file describes, before it is placed anywhere.
-//!
-//! The library reads no files. A scene names its meshes by file; whoever reads the scene reads them too and puts them
-//! into [`Scene::meshes`](crate::Scene), where everything that places a mesh finds it.
 
-use crate::error::SimError;
 use nalgebra::Point3;
-use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// Triangles over shared vertices, in the unit of its file. The front of a triangle is the side from which its
 /// vertices run counter-clockwise.
@@ -74,21 +68,5 @@ impl Mesh {
     /// The triangles, each three numbers of vertices.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
-    }
-}
-
-/// The meshes that a scene names, by the file name that it gives them.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Meshes(pub BTreeMap<String, Arc<Mesh>>);
-
-impl Meshes {
-    /// The mesh of a file.
-    ///
-    /// # Errors
-    /// [`SimError::Mesh`] if nobody has read it.
-    pub fn get(&self, file: &str) -> Result<&Arc<Mesh>, SimError> {
-        self.0.get(file).ok_or_else(|| SimError::Mesh {
-            file: file.to_owned(),
-        })
     }
 }

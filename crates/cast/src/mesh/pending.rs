@@ -1,34 +1,34 @@
 //! Ways to triangles that are known to be met, each ray to one of its own: found in f64 eight at a time.
 
-use super::exact::{Judge, STEEP};
-use super::lanes::{inlined, less, size, unfused};
-use crate::footprint::Ray;
+use crate::lanes::{inlined, less, size, unfused};
+use crate::mesh::exact::{Judge, STEEP};
+use crate::ray::Ray;
 use fearless_simd::{Simd, f64x8, prelude::*};
 
 const LANES: usize = 8;
 
 /// Rays whose triangle is known, but not the way to it.
 #[derive(Default)]
-pub(super) struct Pending {
+pub(crate) struct Pending {
     count: usize,
     /// Each ray and its triangle.
     found: [(usize, u32); LANES],
 }
 
 /// The way of a ray to its triangle.
-pub(super) struct Settled {
-    pub(super) ray: usize,
-    pub(super) triangle: u32,
+pub(crate) struct Settled {
+    pub(crate) ray: usize,
+    pub(crate) triangle: u32,
     /// What [`Judge::way`] gives, to the bit.
-    pub(super) way: f64,
+    pub(crate) way: f64,
     /// [`Judge::closing`], if it was asked for.
-    pub(super) closing: f64,
+    pub(crate) closing: f64,
 }
 
 impl Pending {
     /// Takes one more; whether that is all there is room for, and [`Pending::settle`] must be called.
     #[inline(always)]
-    pub(super) fn add(&mut self, ray: usize, triangle: u32) -> bool {
+    pub(crate) fn add(&mut self, ray: usize, triangle: u32) -> bool {
         self.found[self.count] = (ray, triangle);
         self.count += 1;
         self.count == LANES
@@ -36,7 +36,7 @@ impl Pending {
 
     /// Finds the ways and tells them.
     #[inline(always)]
-    pub(super) fn settle<S: Simd, const CLOSING: bool>(
+    pub(crate) fn settle<S: Simd, const CLOSING: bool>(
         &mut self,
         simd: S,
         judge: &Judge<'_>,

@@ -1,10 +1,10 @@
 //! A bundle of rays in lanes of f32, and the pyramid around it.
 
-use super::build::{downwards, upwards};
-use super::lanes::{cross, size};
-use super::pyramid::{Pyramid, Start};
-use super::rays::Rays;
-use super::rows::{FOUR_ROWS, HALF, InRows, LANES, MOST, ROWS, Rows, TWO_ROWS, Vectors, halves, whole};
+use crate::lanes::{cross, size};
+use crate::packet::in_rows::InRows;
+use crate::packet::pyramid::{Pyramid, Start};
+use crate::packet::rays::Rays;
+use crate::packet::rows::{FOUR_ROWS, HALF, LANES, MOST, ROWS, Rows, TWO_ROWS, Vectors, halves, whole};
 use fearless_simd::{Simd, f32x16, f64x8, prelude::*};
 use std::ops::Range;
 
@@ -12,19 +12,19 @@ use std::ops::Range;
 const TOGETHER: f32 = 0.02;
 
 /// A bundle.
-pub(super) struct Bundle<'a, const R: usize> {
-    pub(super) rays: InRows<'a, R>,
-    pub(super) start: Start,
-    pub(super) direction: Vectors<f32, R>,
+pub(crate) struct Bundle<'a, const R: usize> {
+    pub(crate) rays: InRows<'a, R>,
+    pub(crate) start: Start,
+    pub(crate) direction: Vectors<f32, R>,
     /// If they do not all start at one point, starts relative to the reference.
-    pub(super) offset: Vectors<f32, R>,
+    pub(crate) offset: Vectors<f32, R>,
     /// And direction × offset.
-    pub(super) moment: Vectors<f32, R>,
-    pub(super) pyramid: Pyramid,
+    pub(crate) moment: Vectors<f32, R>,
+    pub(crate) pyramid: Pyramid,
 }
 
 impl<'a, const R: usize> Bundle<'a, R> {
-    pub(super) fn new(rays: &'a Rays, which: Range<usize>) -> Self {
+    pub(crate) fn new(rays: &'a Rays, which: Range<usize>) -> Self {
         Self {
             rays: InRows::of(rays, which),
             start: Start::default(),
@@ -37,13 +37,13 @@ impl<'a, const R: usize> Bundle<'a, R> {
 
     /// Whether the rays do not all start at one point.
     #[inline(always)]
-    pub(super) fn apart(&self) -> bool {
+    pub(crate) fn apart(&self) -> bool {
         self.rays.common.is_none()
     }
 
     /// Finds what there is to know of the rays among things whose coordinates reach so far; whether they are a narrow cone.
     #[inline(always)]
-    pub(super) fn surround<S: Simd>(&mut self, simd: S, reach: f32) -> bool {
+    pub(crate) fn surround<S: Simd>(&mut self, simd: S, reach: f32) -> bool {
         self.rays.narrow(simd, &mut self.direction);
         let reference = self.rays.start();
         self.start = Start {
@@ -87,7 +87,7 @@ impl<'a, const R: usize> Bundle<'a, R> {
 }
 
 /// What rays can be cast into, each by itself or as a bundle of so many rows.
-pub(super) trait Caster<T> {
+pub(crate) trait Caster<T> {
     /// What each of some rays meets.
     fn cast_each(&self, rays: &Rays, which: Range<usize>, found: &mut [T]);
 
@@ -96,7 +96,7 @@ pub(super) trait Caster<T> {
 }
 
 /// What each of some rays meets, as many at a time as fit in a bundle.
-pub(super) fn cast_all<T>(caster: &impl Caster<T>, rays: &Rays, found: &mut [T]) {
+pub(crate) fn cast_all<T>(caster: &impl Caster<T>, rays: &Rays, found: &mut [T]) {
     assert_eq!(rays.len(), found.len(), "every ray has its place");
     for (number, found) in found.chunks_mut(MOST).enumerate() {
         let first = number * MOST;
@@ -126,9 +126,4 @@ fn cast_some<T>(caster: &impl Caster<T>, rays: &Rays, which: Range<usize>, found
         cast_some(caster, rays, which.start..middle, first);
         cast_some(caster, rays, middle..which.end, second);
     }
-}
-
-/// An interval of f32 around a number of f64.
-pub(super) fn around(x: f64) -> (f32, f32) {
-    (downwards(x), upwards(x))
 }

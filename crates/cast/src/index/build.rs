@@ -4,12 +4,10 @@
 //! for how many leaves (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007). A node splits the
 //! greatest of its parts until it has eight. The order of everything is the same on any number of threads.
 
-use super::wide::{Child, Leaf, Node, ROUNDING, WIDTH, Wide};
+use crate::index::wide::{Child, Leaf, Node, WIDTH, Wide};
+use crate::rounding::{ROUNDING, downwards, rounded, upwards};
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
-
-/// Levels of nodes at most: below [`SORTED`] parts are halved by number.
-pub(super) const DEEPEST: usize = 20;
 
 /// Levels of nodes before parts are halved by number whatever that costs, so that the deepest is bounded: 2²⁸ triangles
 /// are 2²⁵ leaves, nine levels more.
@@ -214,8 +212,15 @@ fn over<T: Send>(items: &[Item], of_some: impl Fn(&[Item]) -> T + Sync, join: im
     join(a, b)
 }
 
+impl Wide {
+    /// Indexes triangles over vertices, in metres.
+    pub(crate) fn new(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Self {
+        index(vertices, triangles)
+    }
+}
+
 /// The index over triangles.
-pub(super) fn index(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Wide {
+fn index(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Wide {
     let reach = upwards(vertices.iter().fold(0.0, |reach, v| v.coords.amax().max(reach)));
     let item = |(number, corners): (usize, &[u32; 3])| {
         let [a, b, c] = corners.map(|v| vertices[v as usize].coords);
@@ -255,7 +260,7 @@ pub(super) fn index(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Wide {
 }
 
 /// The nodes over boxes, each given by its lowest and highest corner; a leaf's number is that of its box.
-pub(super) fn over_boxes(boxes: &[(Vector3<f64>, Vector3<f64>)], reach: f32) -> Vec<Node> {
+pub(crate) fn over_boxes(boxes: &[(Vector3<f64>, Vector3<f64>)], reach: f32) -> Vec<Node> {
     let item =
         |(number, (low, high)): (usize, &(Vector3<f64>, Vector3<f64>))| Item::new(number, low, high, reach);
     let mut items: Vec<Item> = boxes.iter().enumerate().map(item).collect();
@@ -411,28 +416,5 @@ fn partition(items: &mut [Item], fits: impl Fn(&Item) -> bool) -> usize {
         items.swap(low, high - 1);
         low += 1;
         high -= 1;
-    }
-}
-
-/// The nearest number in f32.
-// Rounding is what it is for.
-#[allow(clippy::cast_possible_truncation)]
-pub(super) fn rounded(x: f64) -> f32 {
-    x as f32
-}
-
-/// The nearest number in f32 that is not less.
-pub(super) fn upwards(x: f64) -> f32 {
-    let near = rounded(x);
-    if f64::from(near) < x { near.next_up() } else { near }
-}
-
-/// The nearest number in f32 that is not greater.
-pub(super) fn downwards(x: f64) -> f32 {
-    let near = rounded(x);
-    if f64::from(near) > x {
-        near.next_down()
-    } else {
-        near
     }
 }

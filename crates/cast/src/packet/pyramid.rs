@@ -3,10 +3,11 @@
 //! The rays of a narrow cone, from nearly one point, lie in a pyramid. What is outside one of its sides, or outside one
 //! of the sides that it has in projection along an axis, is met by none of them. All of it errs outwards.
 
-use super::lanes;
-use super::lanes::inlined;
-use super::rows::{LANES, Vectors, whole};
-use super::wide::{ROUNDING, WIDTH};
+use crate::index::wide::WIDTH;
+use crate::lanes;
+use crate::lanes::inlined;
+use crate::packet::rows::{LANES, Vectors, whole};
+use crate::rounding::ROUNDING;
 use fearless_simd::{Simd, f32x4, f32x8, f32x16, prelude::*};
 
 /// Rounding of a slope, with room to spare.
@@ -21,7 +22,7 @@ const FAR: usize = 10;
 const NEAR: usize = 11;
 
 /// The pyramid.
-pub(super) struct Pyramid {
+pub(crate) struct Pyramid {
     /// Normals of the sides, by axis. What is behind a side is out of the bundle.
     normal: [[f32; LANES]; 3],
     /// Greatest product of the normal with a point that is not out.
@@ -29,18 +30,18 @@ pub(super) struct Pyramid {
     /// By axis whether a box's corner that is farthest inside has its low (0) or its high side (1).
     inner: [[u32; LANES]; 3],
     /// Four directions, by axis: every ray is a sum of them, none of them taken away.
-    pub(super) corners: [[f32; 4]; 3],
+    pub(crate) corners: [[f32; 4]; 3],
 }
 
 /// Where the rays start, as far as the pyramid needs it.
 #[derive(Default)]
-pub(super) struct Start {
+pub(crate) struct Start {
     /// The point that coordinates are relative to.
-    pub(super) reference: [f32; 3],
+    pub(crate) reference: [f32; 3],
     /// Greatest coordinate of it.
-    pub(super) reach: f32,
+    pub(crate) reach: f32,
     /// Greatest offset of a start from the reference, by the sum of its coordinates.
-    pub(super) spread: f32,
+    pub(crate) spread: f32,
 }
 
 fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
@@ -79,7 +80,7 @@ fn along<S: Simd>(v: &[f32x16<S>; 3], n: [f32; 3]) -> f32x16<S> {
 }
 
 impl Pyramid {
-    pub(super) fn blank() -> Self {
+    pub(crate) fn blank() -> Self {
         Self {
             normal: [[0.0; LANES]; 3],
             edge: [0.0; LANES],
@@ -91,7 +92,7 @@ impl Pyramid {
     /// Finds the sides around directions in rows, among things whose coordinates reach so far; whether they are a
     /// narrow cone.
     #[inline(always)]
-    pub(super) fn surround<S: Simd, const R: usize>(
+    pub(crate) fn surround<S: Simd, const R: usize>(
         &mut self,
         simd: S,
         direction: &Vectors<f32, R>,
@@ -266,7 +267,7 @@ impl Pyramid {
 
     /// Which of eight boxes some ray may meet before `limit`, and a way along a ray that is shorter than that to them.
     #[inline(always)]
-    pub(super) fn boxes<S: Simd>(
+    pub(crate) fn boxes<S: Simd>(
         &self,
         simd: S,
         bounds: &[[[f32; WIDTH]; 2]; 3],
@@ -312,7 +313,7 @@ impl Pyramid {
 
     /// Which of eight triangles some ray may meet.
     #[inline(always)]
-    pub(super) fn triangles<S: Simd>(&self, simd: S, corners: &[[f32x8<S>; 3]; 3]) -> u32 {
+    pub(crate) fn triangles<S: Simd>(&self, simd: S, corners: &[[f32x8<S>; 3]; 3]) -> u32 {
         let splat = inlined(
             #[inline(always)]
             |x: f32| f32x8::splat(simd, x),

@@ -1,6 +1,7 @@
 //! The surface of a shape as triangles: for pictures, for volumes, for files that others read.
 
-use super::{Block, Cylinder, Polygon, Shape};
+use crate::shape::Shape;
+use crate::solid::{Block, Cylinder, Polygon};
 use nalgebra::{Point3, Vector3};
 
 /// A triangle; its corners run counter-clockwise seen from outside.

@@ -1,15 +1,15 @@
 //! A ray against a solid cylinder with flat caps, in closed form.
 
-use crate::footprint::Ray;
+use crate::ray::Ray;
 use catoptric_model::Pose;
 use nalgebra::{Point3, Unit, Vector3};
 
 /// A solid cylinder about the z axis of its own frame, centered on its origin.
 #[derive(Debug, Clone)]
 pub struct Cylinder {
-    pub(super) frame_from_cylinder: Pose,
-    pub(super) radius: f64,
-    pub(super) half_height: f64,
+    pub(crate) frame_from_cylinder: Pose,
+    pub(crate) radius: f64,
+    pub(crate) half_height: f64,
 }
 
 /// A place on a ray, and the outward normal there in the cylinder's own frame.
@@ -29,7 +29,7 @@ impl Cylinder {
     ///
     /// The solid is the part of the round column x² + y² ≤ r² between the planes z = ±h: the ray is inside it where
     /// its stretch inside the column, a quadratic's two roots, overlaps its stretch between the planes.
-    pub(super) fn cast(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
+    pub(crate) fn cast(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
         let origin = self.frame_from_cylinder.inverse_transform_point(&ray.origin);
         let direction = self.frame_from_cylinder.inverse_transform_vector(&ray.direction);
         let (column_in, column_out) = self.column(&origin, &direction)?;
@@ -90,7 +90,7 @@ impl Cylinder {
     }
 
     /// Corners of a box around it.
-    pub(super) fn corners(&self) -> Vec<Point3<f64>> {
+    pub(crate) fn corners(&self) -> Vec<Point3<f64>> {
         let sign = |i: u8, bit: u8| if i & bit == 0 { -1.0 } else { 1.0 };
         (0..8)
             .map(|i| {
@@ -104,6 +104,7 @@ impl Cylinder {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Draws;
     use catoptric_model::frame::yaw_pitch_roll;
     use nalgebra::Translation3;
 
@@ -142,7 +143,7 @@ mod tests {
     fn every_hit_lies_on_the_surface_and_every_miss_stays_outside() {
         let pose = Pose::from_parts(Translation3::new(0.3, -0.2, 0.5), yaw_pitch_roll(0.4, 0.8, -0.3));
         let cylinder = Cylinder::new(pose, 0.8, 1.4);
-        let mut draws = crate::noise::Draws::new(5, crate::noise::Purpose::Placement, 0);
+        let mut draws = Draws::new(5, 0);
         let (mut hits, mut misses) = (0, 0);
         for _ in 0..20_000 {
             let origin = Point3::from(draws.normal3() * 3.0);

@@ -1,8 +1,8 @@
 //! Rays side by side, and moved into another frame eight at a time with the operations of one alone, in their order.
 
-use super::lanes::{inlined, unfused};
-use super::rows::{HALF, LANES as ROW, MOST, Wide};
-use crate::footprint::Ray;
+use crate::lanes::{inlined, unfused};
+use crate::packet::rows::{HALF, LANES as ROW, MOST, Wide};
+use crate::ray::Ray;
 use catoptric_model::Pose;
 use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
 use nalgebra::{Point3, Unit, Vector3};
@@ -16,7 +16,7 @@ const BLOCK: usize = 64;
 /// Rays side by side: each coordinate of all of them in a row of its own, starts in metres, directions of length 1.
 ///
 /// ```
-/// # use catoptric_sim::{cast::Rays, footprint::Ray};
+/// # use catoptric_cast::{Ray, Rays};
 /// # use nalgebra::{Point3, Vector3};
 /// let ray = Ray { origin: Point3::new(0.0, 0.0, 0.1), direction: Vector3::x_axis() };
 /// let rays: Rays = [ray, ray].into_iter().collect();
@@ -57,7 +57,7 @@ impl Rays {
     }
 
     /// Adds some of others.
-    pub(crate) fn extend_from(&mut self, others: &Self, which: Range<usize>) {
+    pub fn extend_from(&mut self, others: &Self, which: Range<usize>) {
         assert!(which.end <= others.count, "they are there");
         self.make_room(which.len());
         let own = self.count..self.count + which.len();
@@ -69,7 +69,7 @@ impl Rays {
     }
 
     /// Adds some of others, moved into another frame: what [`placed`] makes of each of them, to the bit.
-    pub(crate) fn extend_placed(&mut self, others: &Self, which: Range<usize>, other_from_ray: &Pose) {
+    pub fn extend_placed(&mut self, others: &Self, which: Range<usize>, other_from_ray: &Pose) {
         assert!(which.end <= others.count, "they are there");
         self.make_room(which.len());
         let own = self.count;
@@ -132,7 +132,7 @@ impl Rays {
 
     /// Coordinates of where they start and of where they go, by axis, from one of them on for so many rows.
     #[inline(always)]
-    pub(super) fn rows<'a, const R: usize>(&'a self, from: usize) -> [Wide<'a, R>; 2] {
+    pub(crate) fn rows<'a, const R: usize>(&'a self, from: usize) -> [Wide<'a, R>; 2] {
         let three = inlined(
             #[inline(always)]
             |of: &'a [Vec<f64>; 3]| {
@@ -188,14 +188,6 @@ impl FromIterator<Ray> for Rays {
     }
 }
 
-/// A ray moved into another frame.
-pub(crate) fn placed(ray: &Ray, other_from_ray: &Pose) -> Ray {
-    Ray {
-        origin: other_from_ray * ray.origin,
-        direction: other_from_ray * ray.direction,
-    }
-}
-
 /// t·w + q × t + v with t = 2·(q × v).
 #[inline(always)]
 fn rotate<S: Simd>(simd: S, q: &[f64x8<S>; 3], w: f64x8<S>, v: &[f64x8<S>; 3]) -> [f64x8<S>; 3] {
@@ -213,6 +205,7 @@ fn rotate<S: Simd>(simd: S, q: &[f64x8<S>; 3], w: f64x8<S>, v: &[f64x8<S>; 3]) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ray::placed;
     use nalgebra::{Translation3, UnitQuaternion};
 
     #[test]

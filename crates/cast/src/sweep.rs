@@ -3,14 +3,19 @@
 //! A polygon's plane and edges are computed in f64 as for a ray alone, in the same order: the answer is the same to the
 //! bit. Where the whole pyramid around the rays passes inside the polygon, or outside, its edges need not be tried.
 
-use super::build::upwards;
-use super::bundle::{Bundle, Caster, cast_all};
-use super::finish::MetInRow;
-use super::lanes::{inlined, less, unfused};
-use super::rays::Rays;
-use super::rows::{HALF, InRows, LANES, Rows, half};
-use super::wide::Walk;
-use super::{Contact, EDGE_SLACK, FARTHEST, NONE, Polygon, Shape, World};
+use crate::hit::{Contact, NONE};
+use crate::index::wide::Walk;
+use crate::lanes::{inlined, less, unfused};
+use crate::mesh::finish::MetInRow;
+use crate::packet::bundle::{Bundle, Caster, cast_all};
+use crate::packet::in_rows::InRows;
+use crate::packet::rays::Rays;
+use crate::packet::rows::{HALF, LANES, Rows, half};
+use crate::ray::FARTHEST;
+use crate::rounding::upwards;
+use crate::shape::Shape;
+use crate::solid::polygon::{EDGE_SLACK, Polygon};
+use crate::world::World;
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use fearless_simd::{f64x4, f64x8, mask32x8, mask64x8, u32x8};
 use nalgebra::Vector3;
@@ -81,7 +86,17 @@ impl Caster<Option<Contact>> for InWorld<'_> {
 }
 
 impl World {
-    pub(super) fn cast_beam_at(
+    /// The nearest surface along each of some rays, `left` aside: what [`World::cast`] says of each of them but for the point
+    /// and the normal, which [`World::hit`] adds; faster if they are a narrow cone from nearly one point. Of surfaces at
+    /// the very same distance the first counts.
+    ///
+    /// # Panics
+    /// If there are not as many places for what they meet.
+    pub fn cast_beam(&self, rays: &Rays, left: Option<usize>, contacts: &mut [Option<Contact>]) {
+        self.cast_beam_at(Level::new(), rays, left, contacts);
+    }
+
+    pub(crate) fn cast_beam_at(
         &self,
         level: Level,
         rays: &Rays,

@@ -1,23 +1,24 @@
 //! Ways of a bundle's rays to the triangles that they are known to meet, in f64: rays of one triangle by its plane, rays that
 //! have one to themselves eight at a time.
 
-use super::NONE;
-use super::exact::{Judge, Plane};
-use super::lanes::inlined;
-use super::pending::{Pending, Settled};
-use super::rows::{HALF, InRows, LANES, Rows, half};
+use crate::hit::NONE;
+use crate::lanes::inlined;
+use crate::mesh::exact::{Judge, Plane};
+use crate::mesh::pending::{Pending, Settled};
+use crate::packet::in_rows::InRows;
+use crate::packet::rows::{HALF, LANES, Rows, half};
 use fearless_simd::{Simd, prelude::*};
 use fearless_simd::{f64x8, mask32x16, mask64x8, u32x16};
 
 /// What sixteen rays in a row meet.
-pub(super) struct MetInRow<'a> {
-    pub(super) row: usize,
+pub(crate) struct MetInRow<'a> {
+    pub(crate) row: usize,
     /// A bit for every ray that meets anything; the others have any numbers.
-    pub(super) some: u64,
-    pub(super) triangle: &'a [u32; LANES],
-    pub(super) distance: &'a [f64; LANES],
+    pub(crate) some: u64,
+    pub(crate) triangle: &'a [u32; LANES],
+    pub(crate) distance: &'a [f64; LANES],
     /// Product of the ray's direction with the triangle's normal, if it was asked for.
-    pub(super) closing: &'a [f64; LANES],
+    pub(crate) closing: &'a [f64; LANES],
 }
 
 /// Where the normal counts too, fewer rays of a row with the same triangle are looked at each by itself.
@@ -47,7 +48,7 @@ struct Kept {
 
 /// Tells, row by row, how far rays go to these triangles, and under which incidence if that is asked for.
 #[inline(always)]
-pub(super) fn finish<S: Simd, const R: usize, const CLOSING: bool>(
+pub(crate) fn finish<S: Simd, const R: usize, const CLOSING: bool>(
     simd: S,
     found: &[[u32; LANES]; R],
     rays: &InRows<'_, R>,

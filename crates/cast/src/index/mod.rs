@@ -1,0 +1,4 @@
+//! An index over boxes and triangles for lanes.
+
+pub(crate) mod build;
+pub(crate) mod wide;

@@ -1,0 +1,85 @@
+//! Some rays of many, row by row.
+
+use crate::packet::rays::Rays;
+use crate::packet::rows::{LANES, Vectors, Wide, half, halves};
+use crate::ray::Ray;
+use crate::rounding::rounded;
+use fearless_simd::{Simd, f64x8, prelude::*};
+use nalgebra::{Point3, Unit, Vector3};
+use std::ops::Range;
+
+/// Rays in f64. What the last row has too many may be anything.
+pub(crate) struct InRows<'a, const R: usize> {
+    pub(crate) count: usize,
+    pub(crate) direction: Wide<'a, R>,
+    pub(crate) origin: Wide<'a, R>,
+    /// Where all of them start, bit for bit, if they do.
+    pub(crate) common: Option<Point3<f64>>,
+}
+
+impl<'a, const R: usize> InRows<'a, R> {
+    /// Some rays, as many as fit, one at least.
+    #[inline(always)]
+    pub(crate) fn of(rays: &'a Rays, which: Range<usize>) -> Self {
+        let count = which.len();
+        assert!((1..=R * LANES).contains(&count), "they fit");
+        let [origin, direction] = rays.rows(which.start);
+        let mut apart = 0;
+        for row in origin {
+            let row = &row.as_flattened()[..count];
+            let first = row[0].to_bits();
+            apart = row.iter().fold(apart, |apart, x| apart | (first ^ x.to_bits()));
+        }
+        Self {
+            count,
+            direction,
+            origin,
+            common: (apart == 0).then(|| rays.get(which.start).origin),
+        }
+    }
+
+    /// One of them.
+    pub(crate) fn get(&self, ray: usize) -> Ray {
+        let of = |[x, y, z]: &Wide<'_, R>| {
+            let at = |row: &[[f64; LANES]; R]| row[ray / LANES][ray % LANES];
+            Vector3::new(at(x), at(y), at(z))
+        };
+        Ray {
+            origin: Point3::from(of(&self.origin)),
+            // As it came.
+            direction: Unit::new_unchecked(of(&self.direction)),
+        }
+    }
+
+    /// Directions in f32; what the last row has too many are copies of the first ray.
+    #[inline(always)]
+    pub(crate) fn narrow<S: Simd>(&self, simd: S, narrow: &mut Vectors<f32, R>) {
+        for (wide, narrow) in self.direction.iter().zip(narrow) {
+            for (wide, narrow) in wide.iter().zip(&mut narrow.0) {
+                let [low, high] = halves(simd, wide);
+                low.narrow(high).store_slice(narrow);
+            }
+            narrow.fill_up(self.count);
+        }
+    }
+
+    /// The start of the first ray in f32.
+    #[inline(always)]
+    pub(crate) fn start(&self) -> [f32; 3] {
+        let [x, y, z] = self.origin;
+        [rounded(x[0][0]), rounded(y[0][0]), rounded(z[0][0])]
+    }
+
+    /// Starts of a half of a row (the first or the second).
+    #[inline(always)]
+    pub(crate) fn starts<S: Simd>(&self, simd: S, row: usize, second: usize) -> [f64x8<S>; 3] {
+        match &self.common {
+            Some(point) => [
+                f64x8::splat(simd, point.x),
+                f64x8::splat(simd, point.y),
+                f64x8::splat(simd, point.z),
+            ],
+            None => half(simd, &self.origin, row, second),
+        }
+    }
+}
