@@ -8,7 +8,7 @@ use super::truth_tables::{ReturnRows, rows_of_readings};
 use catoptric::io::recording::{Encoded, RecordingEncoder};
 use catoptric::model::Pose;
 use catoptric::sim::laboratory::{Drawn, Memory, Returns, Sight};
-use catoptric::sim::reading::Return;
+use catoptric::sim::receive::Return;
 use catoptric::sim::{Laboratory, SimError};
 use rayon::prelude::*;
 use std::ops::Range;

@@ -5,8 +5,8 @@ use super::truth_tables::{Tell, field, mirror_names, role_name, way};
 use catoptric::model::beam;
 use catoptric::sim::Laboratory;
 use catoptric::sim::laboratory::Sight;
-use catoptric::sim::optics::Setting;
-use catoptric::sim::reading::{Stop, SubRayEnd, SubRayLight};
+use catoptric::sim::light::Setting;
+use catoptric::sim::receive::{Stop, SubRayEnd, SubRayLight};
 use rayon::prelude::*;
 use std::ops::Range;
 

@@ -2,8 +2,8 @@
 
 use super::error::CliError;
 use catoptric::sim::laboratory::Returns;
-use catoptric::sim::optics::Role;
-use catoptric::sim::reading::{Chance, Return};
+use catoptric::sim::light::Role;
+use catoptric::sim::receive::{Chance, Return};
 use catoptric::sim::scene::ErrorModel;
 use catoptric::sim::{Laboratory, Scene};
 use std::fmt::Write as _;

@@ -2,7 +2,7 @@
 
 use catoptric_cast::area_vector;
 use catoptric_model::{MirrorPlane, beam};
-use catoptric_sim::layout;
+use catoptric_sim::build::layout;
 use catoptric_sim::scene::{FacetShape, Wedge};
 use catoptric_sim::truth::{BeamClass, TrueBeam};
 use nalgebra::{Point3, Unit};

@@ -206,7 +206,7 @@ pub(super) fn runs(drawn: &Drawn) -> (Headings, Rows) {
 
 /// Where each mirror stands.
 pub(super) fn places(drawn: &Drawn) -> (Headings, Rows) {
-    let row = |facet: &catoptric_sim::structure::BuiltFacet| {
+    let row = |facet: &catoptric_sim::build::BuiltFacet| {
         let (middle, m) = (crate::layout::center(&facet.face.corners), facet.face.normal);
         let mut row = vec![facet.name.clone()];
         row.extend(middle.iter().map(|c| number(1e3 * c, 1)));
