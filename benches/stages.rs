@@ -10,12 +10,12 @@ use catoptric::calib::{self, Method, Options};
 use catoptric::files::RecordingWriter;
 use catoptric::layout::{Detail, Layout, analyze};
 use catoptric::model::{BoardPlane, Deflection, RawRange, beam, range};
-use catoptric::sim::detect::{self, Pulse};
+use catoptric::sim::build::Structure;
+use catoptric::sim::light::{Mirrors, Setting};
 use catoptric::sim::noise::{Columns, Purpose};
-use catoptric::sim::optics::{Mirrors, Setting};
-use catoptric::sim::reading::Sensor;
+use catoptric::sim::receive::Sensor;
+use catoptric::sim::receive::detect::{self, Pulse};
 use catoptric::sim::scene::{FacetShape, PolygonShape};
-use catoptric::sim::structure::Structure;
 use catoptric::sim::{Laboratory, Scene};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Unit, Vector3};
@@ -64,7 +64,7 @@ fn layout(c: &mut Criterion) {
     let scene = prototype();
     let mut moved = scene.clone();
     let facet = &mut moved.superstructure.facet[3];
-    let corners = catoptric::sim::layout::corners(&facet.shape).unwrap();
+    let corners = catoptric::sim::build::layout::corners(&facet.shape).unwrap();
     let corners_mm = corners
         .iter()
         .map(|c| [c.x * 1e3 + 0.3, c.y * 1e3 - 0.2, c.z * 1e3]);

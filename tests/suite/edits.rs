@@ -4,11 +4,11 @@ use crate::scenes::{PROTOTYPE, TWO_MIRROR, scene};
 use catoptric::layout::{Detail, Layout, analyze};
 use catoptric::model::beam;
 use catoptric::sim::Scene;
-use catoptric::sim::layout::corners;
-use catoptric::sim::optics::{Edit, Mirrors, Setting};
-use catoptric::sim::reading::Sensor;
+use catoptric::sim::build::Structure;
+use catoptric::sim::build::layout::corners;
+use catoptric::sim::light::{Edit, Mirrors, Setting};
+use catoptric::sim::receive::Sensor;
 use catoptric::sim::scene::{FacetShape, PolygonShape};
-use catoptric::sim::structure::Structure;
 use nalgebra::{Point3, Rotation3, Vector3};
 use proptest::prelude::*;
 

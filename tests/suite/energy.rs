@@ -5,14 +5,16 @@
 use crate::scenes::{BARE, scene};
 use catoptric::cast::{Polygon, Shape};
 use catoptric::model::beam;
+use catoptric::sim::Scene;
+use catoptric::sim::build::Structure;
+use catoptric::sim::build::color;
+use catoptric::sim::light::{Mirrors, Role, Setting, Target};
 use catoptric::sim::noise::{Draws, Purpose};
-use catoptric::sim::optics::{Mirrors, Role, Setting, Target};
-use catoptric::sim::reading::{Return, Sensor, Stop, SubRayEnd};
+use catoptric::sim::receive::phase;
+use catoptric::sim::receive::{Return, Sensor, Stop, SubRayEnd};
 use catoptric::sim::scene::{
     Detector, ErrorModel, Facet, FacetShape, Glass, Post, PostCylinder, PostShape, Principle, RectangleShape,
 };
-use catoptric::sim::structure::Structure;
-use catoptric::sim::{Scene, color, phase};
 use nalgebra::{Point3, Vector3};
 
 /// A white rectangle at a place, seen along its normal.

@@ -18,6 +18,7 @@ mod edits;
 mod energy;
 mod export;
 mod gates;
+mod house;
 mod layout;
 mod mishaps;
 mod motion;

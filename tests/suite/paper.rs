@@ -6,7 +6,7 @@
 use crate::scenes::{BARE, PROTOTYPE, scene, set_board_ahead};
 use catoptric::model::{PoseKind, beam};
 use catoptric::sim::scene::{ErrorModel, Errors, Preset};
-use catoptric::sim::{Laboratory, structure::Structure};
+use catoptric::sim::{Laboratory, build::Structure};
 
 /// Table 2: mean errors of three trials and their standard deviations, in metres.
 const TABLE_2: [(f64, [f64; 3], [f64; 3]); 3] = [

@@ -1,15 +1,16 @@
 //! Parameters, expressions and patterns of a scene: what they come to, and what is said of those that come to nothing.
 //!
 //! Places of errors are computed here by searching the text. That a copy is where its original's mirror image is, is
-//! proven in `crates/sim/src/pattern/tests.rs`.
+//! proven in `crates/sim/src/build/pattern/tests.rs`.
 
 use crate::bad_input::{expect_one_in, place_of, problems_with};
 use crate::common::{VALID, folder_with, run, stderr, stdout};
 use crate::scenes::PROTOTYPE;
 use catoptric::files::scene;
 use catoptric::layout::{self, Detail};
+use catoptric::sim::Scene;
+use catoptric::sim::build::layout as shapes;
 use catoptric::sim::scene::FacetShape;
-use catoptric::sim::{Scene, layout as shapes};
 use nalgebra::Point3;
 
 pub(crate) const PARAMETRIC: &str = include_str!("../../scenes/prototype-parametric.toml");

@@ -7,11 +7,11 @@ use crate::scenes::{BARE, scene, set_board_ahead};
 use catoptric::cast::Ray;
 use catoptric::cast::{Polygon, Shape};
 use catoptric::model::{MirrorPlane, beam};
-use catoptric::sim::color;
+use catoptric::sim::build::Structure;
+use catoptric::sim::build::color;
+use catoptric::sim::light::{End, Mirrors, Path, Role, Setting, Target};
 use catoptric::sim::noise::{Draws, Purpose};
-use catoptric::sim::optics::{End, Mirrors, Path, Role, Setting, Target};
 use catoptric::sim::scene::{ErrorModel, Facet, FacetShape, PolygonShape};
-use catoptric::sim::structure::Structure;
 use catoptric::sim::{Laboratory, Scene};
 use nalgebra::{Matrix4, Point3, Unit, Vector3};
 

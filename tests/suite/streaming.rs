@@ -9,10 +9,10 @@ use crate::scenes::{PROTOTYPE, TWO_MIRROR, scene};
 use catoptric::files::scene::load;
 use catoptric::files::{DatasetWriter, Provenance};
 use catoptric::model::{Excerpt, Pose, beam};
+use catoptric::sim::build::Structure;
 use catoptric::sim::laboratory::Memory;
-use catoptric::sim::optics::{Mirrors, Setting};
+use catoptric::sim::light::{Mirrors, Setting};
 use catoptric::sim::scene::{Correlated, EchoChoice, Interference};
-use catoptric::sim::structure::Structure;
 use catoptric::sim::{Laboratory, Scene};
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
@@ -328,7 +328,7 @@ position_m = [0, 0.05, 1.76]
     let left = beam::nearest(std::f64::consts::FRAC_PI_2).unwrap();
     let ends = sight.sub_ray_ends(0, left);
     let hits_intruder = ends.iter().any(|end| match end.stop {
-        catoptric::sim::reading::Stop::Hit { surface, .. } => names[surface] == "intruder",
+        catoptric::sim::receive::Stop::Hit { surface, .. } => names[surface] == "intruder",
         _ => false,
     });
     assert!(hits_intruder, "{ends:?}");

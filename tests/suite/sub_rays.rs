@@ -6,10 +6,10 @@
 use crate::common::{VALID, folder_with, run, stderr};
 use crate::scenes::{BARE, scene};
 use catoptric::model::beam;
-use catoptric::sim::optics::{Mirrors, Setting};
-use catoptric::sim::reading::{Sensor, Stop, SubRayLight};
+use catoptric::sim::build::Structure;
+use catoptric::sim::light::{Mirrors, Setting};
+use catoptric::sim::receive::{Sensor, Stop, SubRayLight};
 use catoptric::sim::scene::{Facet, FacetShape, RectangleShape};
-use catoptric::sim::structure::Structure;
 use std::collections::BTreeMap;
 use std::path::Path;
 

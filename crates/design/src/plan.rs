@@ -20,9 +20,9 @@
 use catoptric_calib::CalibError;
 use catoptric_calib::plan::{Placed, Plan, PlannedPose, Situation, facing};
 use catoptric_model::{Dataset, Pose, PoseKind};
-use catoptric_sim::placement::{self, Planned};
-use catoptric_sim::reading::Sensor;
-use catoptric_sim::room::room_from_rig;
+use catoptric_sim::build::room_from_rig;
+use catoptric_sim::laboratory::placement::{self, Planned};
+use catoptric_sim::receive::Sensor;
 use catoptric_sim::scene::BoardPose;
 use catoptric_sim::{Laboratory, Scene, SimError};
 

@@ -14,8 +14,8 @@ use super::paths::parent;
 use super::tree::{self, Node, Source};
 use catoptric_model::place::{Problem, nearest};
 use catoptric_sim::Scene;
+use catoptric_sim::build::pattern::{self, Expanded};
 use catoptric_sim::check;
-use catoptric_sim::pattern::{self, Expanded};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

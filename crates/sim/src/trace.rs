@@ -3,14 +3,14 @@
 //! The structure around the scanner, if there is one, stands where it is as built under the scene's own seed; boards,
 //! which are in another place for every pose, are not there.
 
-use crate::color;
+use crate::build::color;
+use crate::build::room::room_from_rig;
+use crate::build::stage::Stage;
+use crate::build::structure::Structure;
 use crate::error::SimError;
 use crate::laboratory::wall_targets;
-use crate::optics::{Bounce, Course, End, Mirrors, Setting};
-use crate::room::room_from_rig;
+use crate::light::optics::{Bounce, Course, End, Mirrors, Setting};
 use crate::scene::Scene;
-use crate::stage::Stage;
-use crate::structure::Structure;
 use catoptric_cast::Ray;
 use catoptric_model::Pose;
 use nalgebra::{Point3, Unit, Vector3};

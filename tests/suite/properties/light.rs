@@ -3,10 +3,10 @@
 use super::{cases, direction, vector};
 use catoptric::model::beam;
 use catoptric::model::bias::{interpolate, interpolation_weights};
-use catoptric::sim::footprint::{self, ENERGY_INSIDE, SubRay, sub_rays};
-use catoptric::sim::glass;
+use catoptric::sim::light::footprint::{self, ENERGY_INSIDE, SubRay, sub_rays};
+use catoptric::sim::light::glass;
+use catoptric::sim::light::power::{Illumination, received};
 use catoptric::sim::noise::{Draws, Purpose};
-use catoptric::sim::power::{Illumination, received};
 use catoptric::sim::scene::{BeamShape, Glass, Light};
 use nalgebra::Unit;
 use proptest::collection::vec;

@@ -3,11 +3,11 @@
 use super::cases;
 use crate::scenes::{BARE, scene};
 use catoptric::model::BiasTerms;
-use catoptric::sim::detect::{self, Pulse};
-use catoptric::sim::echo::{Echo, Receiver};
-use catoptric::sim::optics::Role;
-use catoptric::sim::phase;
-use catoptric::sim::reading::{Chance, Return, Sensor};
+use catoptric::sim::light::Role;
+use catoptric::sim::receive::detect::{self, Pulse};
+use catoptric::sim::receive::echo::{Echo, Receiver};
+use catoptric::sim::receive::phase;
+use catoptric::sim::receive::{Chance, Return, Sensor};
 use catoptric::sim::scene::{Detector, ErrorModel};
 use proptest::collection::vec;
 use proptest::prelude::*;

@@ -4,7 +4,7 @@
 //! nothing, every exponential by `libm`. It knows nothing of roots found otherwise.
 
 use super::cases;
-use catoptric::sim::detect::{self, Edge, Pulse, walk};
+use catoptric::sim::receive::detect::{self, Edge, Pulse, walk};
 use proptest::collection::vec;
 use proptest::prelude::*;
 

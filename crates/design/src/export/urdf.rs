@@ -4,7 +4,7 @@ use crate::layout::{Drawing, center};
 use catoptric_model::Pose;
 use catoptric_model::frame::tangent_basis;
 use catoptric_sim::Scene;
-use catoptric_sim::structure::nominal_mount;
+use catoptric_sim::build::nominal_mount;
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
 /// The frames of a layout: the rig, the laser as drawn, and one for every mirror, its z axis along the normal.

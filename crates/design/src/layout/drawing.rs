@@ -6,10 +6,10 @@ use super::footprint::{Footprint, Outlines};
 use super::size::HOUSING;
 use catoptric_cast::Triangle;
 use catoptric_model::Pose;
-use catoptric_sim::optics::{End, Mirrors, Setting};
-use catoptric_sim::reading::Sensor;
-use catoptric_sim::room::room_from_rig;
-use catoptric_sim::structure::{BuiltFacet, Structure};
+use catoptric_sim::build::room_from_rig;
+use catoptric_sim::build::{BuiltFacet, Structure};
+use catoptric_sim::light::{End, Mirrors, Setting};
+use catoptric_sim::receive::Sensor;
 use catoptric_sim::{Scene, SimError};
 use nalgebra::{Point3, Unit, Vector3};
 

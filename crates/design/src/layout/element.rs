@@ -11,11 +11,12 @@
 use super::footprint::Footprint;
 use catoptric_cast::Ray;
 use catoptric_model::beam;
-use catoptric_sim::optics::{End, Path, Setting, Trail};
-use catoptric_sim::reading::{Sensor, class};
-use catoptric_sim::structure::Structure;
+use catoptric_sim::Scene;
+use catoptric_sim::build::Structure;
+use catoptric_sim::build::color;
+use catoptric_sim::light::{End, Path, Setting, Trail};
+use catoptric_sim::receive::{Sensor, class};
 use catoptric_sim::truth::BeamClass;
-use catoptric_sim::{Scene, color};
 use nalgebra::{Unit, Vector3};
 use rayon::prelude::*;
 use serde::Serialize;

@@ -6,7 +6,7 @@ use super::footprint::Footprint;
 use super::sensitivity::{RANGE_M, Shift, shifts};
 use catoptric_cast::area_vector;
 use catoptric_model::beam;
-use catoptric_sim::structure::Structure;
+use catoptric_sim::build::Structure;
 use serde::Serialize;
 
 /// Turn of a facet that its sensitivity is stated for, in degrees.

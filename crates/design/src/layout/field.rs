@@ -8,8 +8,8 @@
 
 use super::element::{Traced, exit};
 use catoptric_model::beam;
+use catoptric_sim::build::Structure;
 use catoptric_sim::scene::BeamShape;
-use catoptric_sim::structure::Structure;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;

@@ -8,9 +8,9 @@ use super::element::Traced;
 use catoptric_cast::Polygon;
 use catoptric_cast::Ray;
 use catoptric_model::{beam, mirror};
-use catoptric_sim::footprint::{SubRay, ray};
-use catoptric_sim::reading::Sensor;
-use catoptric_sim::structure::Structure;
+use catoptric_sim::build::Structure;
+use catoptric_sim::light::footprint::{SubRay, ray};
+use catoptric_sim::receive::Sensor;
 use nalgebra::{Point3, Vector3};
 
 /// Rays of a contour.

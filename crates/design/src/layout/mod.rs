@@ -58,8 +58,8 @@ pub use size::{MIRROR_DENSITY, POST_DENSITY, Size};
 pub use ways::Layout;
 
 use catoptric_model::beam;
-use catoptric_sim::reading::Sensor;
-use catoptric_sim::structure::Structure;
+use catoptric_sim::build::Structure;
+use catoptric_sim::receive::Sensor;
 use catoptric_sim::{Scene, SimError};
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -3,8 +3,8 @@
 use catoptric_cast::area_vector;
 use catoptric_cast::volume;
 use catoptric_sim::Scene;
+use catoptric_sim::build::Structure;
 use catoptric_sim::scene::Preset;
-use catoptric_sim::structure::Structure;
 use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 

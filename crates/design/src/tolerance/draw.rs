@@ -3,9 +3,9 @@
 use super::Cause;
 use crate::layout::{Class, Traced, exit, trace};
 use catoptric_model::beam;
-use catoptric_sim::optics::{Mirrors, Setting};
-use catoptric_sim::reading::Sensor;
-use catoptric_sim::structure::Structure;
+use catoptric_sim::build::Structure;
+use catoptric_sim::light::{Mirrors, Setting};
+use catoptric_sim::receive::Sensor;
 use catoptric_sim::{Scene, SimError};
 use nalgebra::{Point3, Unit, Vector3};
 

@@ -206,7 +206,7 @@ pub(super) fn runs(drawn: &Drawn) -> (Headings, Rows) {
 
 /// Where each mirror stands.
 pub(super) fn places(drawn: &Drawn) -> (Headings, Rows) {
-    let row = |facet: &catoptric_sim::structure::BuiltFacet| {
+    let row = |facet: &catoptric_sim::build::BuiltFacet| {
         let (middle, m) = (
             catoptric_design::layout::center(&facet.face.corners),
             facet.face.normal,

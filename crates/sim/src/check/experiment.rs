@@ -3,7 +3,7 @@
 use super::findings::{Findings, suggestion};
 use super::outline::{Meets, Obstacles, nominal_room_from_sensor};
 use super::structure::{SCAN_HALF_DEG, rounded};
-use crate::board::{before_beam, stands_in};
+use crate::build::board::{before_beam, stands_in};
 use crate::scene::{Board, BoardPose, Scene, SensorTest};
 use catoptric_model::frame::yaw_pitch_roll;
 use catoptric_model::place::Path;
@@ -85,7 +85,7 @@ fn check_rig(scene: &Scene, found: &mut Findings) {
         return;
     }
     for (i, facet) in scene.superstructure.facet.iter().enumerate() {
-        let corners = crate::layout::corners(&facet.shape).unwrap_or_default();
+        let corners = crate::build::layout::corners(&facet.shape).unwrap_or_default();
         let beyond = corners
             .iter()
             .find_map(|c| outside(&(room_from_sensor * c), &room.size_m));

@@ -4,10 +4,10 @@ use super::experiment::{outside, room_extent};
 use super::findings::Findings;
 use super::structure::rounded;
 use super::values::distinct;
-use crate::layout;
+use crate::build::layout;
+use crate::build::structure;
+use crate::build::trajectory::{self, Trajectory};
 use crate::scene::{Flight, Scene};
-use crate::structure;
-use crate::trajectory::{self, Trajectory};
 use catoptric_model::place::Path;
 use nalgebra::{Point3, Vector3};
 

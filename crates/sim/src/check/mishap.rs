@@ -1,7 +1,7 @@
 //! Mishaps: whether each is one thing that can happen. That its pose is recorded with a board shows when it is set up.
 
 use super::findings::{Findings, suggestion};
-use crate::board::board_markers;
+use crate::build::board::board_markers;
 use crate::scene::{Mishap, Scene};
 use catoptric_model::place::Path;
 

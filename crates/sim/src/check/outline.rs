@@ -1,9 +1,9 @@
 //! What every beam meets in the drawing.
 
-use crate::layout;
-use crate::room::room_from_rig;
+use crate::build::layout;
+use crate::build::room::room_from_rig;
+use crate::build::structure;
 use crate::scene::Scene;
-use crate::structure;
 use catoptric_cast::Ray;
 use catoptric_cast::Shape;
 use catoptric_model::beam;

@@ -3,8 +3,8 @@
 use super::findings::Findings;
 use super::structure::check_outline;
 use super::values::distinct;
+use crate::build::stage;
 use crate::scene::{PlaneRectangle, PlaneShape, Scene, SurfaceShape};
-use crate::stage;
 use catoptric_model::place::Path;
 use nalgebra::{Point3, Vector3};
 

@@ -3,7 +3,7 @@
 use super::findings::Findings;
 use super::outline::{Face, Meets, Obstacles};
 use super::values::distinct;
-use crate::layout;
+use crate::build::layout;
 use crate::scene::{Facet, FacetShape, Marker, Plate, RectangleShape, Scanner, Scene, Wedge};
 use catoptric_model::beam;
 use catoptric_model::place::Path;

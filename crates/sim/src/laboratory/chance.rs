@@ -5,7 +5,7 @@
 
 use super::setup::Laboratory;
 use crate::noise::{Columns, Draws, Purpose};
-use crate::reading::{Chance, MAX_ECHOES};
+use crate::receive::reading::{Chance, MAX_ECHOES};
 use crate::scene::{Correlated, ErrorModel, Scene};
 use catoptric_model::beam;
 use std::sync::Arc;

@@ -9,7 +9,7 @@ use super::recorder::{Digest, Readings};
 use super::setup::Laboratory;
 use super::sight::Returns;
 use crate::noise::Columns;
-use crate::reading::Chance;
+use crate::receive::reading::Chance;
 use catoptric_model::dataset::nanoseconds;
 use catoptric_model::{Excerpt, Pose, beam};
 use std::ops::Range;

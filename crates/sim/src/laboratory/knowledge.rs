@@ -1,13 +1,13 @@
 //! What the experimenter knows: the drawing, the surveys, and what steps 1 and 3 found out.
 
 use super::setup::Laboratory;
-use crate::board::board_markers;
+use crate::build::board::board_markers;
+use crate::build::structure::{self, Structure};
 use crate::error::SimError;
+use crate::laboratory::placement;
+use crate::light::optics::{Mirrors, Setting};
 use crate::noise::{Draws, Purpose};
-use crate::optics::{Mirrors, Setting};
-use crate::placement;
 use crate::scene::{ErrorModel, Marker};
-use crate::structure::{self, Structure};
 use catoptric_model::session::{self, Session};
 use catoptric_model::{PoseData, PoseKind, PoseRecord, Summary, beam};
 use nalgebra::{Unit, Vector3};

@@ -1,7 +1,7 @@
 //! Mishaps: a board that moves while it is scanned, labels that sit on the wrong markers.
 
 use super::setup::Laboratory;
-use crate::board::{board_markers, points};
+use crate::build::board::{board_markers, points};
 use crate::error::SimError;
 use crate::scene::{Board, Mishap};
 use catoptric_model::tracking::solve_pose;

@@ -8,13 +8,16 @@ mod excerpt;
 mod knowledge;
 mod label;
 mod mishap;
+pub mod mocap;
+pub mod placement;
 mod record;
 mod recorder;
 mod setup;
 mod sight;
 mod targets;
 mod tracks;
-mod truth;
+mod true_values;
+pub mod truth;
 
 pub use chance::{Chances, Memory};
 pub use excerpt::{Drawn, ExcerptRecorder};

@@ -1,17 +1,17 @@
 //! The experiment set up: a structure as built, a sensor, a procedure.
 
 use super::belief::believed_bias;
-use crate::board;
+use crate::build::board;
+use crate::build::room::room_from_rig;
+use crate::build::stage::Stage;
+use crate::build::structure::Structure;
+use crate::build::trajectory::Trajectory;
 use crate::error::SimError;
+use crate::laboratory::placement::{self, Planned};
+use crate::light::optics::Rig;
 use crate::noise::{Draws, Purpose};
-use crate::optics::Rig;
-use crate::placement::{self, Planned};
-use crate::reading::Sensor;
-use crate::room::room_from_rig;
+use crate::receive::reading::Sensor;
 use crate::scene::{ErrorModel, Scene};
-use crate::stage::Stage;
-use crate::structure::Structure;
-use crate::trajectory::Trajectory;
 use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::tracking::solve_pose;
 use catoptric_model::{Pose, RangeBias};

@@ -5,12 +5,12 @@
 
 use super::setup::Laboratory;
 use super::targets::wall_targets;
-use crate::color;
+use crate::build::color;
+use crate::build::stage::Stage;
+use crate::build::trajectory::Trajectory;
 use crate::error::SimError;
-use crate::optics::{Mirrors, Rig, Setting};
-use crate::reading::{Parts, Return, SubRayEnd};
-use crate::stage::Stage;
-use crate::trajectory::Trajectory;
+use crate::light::optics::{Mirrors, Rig, Setting};
+use crate::receive::reading::{Parts, Return, SubRayEnd};
 use catoptric_cast::BUNDLE;
 use catoptric_model::{Pose, PoseKind, beam};
 use rayon::prelude::*;

@@ -1,11 +1,11 @@
 //! What stands around the sensor: the room's walls, and a stretch's board.
 
 use super::setup::Laboratory;
-use crate::board::outline;
-use crate::color::{self, Paint};
+use crate::build::board::outline;
+use crate::build::color::{self, Paint};
+use crate::build::room;
 use crate::error::SimError;
-use crate::optics::{Role, Target};
-use crate::room;
+use crate::light::optics::{Role, Target};
 use crate::scene::Scene;
 use catoptric_cast::{Polygon, Shape};
 use catoptric_model::Pose;

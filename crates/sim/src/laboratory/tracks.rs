@@ -1,9 +1,9 @@
 //! What motion capture sees during a stretch.
 
 use super::setup::Laboratory;
-use crate::board::{board_markers, points};
-use crate::mocap::{self, Body};
-use crate::room::room_from_rig;
+use crate::build::board::{board_markers, points};
+use crate::build::room::room_from_rig;
+use crate::laboratory::mocap::{self, Body};
 use catoptric_model::Track;
 use catoptric_model::dataset::RIG_SUBJECT;
 use std::ops::Range;

@@ -12,6 +12,7 @@ mod mishap;
 mod omit;
 mod parameter;
 mod pattern;
+mod preset;
 mod room;
 mod scanner;
 mod shape;

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Copies of facets: each becomes a facet like any other before the scene is used ([`crate::pattern::expand`]).
+/// Copies of facets: each becomes a facet like any other before the scene is used ([`crate::build::pattern::expand`]).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Pattern {

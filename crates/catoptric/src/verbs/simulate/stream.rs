@@ -9,7 +9,7 @@ use catoptric_files::recording::{Encoded, RecordingEncoder};
 use catoptric_model::Pose;
 use catoptric_model::Stop;
 use catoptric_sim::laboratory::{Drawn, Memory, Returns, Sight};
-use catoptric_sim::reading::Return;
+use catoptric_sim::receive::Return;
 use catoptric_sim::{Laboratory, SimError};
 use rayon::prelude::*;
 use std::ops::Range;

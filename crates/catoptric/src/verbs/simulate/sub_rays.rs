@@ -5,8 +5,8 @@ use crate::Error;
 use catoptric_model::beam;
 use catoptric_sim::Laboratory;
 use catoptric_sim::laboratory::Sight;
-use catoptric_sim::optics::Setting;
-use catoptric_sim::reading::{Stop, SubRayEnd, SubRayLight};
+use catoptric_sim::light::Setting;
+use catoptric_sim::receive::{Stop, SubRayEnd, SubRayLight};
 use rayon::prelude::*;
 use std::ops::Range;
 

@@ -2,8 +2,8 @@
 
 use crate::Error;
 use catoptric_sim::laboratory::Returns;
-use catoptric_sim::optics::Role;
-use catoptric_sim::reading::{Chance, Return};
+use catoptric_sim::light::Role;
+use catoptric_sim::receive::{Chance, Return};
 use catoptric_sim::scene::ErrorModel;
 use catoptric_sim::{Laboratory, Scene};
 use std::fmt::Write as _;

@@ -1,0 +1,175 @@
+//! Which beams one board serves.
+
+use crate::light::optics::{End, Path};
+use crate::scene::Board;
+use catoptric_cast::Ray;
+use catoptric_model::{Pose, Rectangle, beam};
+use nalgebra::Unit;
+
+/// Part of a board's edge that no beam of its group should come near, in metres, and its growth with distance: beams
+/// leave up to a few degrees off the drawing.
+const EDGE_MARGIN: (f64, f64) = (0.02, 0.05);
+
+/// Beams that one board serves.
+pub(super) struct Group {
+    pub(super) facet: Option<usize>,
+    pub(super) first: usize,
+    pub(super) last: usize,
+    /// The rays that leave towards the board, in the room frame, of every beam of the group.
+    pub(super) rays: Vec<Ray>,
+}
+
+/// Narrowest undeflected sector in which a board is set up, in radians.
+const LEAST_SECTOR: f64 = 20.0 * std::f64::consts::PI / 180.0;
+
+/// The facet that a chief ray leaves by, if it leaves by one alone.
+fn leaves_by(path: &Path) -> Option<usize> {
+    match (path.end, path.facets()) {
+        (End::Escaped, &[facet]) => Some(facet),
+        _ => None,
+    }
+}
+
+/// First and last beam of every facet in the drawing.
+pub fn served_beams(paths: &[Path], facets: usize) -> Vec<Option<[usize; 2]>> {
+    (0..facets)
+        .map(|facet| {
+            let mut served = (0..paths.len()).filter(|&b| leaves_by(&paths[b]) == Some(facet));
+            let first = served.next()?;
+            Some([first, served.next_back().unwrap_or(first)])
+        })
+        .collect()
+}
+
+/// Each facet's beams, cut into equal groups no wider than the span.
+pub(super) fn facet_groups(paths: &[Path], facets: usize, span_deg: f64) -> Vec<(usize, usize, usize)> {
+    let mut groups = Vec::new();
+    for (facet, served) in served_beams(paths, facets).into_iter().enumerate() {
+        let Some([first, last]) = served else { continue };
+        for [first, last] in cut(first, last, span_deg) {
+            groups.push((facet, first, last));
+        }
+    }
+    groups
+}
+
+/// A run of beams cut into the fewest equal pieces no wider than the span.
+fn cut(first: usize, last: usize, span_deg: f64) -> Vec<[usize; 2]> {
+    let beams = last - first + 1;
+    let span = span_deg.to_radians() / beam::STEP;
+    // Both are small positive numbers.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let pieces = ((beams as f64 / span).ceil() as usize).clamp(1, beams);
+    (0..pieces)
+        .map(|k| [first + beams * k / pieces, first + beams * (k + 1) / pieces - 1])
+        .collect()
+}
+
+/// Runs of undeflected beams around the centers at which boards are set up, spread over the free sectors.
+pub(super) fn direct_groups(paths: &[Path], count: usize, span_deg: f64) -> Vec<[usize; 2]> {
+    let free = |b: usize| matches!(paths[b].end, End::Escaped) && paths[b].facets().is_empty();
+    let mut sectors: Vec<[usize; 2]> = Vec::new();
+    for b in (0..paths.len()).filter(|&b| free(b)) {
+        match sectors.last_mut() {
+            Some(sector) if sector[1] + 1 == b => sector[1] = b,
+            _ => sectors.push([b, b]),
+        }
+    }
+    sectors.retain(|s| (s[1] - s[0]) as f64 * beam::STEP >= LEAST_SECTOR);
+    let total: usize = sectors.iter().map(|s| s[1] - s[0] + 1).sum();
+    if total == 0 {
+        return Vec::new();
+    }
+    // Centers evenly over the free beams laid end to end. Successive poses jump by a third of the way, so that
+    // neighbours in tilt are not neighbours in azimuth.
+    let half = 0.5 * span_deg.to_radians() / beam::STEP;
+    (0..count)
+        .map(|k| {
+            let slot = (k % 3) * count.div_ceil(3) + k / 3;
+            let along = (2 * (slot % count) + 1) * total / (2 * count);
+            let mut rest = along;
+            let sector = sectors.iter().find(|s| {
+                let beams = s[1] - s[0] + 1;
+                let here = rest < beams;
+                if !here {
+                    rest -= beams;
+                }
+                here
+            });
+            let sector = sector.copied().unwrap_or(sectors[0]);
+            let center = sector[0] + rest;
+            // Small positive number.
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            let half = half as usize;
+            [
+                center.saturating_sub(half).max(sector[0]),
+                (center + half).min(sector[1]),
+            ]
+        })
+        .collect()
+}
+
+impl Group {
+    pub(super) fn new(
+        facet: Option<usize>,
+        first: usize,
+        last: usize,
+        paths: &[Path],
+        room_from_sensor: &Pose,
+    ) -> Self {
+        let leaves = |path: &Path| match facet {
+            Some(_) => leaves_by(path) == facet,
+            None => path.facets().is_empty() && matches!(path.end, End::Escaped),
+        };
+        let rays = paths[first..=last]
+            .iter()
+            .filter(|p| leaves(p))
+            .map(|p| Ray {
+                origin: room_from_sensor * p.last.origin,
+                direction: Unit::new_unchecked(room_from_sensor.rotation * p.last.direction.into_inner()),
+            })
+            .collect();
+        Self {
+            facet,
+            first,
+            last,
+            rays,
+        }
+    }
+
+    /// The ray of the middle beam.
+    pub(super) fn middle(&self) -> Option<&Ray> {
+        self.rays.get(self.rays.len() / 2)
+    }
+
+    /// Share of the group's rays that meet a board well inside its edges.
+    pub(super) fn caught(&self, board: &Board, room_from_board: &Pose) -> f64 {
+        let outline = Rectangle {
+            width: board.width_mm * 1e-3,
+            height: board.height_mm * 1e-3,
+        };
+        let inside = |ray: &&Ray| {
+            let origin = room_from_board.inverse_transform_point(&ray.origin);
+            let direction = room_from_board.inverse_transform_vector(&ray.direction);
+            let distance = -origin.z / direction.z;
+            distance > 0.0
+                && outline.contains(
+                    &(origin + direction * distance),
+                    EDGE_MARGIN.0 + EDGE_MARGIN.1 * distance,
+                )
+        };
+        self.rays.iter().filter(inside).count() as f64 / self.rays.len() as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn groups_cover_their_run_without_overlap() {
+        let groups = cut(100, 279, 16.0);
+        assert_eq!(groups, vec![[100, 159], [160, 219], [220, 279]]);
+        assert_eq!(cut(5, 5, 16.0), vec![[5, 5]]);
+    }
+}

@@ -1,0 +1,11 @@
+//! From light that comes home to a reading: pulses, echoes, ranges.
+
+pub mod detect;
+pub mod echo;
+pub mod phase;
+pub(crate) mod reading;
+mod spot;
+
+pub use reading::{
+    BeamClass, Chance, MAX_ECHOES, Parts, Return, Sensor, Share, Stop, SubRayEnd, SubRayLight, class,
+};
