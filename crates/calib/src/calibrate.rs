@@ -1,26 +1,20 @@
 //! The whole procedure on one dataset: mounting, screening, and every element in turn.
 
+use crate::attempt::Workspace;
 use crate::bare::Bare;
-use crate::element::Workspace;
+use crate::choose;
+use crate::element;
 use crate::error::CalibError;
+use crate::facet_plane::plane_as_built;
 use crate::joint::{self, Assigned};
-use crate::locate;
-use crate::observations::{BoardInSensor, azimuth};
+use crate::observations::azimuth;
 use crate::options::{Method, Options};
-use crate::pose::{self, Mount};
+use crate::pose::Mount;
+use crate::prepare::{believable, prepare};
 use crate::screen::{Candidate, Screen};
 use crate::solve::BareDistance;
-use crate::tracking;
-use catoptric_model::session::{NominalFacet, Session};
-use catoptric_model::{
-    BeamEstimate, Calibration, Dataset, Deflection, MirrorPlane, Status, Summary, beam, calibration, mirror,
-};
-use nalgebra::{Unit, Vector3};
+use catoptric_model::{BeamEstimate, Calibration, Dataset, MirrorPlane, Session, Status, beam, calibration};
 use rayon::prelude::*;
-use std::borrow::Cow;
-
-/// Solved elements from which a facet's plane as built is taken.
-const LEAST_ELEMENTS: usize = 5;
 
 /// Calibrates a recorded experiment: one entry for every beam of the scanner, in order.
 ///
@@ -91,66 +85,6 @@ pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result
     Ok(calibration)
 }
 
-/// What everything else rests on: mounting and boards in the sensor frame.
-pub(crate) struct Prepared {
-    pub(crate) drawn: Vec<MirrorPlane>,
-    summaries: Vec<Vec<Summary>>,
-    pub(crate) bare: Bare,
-    pub(crate) mount: Mount,
-    boards: Vec<Option<BoardInSensor>>,
-}
-
-/// Checks a dataset, and puts right or leaves out what cannot be believed of it, with a sentence for each.
-pub(crate) fn believable(dataset: &Dataset) -> Result<(Cow<'_, Dataset>, Vec<String>), CalibError> {
-    dataset.check()?;
-    check_session(&dataset.session)?;
-    Ok(tracking::put_right(dataset))
-}
-
-/// Places the sensor in the rig (steps 5 and 6) from a [`believable`] dataset.
-pub(crate) fn prepare(dataset: &Dataset) -> Result<Prepared, CalibError> {
-    let session = &dataset.session;
-    let drawn = session
-        .facets
-        .iter()
-        .map(plane_as_drawn)
-        .collect::<Result<_, _>>()?;
-    let summaries = locate::summaries(dataset);
-    let mount = pose::estimate(dataset, &summaries);
-    let boards = dataset
-        .poses
-        .iter()
-        .map(|p| BoardInSensor::of(p, session, &mount.rig_from_sensor))
-        .collect();
-    Ok(Prepared {
-        drawn,
-        summaries,
-        bare: Bare::of(session),
-        mount,
-        boards,
-    })
-}
-
-impl Prepared {
-    pub(crate) fn workspace<'a>(
-        &'a self,
-        dataset: &'a Dataset,
-        method: Method,
-        options: &'a Options,
-    ) -> Workspace<'a> {
-        Workspace {
-            dataset,
-            summaries: &self.summaries,
-            bare: &self.bare,
-            boards: &self.boards,
-            rig_from_sensor: self.mount.rig_from_sensor,
-            mount: &self.mount.uncertainty,
-            method,
-            options,
-        }
-    }
-}
-
 /// Elements with boards to be solved together: those solved by themselves, and those that only lacked boards.
 fn assigned(
     work: &Workspace,
@@ -170,7 +104,7 @@ fn assigned(
             Status::TooFewPoses | Status::Unobservable => near.first().copied(),
             Status::Direct | Status::NotConverged | Status::Rejected => None,
         }?;
-        let poses = work.boards_hit(estimate, &facets[facet], &mirrors[facet])?;
+        let poses = choose::boards_hit(work, estimate, &facets[facet], &mirrors[facet])?;
         (!poses.is_empty()).then_some(Assigned {
             beam: estimate.beam,
             facet,
@@ -247,95 +181,6 @@ fn as_drawn(
     candidates.iter().enumerate().map(of_one).collect()
 }
 
-pub(crate) fn check_session(session: &Session) -> Result<(), CalibError> {
-    let believed = &session.believed;
-    let positive = [
-        ("scanner.beams", session.scanner.beams as f64),
-        ("scanner.step_deg", session.scanner.step_deg),
-        ("scanner.range_max_m", session.scanner.range_max_m),
-    ];
-    let not_negative = [
-        (
-            "scanner.divergence_full_mrad",
-            session.scanner.divergence_full_mrad,
-        ),
-        ("believed.range_noise_sd_mm", believed.range_noise_sd_mm),
-        ("believed.drift_sd_mm", believed.drift_sd_mm),
-        ("believed.element_sd_mm", believed.element_sd_mm),
-        ("believed.marker_sd_mm", believed.marker_sd_mm),
-        ("believed.distance_bias_sd_mm", believed.distance_bias_sd_mm),
-        ("believed.angle_gain_sd_mm", believed.angle_gain_sd_mm),
-        ("believed.color_bias_sd_mm", believed.color_bias_sd_mm),
-        (
-            "bare_structure.distance_sd_mm",
-            session.bare_structure.distance_sd_mm,
-        ),
-    ];
-    let fail = |key: &str, needed, found| {
-        Err(CalibError::Session {
-            key: key.to_owned(),
-            needed,
-            found,
-        })
-    };
-    for (key, found) in positive {
-        if !(found.is_finite() && found > 0.0) {
-            return fail(key, "a positive number", found);
-        }
-    }
-    for (key, found) in not_negative {
-        if !(found.is_finite() && found >= 0.0) {
-            return fail(key, "a number that is not negative", found);
-        }
-    }
-    Ok(())
-}
-
-pub(crate) fn plane_as_drawn(facet: &NominalFacet) -> Result<MirrorPlane, CalibError> {
-    let plane = facet.plane().ok_or_else(|| CalibError::Facet {
-        name: facet.name.clone(),
-        corners: facet.corners_mm.len(),
-    })?;
-    Ok(MirrorPlane::through(plane.point, plane.normal))
-}
-
-/// The plane that most of a facet's solved elements agree on: medians, which a few strays do not move.
-pub(crate) fn plane_as_built(
-    session: &Session,
-    facet: &NominalFacet,
-    solved: &[BeamEstimate],
-) -> Option<MirrorPlane> {
-    let mut planes: Vec<MirrorPlane> = Vec::new();
-    for estimate in solved.iter().filter(|e| e.facet.as_ref() == Some(&facet.name)) {
-        let Some(deflection) = estimate.deflection() else {
-            continue;
-        };
-        planes.extend(plane_between(azimuth(session, estimate.beam), &deflection));
-    }
-    let median = |value: &dyn Fn(&MirrorPlane) -> f64| {
-        let mut values: Vec<f64> = planes.iter().map(value).collect();
-        values.sort_by(f64::total_cmp);
-        values.get(values.len() / 2).copied()
-    };
-    let normal = Vector3::new(
-        median(&|p| p.normal.x)?,
-        median(&|p| p.normal.y)?,
-        median(&|p| p.normal.z)?,
-    );
-    let plane = MirrorPlane {
-        normal: Unit::try_new(normal, f64::MIN_POSITIVE)?,
-        offset: median(&|p| p.offset)?,
-    };
-    (planes.len() >= LEAST_ELEMENTS).then_some(plane)
-}
-
-/// The plane of a mirror that deflects a beam so.
-pub(crate) fn plane_between(azimuth: f64, deflection: &Deflection) -> Option<MirrorPlane> {
-    let exit = deflection.exit_direction(azimuth);
-    let normal = mirror::normal_between(&beam::direction(azimuth), &exit)?;
-    Some(MirrorPlane::through(deflection.deflection_point(azimuth), normal))
-}
-
 /// The estimate of every element, with facets at the given planes.
 fn estimates(work: &Workspace, candidates: &[Candidate], mirrors: &[MirrorPlane]) -> Vec<BeamEstimate> {
     let facets = &work.dataset.session.facets;
@@ -347,7 +192,7 @@ fn estimates(work: &Workspace, candidates: &[Candidate], mirrors: &[MirrorPlane]
         Candidate::Deflected(near) => {
             let mut tried = near
                 .iter()
-                .map(|f| work.estimate(beam, &facets[*f], &mirrors[*f]));
+                .map(|f| element::estimate(work, beam, &facets[*f], &mirrors[*f]));
             let nearest = tried.next();
             match nearest {
                 Some(solved) if solved.status == Status::Solved => solved,

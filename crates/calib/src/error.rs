@@ -57,9 +57,11 @@ pub enum CalibError {
         what: String,
     },
     /// A name that is no method's.
-    #[error("no method is called {name:?}; there are {}", crate::options::Method::ALL.map(crate::options::Method::name).join(", "))]
+    #[error("no method is called {name:?}; there are {known}")]
     UnknownMethod {
         /// The name asked for.
         name: String,
+        /// The names there are.
+        known: String,
     },
 }

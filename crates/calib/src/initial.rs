@@ -9,6 +9,9 @@ use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3xX, SymmetricEigen, Unit, Vec
 /// Smallest ratio of singular values at which the linear system counts as of rank three.
 const LEAST_CONDITION: f64 = 1e-2;
 
+/// A start in closed form that is farther than this from the drawing is noise, in radians.
+pub(crate) const FARTHEST_START: f64 = 0.35;
+
 /// Times that a bias is looked up at the range corrected by it: biases change by under a hundredth of the range, so each
 /// brings two digits.
 const CORRECTIONS: usize = 7;

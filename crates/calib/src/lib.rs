@@ -15,6 +15,7 @@
 
 mod ahead;
 mod ambiguity;
+mod attempt;
 mod bare;
 mod calibrate;
 mod calibrator;
@@ -24,6 +25,7 @@ pub mod common;
 pub mod covariance;
 mod element;
 pub mod error;
+mod facet_plane;
 pub mod gauge;
 mod gls;
 pub mod initial;
@@ -38,17 +40,18 @@ pub mod observations;
 pub mod options;
 pub mod plan;
 pub mod pose;
+mod prepare;
 pub mod recursive;
 pub mod screen;
 pub mod solve;
 pub mod spread;
 pub mod tracking;
 
+pub use attempt::LEAST_BOARDS;
 pub use calibrate::calibrate;
 pub use calibrator::Calibrator;
 pub use characterize::characterize;
 pub use covariance::{Budget, MountUncertainty};
-pub use element::LEAST_BOARDS;
 pub use error::CalibError;
 pub use joint::{TrueDirection, limit};
 pub use options::{JacobianForm, Method, Options};

@@ -6,7 +6,8 @@
 
 use super::answer::Answer;
 use super::fit::Fit;
-use super::problem::{BOARD_ERRORS, FACET_PARAMETERS, Joint};
+use super::group::{BOARD_ERRORS, FACET_PARAMETERS};
+use super::problem::Joint;
 use crate::least_squares::Solution;
 use catoptric_model::Assessment;
 use catoptric_model::Session;

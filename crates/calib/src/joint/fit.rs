@@ -7,7 +7,9 @@
 //! L(σ, τ) = ‖f‖² + ln det(JᵀJ) + Σ ln det(I + τ²HᵀH)      least at (σ̂, τ̂);  L(0, 0) − L(σ̂, τ̂) tests planeness
 //! ```
 
-use super::problem::{BOARD_ERRORS, FACET_BLOCKS, FACET_PARAMETERS, FIGURE, Flatness, Group, Joint};
+use super::fan::Flatness;
+use super::group::{BOARD_ERRORS, FACET_BLOCKS, FACET_PARAMETERS, FIGURE, Group};
+use super::problem::Joint;
 use crate::least_squares::{self, Block, Point, Prior, ProblemError, Reduced, Solution, State, WithPriors};
 use catoptric_model::MirrorPlane;
 use nalgebra::DVector;

@@ -4,7 +4,8 @@
 //! A reading that weighs a million times less than it should is left out, while its prediction and the variance of that,
 //! by everything that is estimated and by the board's own errors, come out of the same algebra as all others.
 
-use super::problem::{Group, Joint};
+use super::group::Group;
+use super::problem::Joint;
 use crate::least_squares::{self, ProblemError, State};
 use catoptric_model::assessment::HeldOut;
 

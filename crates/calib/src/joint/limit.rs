@@ -4,13 +4,16 @@
 //! priors, so this is the Bayesian (van Trees) form of the Cramér–Rao bound; for an element by itself see
 //! [`crate::covariance::Budget::bound`].
 
-use super::problem::{FIGURE, FIGURE_ORDERS, FIGURE_RMS, Flatness, orders};
-use super::{Assigned, along, begin, components, direct_group, group, mounting_as_drawn};
-use crate::calibrate::{believable, plane_between, prepare};
+use super::assemble::{Assigned, along, begin, components, direct_group, group, mounting_as_drawn};
+use super::fan::{FIGURE_RMS, Flatness, orders};
+use super::group::{FIGURE, FIGURE_ORDERS};
+use crate::choose;
 use crate::error::CalibError;
+use crate::facet_plane::plane_between;
 use crate::least_squares;
 use crate::observations::azimuth;
 use crate::options::{Method, Options};
+use crate::prepare::{believable, prepare};
 use catoptric_model::{Dataset, Deflection, MirrorPlane, frame};
 use nalgebra::{DMatrix, DVector, Matrix2, Unit, Vector3};
 use std::collections::BTreeMap;
@@ -60,7 +63,7 @@ pub fn limit(
             .collect::<Vec<_>>();
         flat.push(flatness(&mean, &built, &places));
         for t in of_facet {
-            if let Some(poses) = work.boards_at(t.beam, facet, &mean, &t.deflection)
+            if let Some(poses) = choose::boards_at(&work, t.beam, facet, &mean, &t.deflection)
                 && !poses.is_empty()
             {
                 assigned.push(Assigned {

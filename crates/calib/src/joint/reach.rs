@@ -6,8 +6,9 @@
 //! Applications", 1988, section 6.1): it rises by k² over k standard deviations as far as the problem is linear, and by
 //! k²(1 ± 1/q)² where it bends, with q = δ̂ over the standard deviation.
 
+use super::group::Element;
 use super::linear::Linear;
-use super::problem::{Element, Joint};
+use super::problem::Joint;
 use crate::least_squares::{self, GroupJacobian, GroupedProblem, Point, Solution};
 use catoptric_model::frame;
 use nalgebra::{DVector, Matrix2, Vector2, Vector3};

@@ -2,15 +2,11 @@
 //! that no mirror touches would have read.
 
 mod abnormal;
+mod evidence;
 mod near;
 mod tally;
 
-use crate::common::CommonErrors;
-use crate::observations::BoardInSensor;
-use crate::pose::Mount;
-use catoptric_model::{Dataset, Pose, Summary};
-use nalgebra::Matrix6;
-
+pub use evidence::Screen;
 pub use near::{EDGE_BEAMS, facets_near};
 
 /// What screening makes of an element.
@@ -24,39 +20,7 @@ pub enum Candidate {
     Rejected(String),
 }
 
-/// The stretches of a dataset prepared for screening.
-pub struct Screen<'a> {
-    dataset: &'a Dataset,
-    summaries: &'a [Vec<Summary>],
-    /// Covariance of the mounting.
-    mount: Matrix6<f64>,
-    common: CommonErrors<'a>,
-    boards: &'a [Option<BoardInSensor>],
-    rooms_from_sensor: Vec<Pose>,
-}
-
-impl<'a> Screen<'a> {
-    /// Prepares the stretches; `boards` holds each pose's board in the sensor frame.
-    pub fn new(
-        dataset: &'a Dataset,
-        summaries: &'a [Vec<Summary>],
-        mount: &'a Mount,
-        boards: &'a [Option<BoardInSensor>],
-    ) -> Self {
-        Self {
-            dataset,
-            summaries,
-            mount: mount.uncertainty.total(),
-            common: CommonErrors::of(&dataset.session),
-            boards,
-            rooms_from_sensor: dataset
-                .poses
-                .iter()
-                .map(|p| p.room_from_rig * mount.rig_from_sensor)
-                .collect(),
-        }
-    }
-
+impl Screen<'_> {
     /// The class of one element, from statistics alone.
     pub fn classify(&self, beam: usize) -> Candidate {
         let session = &self.dataset.session;

@@ -1,6 +1,6 @@
 //! How often a beam reads what is straight ahead of it: what an undeflected beam would have read, stretch by stretch.
 
-use super::Screen;
+use super::evidence::Screen;
 use crate::ahead::{AGREEMENT_FLOOR, ahead};
 use crate::jacobian;
 use crate::observations::{azimuth, cone_half_angle};
