@@ -1,14 +1,14 @@
 //! What every procedure begins with: a dataset that is checked and put right, the sensor placed in the rig (step 5), and
 //! the boards seen from there (step 6).
 
-use crate::attempt::Workspace;
-use crate::bare::Bare;
+use crate::element::attempt::Workspace;
+use crate::element::facet_plane::plane_as_drawn;
 use crate::error::CalibError;
-use crate::facet_plane::plane_as_drawn;
-use crate::locate;
-use crate::observations::BoardInSensor;
+use crate::mount::pose::{self, Mount};
 use crate::options::{Method, Options};
-use crate::pose::{self, Mount};
+use crate::readings::bare::Bare;
+use crate::readings::locate;
+use crate::readings::observations::BoardInSensor;
 use crate::tracking;
 use catoptric_model::{Dataset, MirrorPlane, Session, Summary};
 use std::borrow::Cow;

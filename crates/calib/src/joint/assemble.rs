@@ -3,15 +3,18 @@
 use super::fan::Flatness;
 use super::group::{BareFacet, Board, Element, Facet, Group, Sight};
 use super::problem::{Joint, Mounting};
-use crate::attempt::Workspace;
-use crate::common::CommonErrors;
-use crate::least_squares::State;
-use crate::mount_data::DirectBoard;
-use crate::observations::azimuth;
-use crate::pose::{self, Mount, Prior};
-use crate::spread;
-use catoptric_model::{MirrorPlane, Pose, beam};
+use crate::element::attempt::Workspace;
+use crate::element::choose::boards_hit;
+use crate::judge::common::CommonErrors;
+use crate::lsq::State;
+use crate::mount::mount_data::DirectBoard;
+use crate::mount::pose::{self, Mount, Prior};
+use crate::readings::observations::azimuth;
+use crate::readings::spread;
+use crate::screen::Candidate;
+use catoptric_model::{BeamEstimate, MirrorPlane, Pose, Status, beam};
 use nalgebra::{DVector, Dyn, Matrix6, OMatrix, RowDVector, U6, Vector6};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// Motions of the mounting, the first of the shared numbers.
@@ -25,6 +28,35 @@ pub(crate) struct Assigned {
     pub(crate) beam: usize,
     pub(crate) facet: usize,
     pub(crate) poses: Vec<usize>,
+}
+
+/// Elements with boards to be solved together: those solved by themselves, and those that only lacked boards.
+pub(crate) fn assigned(
+    work: &Workspace,
+    candidates: &[Candidate],
+    mirrors: &[MirrorPlane],
+    alone: &[BeamEstimate],
+) -> Vec<Assigned> {
+    let facets = &work.dataset.session.facets;
+    let of_one = |(candidate, estimate): (&Candidate, &BeamEstimate)| {
+        let Candidate::Deflected(near) = candidate else {
+            return None;
+        };
+        let facet = match estimate.status {
+            Status::Solved => facets
+                .iter()
+                .position(|f| Some(&f.name) == estimate.facet.as_ref()),
+            Status::TooFewPoses | Status::Unobservable => near.first().copied(),
+            Status::Direct | Status::NotConverged | Status::Rejected => None,
+        }?;
+        let poses = boards_hit(work, estimate, &facets[facet], &mirrors[facet])?;
+        (!poses.is_empty()).then_some(Assigned {
+            beam: estimate.beam,
+            facet,
+            poses,
+        })
+    };
+    candidates.par_iter().zip(alone).filter_map(of_one).collect()
 }
 
 /// Facets that share boards, each set by the indices of its facets; facets without elements are in none.

@@ -8,7 +8,7 @@ use super::answer::Answer;
 use super::fit::Fit;
 use super::group::{BOARD_ERRORS, FACET_PARAMETERS};
 use super::problem::Joint;
-use crate::least_squares::Solution;
+use crate::lsq::Solution;
 use catoptric_model::Assessment;
 use catoptric_model::Session;
 use catoptric_model::assessment::{

@@ -2,8 +2,8 @@
 
 use super::answer::Answer;
 use super::reach::STRAIGHT_SD;
-use crate::observability::WEAKEST_SD;
-use crate::solve::libm_cos;
+use crate::judge::levers::libm_cos;
+use crate::judge::observability::WEAKEST_SD;
 use catoptric_model::{BeamEstimate, Status};
 use nalgebra::{Matrix2, Vector2};
 

@@ -6,7 +6,7 @@
 
 use super::group::Group;
 use super::problem::Joint;
-use crate::least_squares::{self, ProblemError, State};
+use crate::lsq::{self, ProblemError, State};
 use catoptric_model::assessment::HeldOut;
 
 /// Parts that the boards of a facet are left out in.
@@ -32,7 +32,7 @@ impl Joint<'_> {
                     sight.sd *= LEFT_OUT;
                 }
             }
-            let solution = rest.solve(from.clone(), &least_squares::Options::default())?;
+            let solution = rest.solve(from.clone(), &lsq::Options::default())?;
             for answer in rest.answers(&solution) {
                 // Without boards of its own an element's direction is that of its facet; without a covariance it is open.
                 for sight in answer

@@ -7,13 +7,14 @@
 use super::assemble::{Assigned, along, begin, components, direct_group, group, mounting_as_drawn};
 use super::fan::{FIGURE_RMS, Flatness, orders};
 use super::group::{FIGURE, FIGURE_ORDERS};
-use crate::choose;
+use crate::element::choose;
+use crate::element::facet_plane::plane_between;
 use crate::error::CalibError;
-use crate::facet_plane::plane_between;
-use crate::least_squares;
-use crate::observations::azimuth;
+use crate::judge::levers::libm_cos;
+use crate::lsq;
 use crate::options::{Method, Options};
 use crate::prepare::{believable, prepare};
+use crate::readings::observations::azimuth;
 use catoptric_model::{Dataset, Deflection, MirrorPlane, frame};
 use nalgebra::{DMatrix, DVector, Matrix2, Unit, Vector3};
 use std::collections::BTreeMap;
@@ -95,17 +96,16 @@ pub fn limit(
         figure: of_all(|f| f.figure),
         tau: of_all(|f| f.tau),
     };
-    let linear = least_squares::linearize(&joint.with_priors(&joint), &state).map_err(|problem| {
-        CalibError::Foreign {
+    let linear =
+        lsq::linearize(&joint.with_priors(&joint), &state).map_err(|problem| CalibError::Foreign {
             name: "limit".to_owned(),
             what: problem.to_string(),
-        }
-    })?;
+        })?;
     Ok(joint
         .covariances(&state, &linear.information)
         .into_iter()
         .map(|(beam, elevation, tangent)| {
-            let cos = crate::solve::libm_cos(elevation);
+            let cos = libm_cos(elevation);
             let scale = Matrix2::new(1.0 / cos, 0.0, 0.0, 1.0);
             (beam, tangent.map(|c| scale * c * scale))
         })

@@ -4,8 +4,8 @@ use super::fan::Fan;
 use super::group::{BOARD_ERRORS, Element, FACET_PARAMETERS, FIGURE_ORDERS, Group};
 use super::placed::{Boards, Placed};
 use super::problem::Joint;
-use crate::jacobian;
-use crate::least_squares::{GroupJacobian, Point};
+use crate::lsq::{GroupJacobian, Point};
+use crate::readings::jacobian;
 use catoptric_model::frame;
 use nalgebra::{DVector, Dyn, Matrix2, OMatrix, Point3, U2, Unit, Vector2, Vector3};
 

@@ -20,20 +20,20 @@ mod problem;
 mod reach;
 mod rows;
 
-use crate::attempt::Workspace;
-use crate::least_squares::{self, ProblemError, State};
+use crate::element::attempt::Workspace;
+use crate::lsq::{self, ProblemError, State};
+use crate::mount::pose::Mount;
 use crate::options::Method;
-use crate::pose::Mount;
-use assemble::{begin, components, direct_group, group, mounting_as_drawn, mounting_as_found};
+use assemble::{Assigned, begin, components, direct_group, group, mounting_as_drawn, mounting_as_found};
 use catoptric_model::calibration::{FacetEstimate, MountEstimate};
-use catoptric_model::{Assessment, BeamEstimate, MirrorPlane, RangeBias};
+use catoptric_model::{Assessment, BeamEstimate, Calibration, MirrorPlane, RangeBias};
 use fit::Fit;
 use group::Group;
 use nalgebra::DVector;
 use problem::{Joint, Mounting};
 use std::collections::BTreeMap;
 
-pub(crate) use assemble::Assigned;
+pub(crate) use assemble::assigned;
 pub use limit::{TrueDirection, limit};
 
 /// Rounds of leaving elements out.
@@ -41,24 +41,38 @@ const ROUNDS: usize = 3;
 
 /// What came of it.
 #[derive(Default)]
-pub(crate) struct Outcome {
+struct Outcome {
     /// Elements that took part.
-    pub(crate) beams: BTreeMap<usize, BeamEstimate>,
-    pub(crate) facets: Vec<FacetEstimate>,
-    pub(crate) mount: Option<MountEstimate>,
-    pub(crate) bias: Option<RangeBias>,
-    pub(crate) assessment: Option<Assessment>,
+    beams: BTreeMap<usize, BeamEstimate>,
+    facets: Vec<FacetEstimate>,
+    mount: Option<MountEstimate>,
+    bias: Option<RangeBias>,
+    assessment: Option<Assessment>,
 }
 
-/// Calibrates the assigned elements together.
-pub(crate) fn calibrate(
+/// Calibrates the assigned elements together, and replaces what they found by themselves.
+pub(crate) fn together(
     work: &Workspace,
     mount: &Mount,
     planes: &[MirrorPlane],
-    assigned: Vec<Assigned>,
-) -> Result<Outcome, ProblemError> {
+    assigned: &[Assigned],
+    calibration: &mut Calibration,
+) {
     // Within the pool: groups are handed out over and over, and from outside each time would wake it.
-    rayon::scope(|_| within_pool(work, mount, planes, &assigned))
+    match rayon::scope(|_| within_pool(work, mount, planes, assigned)) {
+        Ok(outcome) => {
+            for (beam, estimate) in outcome.beams {
+                calibration.beams[beam] = estimate;
+            }
+            calibration.facets = outcome.facets;
+            calibration.rig_from_sensor = outcome.mount.or(calibration.rig_from_sensor);
+            calibration.bias = outcome.bias;
+            calibration.assessment = outcome.assessment;
+        }
+        Err(problem) => calibration.warnings.push(format!(
+            "the elements could not be solved together ({problem}); each was solved by itself"
+        )),
+    }
 }
 
 fn within_pool(
@@ -105,7 +119,7 @@ fn solve(
 ) -> Result<Outcome, ProblemError> {
     let session = &work.dataset.session;
     let (mut joint, start) = begin(work, groups, mounting, mean, planes);
-    let exact = least_squares::Options::default();
+    let exact = lsq::Options::default();
     let rigid = |joint: &Joint, from: State| {
         joint.solve(from, &exact).map(|solution| Fit {
             solution,

@@ -2,9 +2,9 @@
 
 use super::group::{BOARD_ERRORS, Board, Group};
 use super::problem::Joint;
-use crate::covariance::PlaneFit;
-use crate::least_squares::Point;
-use crate::pose;
+use crate::judge::covariance::PlaneFit;
+use crate::lsq::Point;
+use crate::mount::pose;
 use catoptric_model::bias::ColoredBias;
 use catoptric_model::{BoardPlane, Pose};
 use nalgebra::{DVector, Dyn, Matrix3, Matrix6, OMatrix, Point3, U6, Unit, UnitQuaternion, Vector3, Vector6};

@@ -11,8 +11,8 @@
 
 use super::fan::{Flatness, Shape};
 use super::group::{BOARD_ERRORS, Element, FACET_BLOCKS, FIGURE, Group};
-use crate::common::CommonErrors;
-use crate::least_squares::{Block, Point};
+use crate::judge::common::CommonErrors;
+use crate::lsq::{Block, Point};
 use catoptric_model::{MirrorPlane, Pose, RangeBias};
 use nalgebra::{DVector, Dyn, OMatrix, U6};
 

@@ -3,7 +3,7 @@
 use super::fan::Shape;
 use super::group::{BareFacet, FACET_PARAMETERS};
 use super::problem::Joint;
-use crate::least_squares::{GroupJacobian, GroupRows, GroupedProblem, Point};
+use crate::lsq::{GroupJacobian, GroupRows, GroupedProblem, Point};
 use catoptric_model::frame;
 use nalgebra::{DMatrix, DVector};
 

@@ -11,7 +11,7 @@
 use super::request::Request;
 use super::situation::{Element, Fan, Situation, in_sensor};
 use crate::error::CalibError;
-use crate::observations::{BoardInSensor, cone_half_angle};
+use crate::readings::observations::{BoardInSensor, cone_half_angle};
 use catoptric_model::frame::tangent_basis;
 use catoptric_model::session::BoardSheet;
 use catoptric_model::{Pose, Session};

@@ -1,15 +1,15 @@
 //! What the experimenter knows before the next pose: the drawing or what was recorded, never the truth.
 
 use crate::calibrate::calibrate;
-use crate::choose;
-use crate::covariance::MountUncertainty;
+use crate::element::choose;
+use crate::element::facet_plane::{plane_as_built, plane_as_drawn};
 use crate::error::CalibError;
-use crate::facet_plane::{plane_as_built, plane_as_drawn};
-use crate::observations::{BoardInSensor, azimuth, cone_half_angle};
+use crate::judge::covariance::MountUncertainty;
+use crate::mount::pose;
 use crate::options::{Method, Options};
-use crate::pose;
 use crate::prepare::{believable, prepare};
-use crate::spread;
+use crate::readings::observations::{BoardInSensor, azimuth, cone_half_angle};
+use crate::readings::spread;
 use catoptric_model::session::{BoardSheet, NominalFacet};
 use catoptric_model::{
     BoardPlane, Dataset, Deflection, MirrorPlane, Pose, PoseKind, PoseLabel, PoseRecord, Session, Status,

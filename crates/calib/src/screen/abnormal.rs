@@ -1,8 +1,8 @@
 //! Numbers that no good beam shows: no return, too close, of the structure, or spread too far in the known room.
 
 use super::evidence::Screen;
-use crate::observations::azimuth;
-use crate::spread;
+use crate::readings::observations::azimuth;
+use crate::readings::spread;
 use catoptric_model::{PoseKind, Summary, beam};
 use nalgebra::Point3;
 

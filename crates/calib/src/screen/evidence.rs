@@ -1,13 +1,13 @@
 //! The stretches of a dataset that say what an element reads, with everything that is known of what it should read.
 
-use crate::common::CommonErrors;
-use crate::observations::BoardInSensor;
-use crate::pose::Mount;
+use crate::judge::common::CommonErrors;
+use crate::mount::pose::Mount;
+use crate::readings::observations::BoardInSensor;
 use catoptric_model::{Dataset, Pose, PoseRecord, Summary};
 use nalgebra::Matrix6;
 
 /// The stretches of a dataset prepared for screening.
-pub struct Screen<'a> {
+pub(super) struct Screen<'a> {
     pub(super) dataset: &'a Dataset,
     pub(super) summaries: &'a [Vec<Summary>],
     /// Covariance of the mounting.
@@ -19,7 +19,7 @@ pub struct Screen<'a> {
 
 impl<'a> Screen<'a> {
     /// Prepares the stretches; `boards` holds each pose's board in the sensor frame.
-    pub fn new(
+    pub(super) fn new(
         dataset: &'a Dataset,
         summaries: &'a [Vec<Summary>],
         mount: &'a Mount,

@@ -6,12 +6,16 @@ mod evidence;
 mod near;
 mod tally;
 
-pub use evidence::Screen;
-pub use near::{EDGE_BEAMS, facets_near};
+use crate::mount::pose::Mount;
+use crate::readings::observations::BoardInSensor;
+use catoptric_model::{Dataset, Summary};
+use evidence::Screen;
+use near::facets_near;
+use rayon::prelude::*;
 
 /// What screening makes of an element.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Candidate {
+pub(crate) enum Candidate {
     /// It reads what a beam without a mirror reads; the text says how often.
     Direct(String),
     /// A mirror may deflect it: indices of facets, the likeliest first.
@@ -20,9 +24,21 @@ pub enum Candidate {
     Rejected(String),
 }
 
+/// The class of every element, in order; `boards` holds each pose's board in the sensor frame.
+pub(crate) fn candidates(
+    dataset: &Dataset,
+    summaries: &[Vec<Summary>],
+    mount: &Mount,
+    boards: &[Option<BoardInSensor>],
+) -> Vec<Candidate> {
+    let screen = Screen::new(dataset, summaries, mount, boards);
+    let beams = (0..dataset.session.scanner.beams).into_par_iter();
+    beams.map(|b| screen.classify(b)).collect()
+}
+
 impl Screen<'_> {
     /// The class of one element, from statistics alone.
-    pub fn classify(&self, beam: usize) -> Candidate {
+    fn classify(&self, beam: usize) -> Candidate {
         let session = &self.dataset.session;
         let facets = facets_near(&session.facets, beam);
         let tally = self.tally(beam, &facets);

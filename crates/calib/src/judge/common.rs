@@ -10,14 +10,14 @@ const STRUCTURE: &str = "structure";
 /// then A_a, then E_c of each color a board has; and last the drift while the scanner ranged the bare structure, if it was
 /// the scanner that did.
 #[derive(Debug, Clone, PartialEq)]
-pub struct CommonErrors<'a> {
+pub(crate) struct CommonErrors<'a> {
     session: &'a Session,
     colors: Vec<&'a str>,
 }
 
 impl<'a> CommonErrors<'a> {
     /// The uncertain numbers of a session.
-    pub fn of(session: &'a Session) -> Self {
+    pub(crate) fn of(session: &'a Session) -> Self {
         let mut colors: Vec<&str> = session.boards.iter().map(|b| b.color.as_str()).collect();
         colors.sort_unstable();
         colors.dedup();
@@ -25,20 +25,15 @@ impl<'a> CommonErrors<'a> {
     }
 
     /// How many there are.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         let drift = usize::from(self.session.bare_structure.scanned);
         self.session.believed.bias.distance.range_m.len() + 1 + self.colors.len() + drift
-    }
-
-    /// Never: A_a is always among them.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Error of a corrected range that one standard deviation of each number causes, in metres.
     ///
     /// A_a is uncertain with A_a + B_a, the error at normal incidence, held: its column is cos θ_N − 1.
-    pub fn row(&self, range: f64, cos_incidence: f64, color: &str) -> RowDVector<f64> {
+    pub(crate) fn row(&self, range: f64, cos_incidence: f64, color: &str) -> RowDVector<f64> {
         let mut row = RowDVector::zeros(self.len());
         for (number, error) in self.entries(range, cos_incidence, self.place(color)) {
             row[number] += error;
@@ -68,7 +63,7 @@ impl<'a> CommonErrors<'a> {
 
     /// Error of a bare distance that one standard deviation of each number causes, in metres: of what the scanner ranged
     /// and the believed biases corrected.
-    pub fn bare_row(&self, distance: f64, cos_incidence: f64) -> RowDVector<f64> {
+    pub(crate) fn bare_row(&self, distance: f64, cos_incidence: f64) -> RowDVector<f64> {
         if !self.session.bare_structure.scanned {
             return RowDVector::zeros(self.len());
         }
@@ -79,7 +74,7 @@ impl<'a> CommonErrors<'a> {
     }
 
     /// Standard deviation of a bare distance by all else, which the facets do not share, in metres.
-    pub fn bare_sd(&self, distance: f64, cos_incidence: f64) -> f64 {
+    pub(crate) fn bare_sd(&self, distance: f64, cos_incidence: f64) -> f64 {
         let whole = self.session.bare_structure.distance_sd_mm * 1e-3;
         let shared = self.bare_row(distance, cos_incidence).norm_squared();
         (whole * whole - shared).max(0.0).sqrt()
@@ -100,7 +95,7 @@ impl<'a> CommonErrors<'a> {
     }
 
     /// The believed biases changed by so many standard deviations of each number.
-    pub fn applied(&self, deviations: &[f64]) -> RangeBias {
+    pub(crate) fn applied(&self, deviations: &[f64]) -> RangeBias {
         let beliefs = &self.session.believed;
         let mut bias = beliefs.bias.clone();
         let nodes = bias.distance.range_m.len();
@@ -121,7 +116,7 @@ impl<'a> CommonErrors<'a> {
     }
 
     /// Variance of E_c for a color that no board of the session has, in square metres; zero for a listed one.
-    pub fn unlisted_variance(&self, color: &str) -> f64 {
+    pub(crate) fn unlisted_variance(&self, color: &str) -> f64 {
         if self.colors.contains(&color) {
             0.0
         } else {

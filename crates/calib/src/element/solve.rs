@@ -3,13 +3,14 @@
 //! Every step corrects the readings (Eq. 3) and places the mirror at the current estimate, so that data without noise
 //! return the truth itself and not a neighbor of it.
 
-use crate::jacobian;
-use crate::jacobian::OutgoingRay;
-use crate::observations::Observation;
+use crate::judge::levers::{levers, off_zero};
 use crate::options::{JacobianForm, Options};
+use crate::readings::jacobian;
+use crate::readings::jacobian::OutgoingRay;
+use crate::readings::observations::Observation;
 use catoptric_model::bias::ColoredBias;
 use catoptric_model::{BoardPlane, CorrectedRange, Deflection, RangeBias, beam};
-use nalgebra::{Matrix2, SymmetricEigen, Unit, Vector2, Vector3};
+use nalgebra::{Matrix2, Unit, Vector2, Vector3};
 
 /// Lever arm, in metres per radian, below which a direction counts as undetermined within the iteration.
 ///
@@ -273,20 +274,4 @@ pub(crate) fn determined_step(
         }
     }
     step.component_mul(&scale).cap_magnitude(LONGEST_STEP)
-}
-
-/// Squared lever arms and their directions in the tangent plane (cos φ·δθ, δφ), from HᵀH in (θ_a, φ).
-pub fn levers(normal: &Matrix2<f64>, cos_elevation: f64) -> (Vector2<f64>, Matrix2<f64>) {
-    let scale = Matrix2::from_diagonal(&Vector2::new(1.0 / cos_elevation, 1.0));
-    let eigen = SymmetricEigen::new(scale * normal * scale);
-    (eigen.eigenvalues, eigen.eigenvectors)
-}
-
-/// cos φ of an elevation, the same on every machine; kept off zero, where azimuth means nothing.
-pub(crate) fn libm_cos(elevation: f64) -> f64 {
-    off_zero(beam::direction(elevation).x)
-}
-
-fn off_zero(cos_elevation: f64) -> f64 {
-    cos_elevation.abs().max(1e-6)
 }

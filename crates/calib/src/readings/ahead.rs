@@ -1,6 +1,6 @@
 //! What a ray in the sensor frame meets: the board of the pose, or the known room.
 
-use crate::observations::{BoardInSensor, cone_half_angle};
+use crate::readings::observations::{BoardInSensor, cone_half_angle};
 use catoptric_model::{BoardPlane, Pose, Session, frame};
 use nalgebra::{Point3, Unit, Vector3};
 

@@ -1,12 +1,12 @@
 //! An element on its way to an estimate: what it read of which boards, and the error budgets of what it may conclude.
 
-use crate::bare::Bare;
-use crate::covariance::{self, Budget, MountUncertainty};
-use crate::observability::{self, Weakness};
-use crate::observations::{BoardInSensor, BoardView, Observation, azimuth};
+use crate::element::solve::{BareDistance, Element, Solution};
+use crate::judge::covariance::{self, Budget, MountUncertainty};
+use crate::judge::observability::{self, Weakness};
 use crate::options::{Method, Options};
-use crate::solve::{BareDistance, Element, Solution};
-use crate::spread;
+use crate::readings::bare::Bare;
+use crate::readings::observations::{BoardInSensor, BoardView, Observation, azimuth};
+use crate::readings::spread;
 use catoptric_model::session::NominalFacet;
 use catoptric_model::{Dataset, Deflection, Pose, PoseKind, PoseRecord, Session, Status, Summary};
 

@@ -5,8 +5,9 @@
 //!
 //! Unlike the paper, whose "RLS" is the batch form of Eq. (8), this is the recursion; both end at the same estimate.
 
+use crate::element::solve::{Element, Solution};
+use crate::judge::levers::{levers, libm_cos};
 use crate::options::Options;
-use crate::solve::{Element, Solution, levers, libm_cos};
 use catoptric_model::Deflection;
 use nalgebra::{Matrix2, Vector2};
 

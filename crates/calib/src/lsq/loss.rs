@@ -61,7 +61,7 @@ impl Loss {
 /// The size that a normal residual of standard deviation 1 exceeds with probability 1 − p: √χ²₁(p).
 ///
 /// ```
-/// let gate = catoptric_calib::least_squares::gate(0.99);
+/// let gate = catoptric_calib::lsq::gate(0.99);
 /// assert!((gate - 2.575829).abs() < 1e-6);
 /// ```
 ///

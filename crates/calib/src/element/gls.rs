@@ -4,8 +4,9 @@
 //! least variance of all estimates of one element by itself. Unlike the paper, whose sum gives every reading the same
 //! weight.
 
-use crate::attempt::Attempt;
-use crate::solve::{Element, Solution, determined_step, libm_cos};
+use crate::element::attempt::Attempt;
+use crate::element::solve::{Element, Solution, determined_step};
+use crate::judge::levers::libm_cos;
 use catoptric_model::Deflection;
 use nalgebra::DVector;
 

@@ -1,7 +1,7 @@
 //! The plane of a facet: as drawn, and as its elements find it.
 
 use crate::error::CalibError;
-use crate::observations::azimuth;
+use crate::readings::observations::azimuth;
 use catoptric_model::session::{NominalFacet, Session};
 use catoptric_model::{BeamEstimate, Deflection, MirrorPlane, beam, mirror};
 use nalgebra::{Unit, Vector3};
@@ -16,6 +16,18 @@ pub(crate) fn plane_as_drawn(facet: &NominalFacet) -> Result<MirrorPlane, CalibE
         corners: facet.corners_mm.len(),
     })?;
     Ok(MirrorPlane::through(plane.point, plane.normal))
+}
+
+/// The planes of all facets as their solved elements find them, or else as drawn.
+pub(crate) fn as_built(
+    session: &Session,
+    drawn: &[MirrorPlane],
+    solved: &[BeamEstimate],
+) -> Vec<MirrorPlane> {
+    let facets = session.facets.iter().zip(drawn);
+    facets
+        .map(|(facet, drawn)| plane_as_built(session, facet, solved).unwrap_or(*drawn))
+        .collect()
 }
 
 /// The plane that most of a facet's solved elements agree on: medians, which a few strays do not move.

@@ -1,10 +1,10 @@
 //! Which readings of which boards place the sensor in the rig, and what each of them says.
 
-use crate::common::CommonErrors;
-use crate::covariance::PlaneFit;
-use crate::jacobian;
-use crate::observations::{BoardInSensor, azimuth, cone_half_angle};
-use crate::spread;
+use crate::judge::common::CommonErrors;
+use crate::judge::covariance::PlaneFit;
+use crate::readings::jacobian;
+use crate::readings::observations::{BoardInSensor, azimuth, cone_half_angle};
+use crate::readings::spread;
 use catoptric_model::session::MountTolerance;
 use catoptric_model::{
     CorrectedRange, Dataset, Pose, PoseKind, PoseRecord, RangeBias, RawRange, Summary, beam,

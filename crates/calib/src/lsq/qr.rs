@@ -26,7 +26,7 @@ impl PivotedQr {
     /// Factors a matrix (m × n) by Householder reflections and applies them to `carried` (m × c) too.
     ///
     /// ```
-    /// use catoptric_calib::least_squares::PivotedQr;
+    /// use catoptric_calib::lsq::PivotedQr;
     /// use nalgebra::DMatrix;
     /// // The third column is the sum of the first two.
     /// let a = DMatrix::from_row_slice(4, 3, &[1.0, 2.0, 3.0, 0.0, 1.0, 1.0, 1.0, 0.0, 1.0, 2.0, 1.0, 3.0]);

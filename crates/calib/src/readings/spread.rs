@@ -14,17 +14,17 @@ const SPREAD_SIGMAS: f64 = 5.0;
 /// Largest sample standard deviation that is still believed to be noise, in metres.
 ///
 /// The standard error of a sample standard deviation is σ/√(2(N − 1)).
-pub fn largest_spread(believed_sd: f64, count: usize) -> f64 {
+pub(crate) fn largest_spread(believed_sd: f64, count: usize) -> f64 {
     SPREAD_FLOOR + SURFACE_FACTOR * believed_sd * (1.0 + SPREAD_SIGMAS * relative_error(count))
 }
 
 /// Whether a beam's readings spread more than noise explains.
-pub fn is_abnormal(summary: &Summary, believed_sd: f64) -> bool {
+pub(crate) fn is_abnormal(summary: &Summary, believed_sd: f64) -> bool {
     summary.count > 1 && summary.sd > largest_spread(believed_sd, summary.count)
 }
 
 /// Noise of one reading, in metres: the believed one, or the observed one where it is plainly larger.
-pub fn noise_sd(summary: &Summary, believed_sd: f64) -> f64 {
+pub(crate) fn noise_sd(summary: &Summary, believed_sd: f64) -> f64 {
     // Always taking the larger of two would call noise larger than it is whenever the sample happens to be so.
     let chance = believed_sd * (1.0 + 3.0 * relative_error(summary.count));
     if summary.sd > chance {

@@ -1,14 +1,14 @@
 //! Can an estimate be believed? Its residuals, its weakest direction, and the known room (step 13).
 
-use crate::ahead::{AGREEMENT_FLOOR, ahead};
-use crate::ambiguity::second_direction;
-use crate::attempt::{Attempt, Failure, Fit, lost, rejected};
-use crate::choose::{GATE_FLOOR, GATE_SIGMAS};
-use crate::initial;
-use crate::observations::{BoardView, Observation};
+use crate::element::ambiguity::second_direction;
+use crate::element::attempt::{Attempt, Failure, Fit, lost, rejected};
+use crate::element::choose::{GATE_FLOOR, GATE_SIGMAS};
+use crate::element::initial;
+use crate::judge::levers::libm_cos;
 use crate::options::Method;
-use crate::solve::libm_cos;
-use crate::spread;
+use crate::readings::ahead::{AGREEMENT_FLOOR, ahead};
+use crate::readings::observations::{BoardView, Observation};
+use crate::readings::spread;
 use catoptric_model::{BeamEstimate, Deflection, PoseKind, RawRange, Status, frame};
 use nalgebra::{Matrix2, Vector2};
 

@@ -7,9 +7,9 @@
 //! δz = B + A_c·r + A_a·cos θ_N          B_a and B_c are one column: only their sum B exists
 //! ```
 
-use crate::jacobian;
-use crate::least_squares::{Information, Point, Problem, linearize};
-use crate::solve::libm_cos;
+use crate::judge::levers::libm_cos;
+use crate::lsq::{Information, Point, Problem, linearize};
+use crate::readings::jacobian;
 use catoptric_model::{BoardPlane, Deflection, MirrorPlane, beam, frame, range};
 use nalgebra::{DMatrix, DVector, Point3, Unit, Vector3};
 

@@ -1,6 +1,6 @@
 //! How far a tracked plane can be off at a point of it: the fit of a plane through markers.
 
-use crate::observations::BoardView;
+use crate::readings::observations::BoardView;
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
 /// Part of the longest distance of a marker from the middle of all at which one gives a direction.

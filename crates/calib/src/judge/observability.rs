@@ -3,8 +3,8 @@
 //! Each board contributes p = s·tan α along the direction of its tilt, seen along the beam; if all p are collinear
 //! with the origin (one tilt axis, one orientation, boards face-on) one direction of (θ_a, φ) changes no range.
 
-use crate::covariance::Budget;
-use crate::solve::{levers, libm_cos};
+use crate::judge::covariance::Budget;
+use crate::judge::levers::{levers, libm_cos};
 use nalgebra::{Matrix2, Vector2};
 
 /// Standard deviation beyond which a direction counts as unobservable, in radians (3°): more than the drawing's error.

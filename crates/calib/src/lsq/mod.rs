@@ -6,7 +6,7 @@
 //! [`minimize_graduated`] withstand outliers. [`Information`] answers for the solution, and says what is open.
 //!
 //! ```
-//! use catoptric_calib::least_squares::{Options, Point, Problem, minimize};
+//! use catoptric_calib::lsq::{Options, Point, Problem, minimize};
 //! use nalgebra::{DMatrix, DVector};
 //!
 //! /// y = a·x² + b, in units of the error of y.
@@ -33,7 +33,7 @@
 //! let found = minimize(&one_side, Point::vector(&[0.0, 0.0]), &Options::default())?;
 //! assert_eq!(found.information.rank(), 1);
 //! assert_eq!(found.information.standard_deviations(), [None, None]);
-//! # Ok::<(), catoptric_calib::least_squares::ProblemError>(())
+//! # Ok::<(), catoptric_calib::lsq::ProblemError>(())
 //! ```
 
 mod elimination;

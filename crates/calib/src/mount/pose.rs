@@ -5,8 +5,8 @@
 //! board share its drift and its markers' error, so each board is weighted by its whole covariance (Woodbury), not
 //! reading by reading.
 
-use crate::covariance::MountUncertainty;
-use crate::mount_data::{DirectBoard, Selection, Selector};
+use crate::judge::covariance::MountUncertainty;
+use crate::mount::mount_data::{DirectBoard, Selection, Selector};
 use catoptric_model::session::MountTolerance;
 use catoptric_model::{Dataset, Pose, PoseData, Summary, calibration::MountEstimate};
 use nalgebra::{

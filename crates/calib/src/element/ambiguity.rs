@@ -5,9 +5,9 @@
 //! mirrored at it: boards whose tilts, as vectors tan α across the beam, lie on one line. Vertical boards are the well-known
 //! case, e = z: φ and −φ cannot be told apart.
 
-use crate::attempt::{Attempt, Fit};
-use crate::initial::FARTHEST_START;
-use crate::solve;
+use crate::element::attempt::{Attempt, Fit};
+use crate::element::initial::FARTHEST_START;
+use crate::element::solve;
 use catoptric_model::{Deflection, beam};
 use nalgebra::{DVector, Matrix3, SymmetricEigen};
 

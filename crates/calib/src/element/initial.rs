@@ -1,8 +1,8 @@
 //! A start without a guess: 1/s_k = (n_k/(n_k·(c_k − P_L1)))·v is linear in the exit direction v.
 
-use crate::covariance::Budget;
-use crate::observations::Observation;
-use crate::solve::libm_cos;
+use crate::judge::covariance::Budget;
+use crate::judge::levers::libm_cos;
+use crate::readings::observations::Observation;
 use catoptric_model::{Deflection, RangeBias, frame};
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3xX, SymmetricEigen, Unit, Vector3};
 
@@ -90,7 +90,7 @@ pub(crate) fn covariance(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::observations::BoardView;
+    use crate::readings::observations::BoardView;
     use catoptric_model::{BoardPlane, RawRange, beam, range};
     use nalgebra::Point3;
 

@@ -1,17 +1,19 @@
 //! One element from its readings to its estimate: boards and angles chosen in turn until both stand.
 
-use crate::attempt::{Attempt, Failure, Fit, LEAST_BOARDS, Workspace, lost};
-use crate::choose::choose;
-use crate::gls::generalized;
-use crate::initial::{self, FARTHEST_START};
-use crate::judge::{judge, residuals_agree};
-use crate::locate;
-use crate::observations::azimuth;
+use crate::element::attempt::{Attempt, Failure, Fit, LEAST_BOARDS, Workspace, lost};
+use crate::element::choose::choose;
+use crate::element::gls::generalized;
+use crate::element::initial::{self, FARTHEST_START};
+use crate::element::recursive::recursive;
+use crate::element::solve::{self, Element, Solution};
+use crate::element::verdict::{judge, residuals_agree};
 use crate::options::Method;
-use crate::recursive::recursive;
-use crate::solve::{self, Element, Solution};
+use crate::readings::locate;
+use crate::readings::observations::azimuth;
+use crate::screen::Candidate;
 use catoptric_model::session::NominalFacet;
 use catoptric_model::{BeamEstimate, Deflection, MirrorPlane, Status, beam};
+use rayon::prelude::*;
 
 /// Direction errors allowed for while the boards of an element are chosen, in radians, from the drawing's to none.
 ///
@@ -25,13 +27,41 @@ const FARTHEST_END: f64 = 0.007;
 /// Largest ||v| − 1| of a start in closed form that is believed.
 const LARGEST_EXCESS: f64 = 0.2;
 
-/// The estimate of one element on a facet whose plane is believed to be `mirror`.
-pub(crate) fn estimate(
+/// The estimate of every element, with facets at the given planes.
+pub(crate) fn estimates(
     work: &Workspace,
-    beam: usize,
-    facet: &NominalFacet,
-    mirror: &MirrorPlane,
-) -> BeamEstimate {
+    candidates: &[Candidate],
+    mirrors: &[MirrorPlane],
+) -> Vec<BeamEstimate> {
+    let facets = &work.dataset.session.facets;
+    let of_one = |(beam, candidate): (usize, &Candidate)| match candidate {
+        Candidate::Direct(reason) => BeamEstimate::without_angles(beam, Status::Direct, Some(reason.clone())),
+        Candidate::Rejected(reason) => {
+            BeamEstimate::without_angles(beam, Status::Rejected, Some(reason.clone()))
+        }
+        Candidate::Deflected(near) => {
+            let mut tried = near
+                .iter()
+                .map(|f| estimate(work, beam, &facets[*f], &mirrors[*f]));
+            let nearest = tried.next();
+            match nearest {
+                Some(solved) if solved.status == Status::Solved => solved,
+                // At the seam of two facets the neighbor may be the one that was met.
+                other => tried
+                    .find(|e| e.status == Status::Solved)
+                    .or(other)
+                    .unwrap_or_else(|| {
+                        let reason = "no facet is near it".to_owned();
+                        BeamEstimate::without_angles(beam, Status::Rejected, Some(reason))
+                    }),
+            }
+        }
+    };
+    candidates.par_iter().enumerate().map(of_one).collect()
+}
+
+/// The estimate of one element on a facet whose plane is believed to be `mirror`.
+fn estimate(work: &Workspace, beam: usize, facet: &NominalFacet, mirror: &MirrorPlane) -> BeamEstimate {
     let session = &work.dataset.session;
     let azimuth = azimuth(session, beam);
     let without = |status, reason| BeamEstimate {

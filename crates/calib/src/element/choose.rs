@@ -1,7 +1,7 @@
 //! Which boards an element hits: those that hold its spot where the estimate puts it, and whose range agrees.
 
-use crate::attempt::{Attempt, LEAST_BOARDS, Workspace};
-use crate::observations::{azimuth, cone_half_angle};
+use crate::element::attempt::{Attempt, LEAST_BOARDS, Workspace};
+use crate::readings::observations::{azimuth, cone_half_angle};
 use catoptric_model::session::NominalFacet;
 use catoptric_model::{BeamEstimate, Deflection, MirrorPlane, beam};
 

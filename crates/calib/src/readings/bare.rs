@@ -6,7 +6,7 @@
 //!
 //! Where two facets meet, a beam may have ranged the neighbor's structure, or both at once.
 
-use crate::observations::azimuth;
+use crate::readings::observations::azimuth;
 use catoptric_model::Session;
 use catoptric_model::session::NominalFacet;
 use nalgebra::{Matrix2, Vector2};

@@ -8,9 +8,9 @@
 
 mod plane;
 
-use crate::common::CommonErrors;
-use crate::jacobian;
-use crate::observations::BoardView;
+use crate::judge::common::CommonErrors;
+use crate::readings::jacobian;
+use crate::readings::observations::BoardView;
 use catoptric_model::{Deflection, Session, beam, range};
 use nalgebra::{DMatrix, DVector, Dyn, Matrix2, Matrix6, OMatrix, RowDVector, RowVector6, U2, U6, Vector2};
 
@@ -29,7 +29,7 @@ const LEAST_ERROR: f64 = 1e-6;
 pub struct MountUncertainty {
     /// Covariance from errors that no element shares.
     pub independent: Matrix6<f64>,
-    /// Motion caused by one standard deviation of each of the [`CommonErrors`]; no columns if unknown.
+    /// Motion caused by one standard deviation of each uncertain number of the believed biases; no columns if unknown.
     pub common: OMatrix<f64, U6, Dyn>,
 }
 

@@ -5,7 +5,7 @@
 //! it stands for the beam as long as no more readings lie outside than happens to other beams. A beam that reads two
 //! surfaces by turns has more, keeps its wide spread and is judged by that (step 4).
 
-use crate::spread;
+use crate::readings::spread;
 use catoptric_model::{Dataset, PoseRecord, Summary, Window};
 use rayon::prelude::*;
 
