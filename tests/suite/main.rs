@@ -14,6 +14,7 @@ mod consistency;
 mod detection;
 mod determinism;
 mod docs;
+mod door;
 mod edits;
 mod energy;
 mod export;
