@@ -7,7 +7,7 @@
 use catoptric::calib::observations::{BoardView, Observation};
 use catoptric::calib::solve::{self, BareDistance, Element};
 use catoptric::calib::{self, Method, Options};
-use catoptric::io::RecordingWriter;
+use catoptric::files::RecordingWriter;
 use catoptric::layout::{Detail, Layout, analyze};
 use catoptric::model::{BoardPlane, Deflection, RawRange, beam, range};
 use catoptric::sim::build::Structure;

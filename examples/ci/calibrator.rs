@@ -20,7 +20,7 @@ impl Calibrator for Mine {
 }
 
 fn scene() -> Scene {
-    let text = catoptric::io::scene::scene_template(catoptric::io::scene::Layout::TwoMirror);
+    let text = catoptric::files::scene::Template::TwoMirror.text();
     let mut scene: Scene = toml::from_str(text).unwrap();
     scene.experiment.scans_per_pose = 10; // a tenth of the time
     scene.scanner.sub_rays = 7;

@@ -2,12 +2,11 @@
 
 use super::Context;
 use super::error::CliError;
-use super::files::read_calibration;
 use super::output::{counted, print};
-use catoptric::apply::{CloudFrame, apply};
-use catoptric::io;
-use catoptric::io::IoError;
-use catoptric::io::cloud::{CloudFormat, cloud_bytes};
+use catoptric::files;
+use catoptric::files::IoError;
+use catoptric::files::cloud::{CloudFormat, cloud_bytes};
+use catoptric::{CloudFrame, Error, apply, read_calibration, read_dataset};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -40,19 +39,18 @@ enum FrameName {
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let invalid = |message: String| CliError::Invalid { message, help: None };
     let path = &arguments.out;
-    let format = CloudFormat::of_path(path).map_err(|e| invalid(e.to_string()))?;
-    let dataset = io::read_dataset(&arguments.dataset)?;
+    let format = CloudFormat::of_path(path).map_err(|e| CliError::invalid(e.to_string(), None))?;
+    let dataset = read_dataset(&arguments.dataset)?;
     let calibration = read_calibration(&arguments.calibration)?;
     let frame = match arguments.frame {
         FrameName::Sensor => CloudFrame::Sensor,
         FrameName::Rig => CloudFrame::Rig,
         FrameName::Room => CloudFrame::Room,
     };
-    let cloud = apply(&dataset, &calibration, arguments.pose, frame).map_err(|e| invalid(e.to_string()))?;
+    let cloud = apply(&dataset, &calibration, arguments.pose, frame).map_err(Error::from)?;
     let bytes = cloud_bytes(format, &cloud).map_err(|e| IoError::write(path, e))?;
-    io::write_file(path, &bytes)?;
+    files::write_file(path, &bytes)?;
     if cloud.mount_is_nominal {
         context.say("the calibration has no mounting: the drawing's was taken");
     }

@@ -2,12 +2,10 @@
 
 use super::Context;
 use super::error::CliError;
-use super::files::read_characterization;
-use super::interrupt;
 use super::output::{counted, print, quoted};
-use catoptric::calib::{self, JacobianForm, Method, Options};
-use catoptric::io;
-use catoptric::model::{Calibration, Status};
+use catoptric::calib::{JacobianForm, Options};
+use catoptric::model::Status;
+use catoptric::{Calibration, Method, calibrate_with, read_characterization, read_dataset, write_json};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -75,21 +73,19 @@ enum JacobianName {
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let mut dataset = io::read_dataset(&arguments.dataset)?;
-    interrupt::check()?;
+    let mut dataset = read_dataset(&arguments.dataset)?;
+    context.check()?;
     if let Some(path) = &arguments.characterization {
         let found = read_characterization(path)?;
         dataset.session.believed = dataset.session.believed.after(&found);
     }
     let method = Method::from(arguments.method);
     if arguments.cross_validate && method != Method::Joint {
-        return Err(CliError::Invalid {
-            message: format!(
-                "--cross-validate goes with --method joint, not with {}",
-                method.name()
-            ),
-            help: None,
-        });
+        let message = format!(
+            "--cross-validate goes with --method joint, not with {}",
+            method.name()
+        );
+        return Err(CliError::invalid(message, None));
     }
     let options = Options {
         jacobian: match arguments.jacobian {
@@ -100,13 +96,12 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         ..Options::default()
     };
     let begin = Instant::now();
-    let calibration = calib::calibrate(&dataset, method, &options)?;
-    interrupt::check()?;
+    let calibration = calibrate_with(&dataset, method, &options, &context.control())?;
     context.detail(&format!("calibrated in {:.2} s", begin.elapsed().as_secs_f64()));
     for warning in &calibration.warnings {
         context.say(&format!("warning: {warning}"));
     }
-    io::write_json(&arguments.out, &calibration)?;
+    write_json(&arguments.out, &calibration)?;
     print(&format!(
         "wrote {}: {}\n{}next: catoptric score {} {}\n",
         arguments.out.display(),

@@ -3,11 +3,11 @@
 use super::Context;
 use super::error::CliError;
 use super::output::{counted, print, quoted};
-use catoptric::io::scene;
 use catoptric::model::beam;
+use catoptric::sim::Laboratory;
 use catoptric::sim::check::{Outline, outline};
 use catoptric::sim::trace::Scenery;
-use catoptric::sim::{Laboratory, Scene};
+use catoptric::{Scene, sim};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -22,13 +22,14 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let scene = scene::load(&arguments.scene, &arguments.set)?;
+    let scene = Scene::load_with(&arguments.scene, &arguments.set)?;
+    let scene = scene.resolved();
     if scene.has_no_laboratory() {
-        return open_stage(arguments, &scene);
+        return open_stage(arguments, scene);
     }
-    let outline = outline(&scene);
+    let outline = outline(scene);
     // Setting the experiment up finds what no single value shows: a board that fits nowhere.
-    let laboratory = Laboratory::new(&scene, scene.seed)?;
+    let laboratory = Laboratory::new(scene, scene.seed)?;
     let flights = match scene.flight.len() {
         0 => String::new(),
         flights => format!(", {}", counted(flights, "flight")),
@@ -72,7 +73,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
 }
 
 /// A scene to trace rays in, and no more.
-fn open_stage(arguments: &Arguments, scene: &Scene) -> Result<(), CliError> {
+fn open_stage(arguments: &Arguments, scene: &sim::Scene) -> Result<(), CliError> {
     Scenery::new(scene)?.tracer(1)?;
     print(&format!(
         "ok: {}: {}, {}, no laboratory\nnext: catoptric trace {} --rays RAYS.csv --out PATHS.csv\n",

@@ -1,12 +1,11 @@
 //! `catoptric compare`: several calibrations of one dataset, whoever made them, in one table.
 
 use super::error::CliError;
-use super::files::{read_calibration, read_truth};
 use super::output::{counted, print};
 use super::score::figure;
-use catoptric::compare::{CONTRADICTION, Comparison, Contestant, Row, compare};
-use catoptric::io;
+use catoptric::compare::{CONTRADICTION, Row};
 use catoptric::score::Honesty;
+use catoptric::{Comparison, Contestant, compare, read_calibration, read_dataset, read_truth};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -25,7 +24,7 @@ pub(crate) struct Arguments {
 
 /// Ends well whatever the verdicts are: `score` is what judges one of them.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
-    let dataset = io::read_dataset(&arguments.dataset)?;
+    let dataset = read_dataset(&arguments.dataset)?;
     let truth = read_truth(&arguments.dataset)?;
     let contestants: Vec<Contestant> = arguments
         .calibrations

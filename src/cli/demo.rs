@@ -3,17 +3,15 @@
 use super::Context;
 use super::calibrate::summary;
 use super::error::CliError;
-use super::files::read_truth;
-use super::interrupt;
 use super::output::{counted, grouped, print, quoted};
 use super::score::figure;
-use super::simulate::{self, Recording};
-use catoptric::apply::{CloudFrame, apply};
-use catoptric::calib::{self, Method, Options};
-use catoptric::io::cloud::{CloudFormat, cloud_bytes};
-use catoptric::io::scene::{self, Layout};
-use catoptric::io::{self, IoError};
-use catoptric::score::{Verdict, score};
+use catoptric::calib::Options;
+use catoptric::files::cloud::{CloudFormat, cloud_bytes};
+use catoptric::files::{self, IoError};
+use catoptric::{
+    CloudFrame, Error, Method, Recording, Scene, Template, Verdict, apply, calibrate_with, read_dataset,
+    read_truth, report, score, simulate_into, write_json,
+};
 use clap::Args;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -35,46 +33,40 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let begin = Instant::now();
     let folder = &arguments.out;
-    if folder.join(io::dataset::SESSION).exists() {
-        return Err(CliError::Invalid {
-            message: format!(
-                "{} is itself a dataset; the demo writes one into a folder of its own",
-                folder.display()
-            ),
-            help: Some("give another --out".to_owned()),
-        });
+    if folder.join(files::dataset::SESSION).exists() {
+        let message = format!(
+            "{} is itself a dataset; the demo writes one into a folder of its own",
+            folder.display()
+        );
+        return Err(CliError::invalid(message, "give another --out".to_owned()));
     }
-    let mut scene = scene::parse(scene::scene_template(Layout::Prototype), "prototype.toml", &[])?;
-    scene.seed = arguments.seed.unwrap_or(scene.seed);
+    let mut scene = Scene::template(Template::Prototype);
+    if let Some(seed) = arguments.seed {
+        scene = scene.with_seed(seed);
+    }
     let dataset_folder = folder.join("dataset");
-    let figures = simulate::record(
-        &Recording {
-            scene: &scene,
-            command_line: format!("catoptric demo --seed {}", scene.seed),
-            out: &dataset_folder,
-            // Only a dataset is ever replaced; a second demo makes the same one again.
-            blind: false,
-            replace: true,
-            returns: false,
-            readings: false,
-            sub_rays: false,
-        },
-        context,
-    )?;
+    let recording = Recording {
+        // Only a dataset is ever replaced; a second demo makes the same one again.
+        replace: true,
+        command_line: Some(format!("catoptric demo --seed {}", scene.resolved().seed)),
+        ..Recording::default()
+    };
+    let control = context.control();
+    let figures = simulate_into(&scene, &dataset_folder, &recording, &control)?;
 
     context.say("reading the dataset back");
-    let dataset = io::read_dataset(&dataset_folder)?;
+    let dataset = read_dataset(&dataset_folder)?;
     let truth = read_truth(&dataset_folder)?;
     let mut results = Vec::new();
     let mut lines = Vec::new();
     for method in SHOWN {
-        interrupt::check()?;
+        context.check()?;
         let name = method.name();
         context.say(&format!("calibrating: {name}"));
-        let calibration = calib::calibrate(&dataset, method, &Options::default())?;
-        io::write_json(folder.join(format!("calibration-{name}.json")), &calibration)?;
+        let calibration = calibrate_with(&dataset, method, &Options::default(), &control)?;
+        write_json(folder.join(format!("calibration-{name}.json")), &calibration)?;
         let result = score(&dataset, &calibration, truth.as_ref());
-        io::write_json(folder.join(format!("score-{name}.json")), &result)?;
+        write_json(folder.join(format!("score-{name}.json")), &result)?;
         lines.push(format!(
             "{name:8}  {}; per-axis error {} rms",
             summary(&calibration),
@@ -82,20 +74,17 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         ));
         results.push((calibration, result));
     }
-    interrupt::check()?;
+    context.check()?;
     context.say("writing cloud and report");
     let cloud_path = folder.join("cloud.ply");
-    let cloud = apply(&dataset, &results[0].0, None, CloudFrame::Room).map_err(|e| CliError::Invalid {
-        message: e.to_string(),
-        help: None,
-    })?;
+    let cloud = apply(&dataset, &results[0].0, None, CloudFrame::Room).map_err(Error::from)?;
     let bytes = cloud_bytes(CloudFormat::Ply, &cloud).map_err(|e| IoError::write(&cloud_path, e))?;
-    io::write_file(&cloud_path, &bytes)?;
+    files::write_file(&cloud_path, &bytes)?;
     let report_path = folder.join("report.html");
-    let html = catoptric::report::report(&dataset, truth.as_ref(), &results, Some(&cloud));
-    io::write_file(&report_path, html.as_bytes())?;
+    let html = report(&dataset, truth.as_ref(), &results, Some(&cloud));
+    files::write_file(&report_path, html.as_bytes())?;
 
-    let score = &results[0].1;
+    let (scene, score) = (scene.resolved(), &results[0].1);
     let verdict = score.verdict.word();
     let calibrated = lines.join("\n            ");
     print(&format!(

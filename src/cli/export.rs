@@ -3,11 +3,13 @@
 use super::Context;
 use super::error::CliError;
 use super::output::{counted, print, quoted};
-use catoptric::export::{self, Part};
-use catoptric::io::{self, scene};
-use catoptric::layout::Drawing;
+use catoptric::export::Part;
+use catoptric::{Error, ExportFormat, Scene, export, export_boards, files, read_dataset};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
+
+/// How far beams of a GLB go after their last mirror unless something else is asked for, in meters.
+const REACH_M: f64 = 1.0;
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]
@@ -17,7 +19,7 @@ pub(crate) struct Arguments {
     input: PathBuf,
     /// What to write.
     #[arg(long, value_enum)]
-    format: Format,
+    format: FormatName,
     /// The file.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -39,7 +41,7 @@ pub(crate) struct Arguments {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
+enum FormatName {
     /// Mirrors and a printable frame as closed solids, in millimetres
     Stl,
     /// Mirrors, housing and beams to look at (binary glTF), in metres
@@ -64,74 +66,55 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     if arguments.input.is_dir() {
         return boards(arguments);
     }
-    let reach_m = arguments.reach_m.unwrap_or(1.0);
+    let reach_m = arguments.reach_m.unwrap_or(REACH_M);
     if !(reach_m.is_finite() && reach_m > 0.0) {
-        return Err(CliError::Invalid {
-            message: format!("--reach-m takes a positive number, it was given {reach_m}"),
-            help: None,
-        });
+        let message = format!("--reach-m takes a positive number, it was given {reach_m}");
+        return Err(CliError::invalid(message, None));
     }
-    let scene = scene::load(&arguments.input, &arguments.set)?;
-    let seed = arguments.as_built.then(|| arguments.seed.unwrap_or(scene.seed));
-    let drawing = Drawing::new(&scene, seed)?;
-    let (bytes, what) = match arguments.format {
-        Format::Stl => {
-            let part = match arguments.part.unwrap_or(Solids::All) {
-                Solids::Mirrors => Part::Mirrors,
-                Solids::Frame => Part::Frame,
-                Solids::All => Part::All,
-            };
-            let solids = export::solids(&scene, &drawing, part);
-            if solids.is_empty() {
-                return Err(CliError::Invalid {
-                    message: "the scene has nothing of that kind to make".to_owned(),
-                    help: Some("see --part".to_owned()),
-                });
-            }
-            if part != Part::Mirrors {
-                let shaded = export::shaded_by_frame(&scene, seed)?;
-                if !shaded.is_empty() {
-                    let names: Vec<String> = shaded.iter().map(usize::to_string).collect();
-                    context.say(&format!(
-                        "warning: the frame takes the sight of {}: {}",
-                        counted(shaded.len(), "element"),
-                        names.join(", ")
-                    ));
-                }
-            }
-            (
-                export::stl(&solids),
-                format!("{}, millimetres", counted(solids.len(), "solid")),
-            )
-        }
-        Format::Glb => (
-            export::glb(&scene, &drawing, reach_m),
-            format!("{} and beams, metres", counted(drawing.facets.len(), "mirror")),
-        ),
-        Format::Csv => {
-            let table = export::drawing_table(&scene, &drawing);
-            let table = table.map_err(|e| CliError::Output(std::io::Error::other(e)))?;
-            (table, counted(drawing.facets.len(), "mirror"))
-        }
-        Format::Urdf => (
-            export::urdf(&scene, &drawing).into_bytes(),
-            format!("the laser and {}", counted(drawing.facets.len(), "mirror")),
-        ),
+    let scene = Scene::load_with(&arguments.input, &arguments.set)?;
+    let seed = arguments
+        .as_built
+        .then(|| arguments.seed.unwrap_or(scene.resolved().seed));
+    let format = match arguments.format {
+        FormatName::Stl => ExportFormat::Stl(match arguments.part.unwrap_or(Solids::All) {
+            Solids::Mirrors => Part::Mirrors,
+            Solids::Frame => Part::Frame,
+            Solids::All => Part::All,
+        }),
+        FormatName::Glb => ExportFormat::Glb { reach_m },
+        FormatName::Csv => ExportFormat::Csv,
+        FormatName::Urdf => ExportFormat::Urdf,
     };
-    io::write_file(&arguments.out, &bytes)?;
+    let exported = export(&scene, format, seed)?;
+    if !exported.shaded.is_empty() {
+        let names: Vec<String> = exported.shaded.iter().map(usize::to_string).collect();
+        context.say(&format!(
+            "warning: the frame takes the sight of {}: {}",
+            counted(exported.shaded.len(), "element"),
+            names.join(", ")
+        ));
+    }
+    files::write_file(&arguments.out, &exported.bytes)?;
+    let parts = exported.parts;
+    let what = match arguments.format {
+        FormatName::Stl => format!("{}, millimetres", counted(parts, "solid")),
+        FormatName::Glb => format!("{} and beams, metres", counted(parts, "mirror")),
+        FormatName::Csv => counted(parts, "mirror"),
+        FormatName::Urdf => format!("the laser and {}", counted(parts, "mirror")),
+    };
     print(&format!("wrote {}: {what}\n", quoted(&arguments.out)))
 }
 
 /// The boards of a dataset.
 fn boards(arguments: &Arguments) -> Result<(), CliError> {
     let shown = quoted(&arguments.input);
-    if arguments.format != Format::Csv {
-        return Err(CliError::Invalid {
-            message: format!(
+    if arguments.format != FormatName::Csv {
+        return Err(CliError::invalid(
+            format!(
                 "{shown} is a folder; of a dataset there is csv, the other formats are made from a scene"
             ),
-            help: Some("a dataset keeps its scene in truth/scene.toml".to_owned()),
-        });
+            "a dataset keeps its scene in truth/scene.toml".to_owned(),
+        ));
     }
     let of_scenes = [
         ("--part", arguments.part.is_some()),
@@ -140,21 +123,17 @@ fn boards(arguments: &Arguments) -> Result<(), CliError> {
         ("--set", !arguments.set.is_empty()),
     ];
     if let Some((option, _)) = of_scenes.iter().find(|(_, given)| *given) {
-        return Err(CliError::Invalid {
-            message: format!("{option} is for scenes, and {shown} is a folder"),
-            help: Some("a dataset is exported as it was recorded".to_owned()),
-        });
+        return Err(CliError::invalid(
+            format!("{option} is for scenes, and {shown} is a folder"),
+            "a dataset is exported as it was recorded".to_owned(),
+        ));
     }
-    let dataset = io::read_dataset(&arguments.input)?;
-    let boards = dataset.poses.iter().filter(|p| export::has_rows(p)).count();
-    if boards == 0 {
-        return Err(CliError::Invalid {
-            message: format!("no board was recorded in {shown}"),
-            help: Some("a flight and an empty room have no rows in this table".to_owned()),
-        });
-    }
-    let table = export::board_table(&dataset).map_err(|e| CliError::Output(std::io::Error::other(e)))?;
-    io::write_file(&arguments.out, &table)?;
+    let dataset = read_dataset(&arguments.input)?;
+    let (table, boards) = export_boards(&dataset).map_err(|error| match error {
+        Error::Invalid { message, help } => CliError::invalid(format!("{message} in {shown}"), help),
+        other => other.into(),
+    })?;
+    files::write_file(&arguments.out, &table)?;
     print(&format!(
         "wrote {}: {}\n",
         quoted(&arguments.out),

@@ -2,14 +2,11 @@
 
 use super::Context;
 use super::error::CliError;
-use super::interrupt;
 use super::output::{print, quoted};
-use catoptric::io::{self, IoError, scene};
-use catoptric::layout::{self, Analysis, Class, Detail, FacetView, Requirement, RequirementError};
-use catoptric::report::{self, Drawn};
+use catoptric::layout::{Analysis, Class, FacetView, Requirement, RequirementError};
+use catoptric::{LAYOUT_PAGE, LayoutOptions, Scene, layout, layout_json, write_layouts};
 use clap::Args;
-use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Arguments of `layout`.
@@ -42,55 +39,38 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// What is printed of several layouts.
-#[derive(Serialize)]
-struct SideBySide<'a> {
-    schema_version: u32,
-    layouts: &'a [Analysis],
-}
-
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let requirements = requirements(&arguments.require, EXAMPLE)?;
     let mut scenes = Vec::new();
     for path in &arguments.scenes {
-        scenes.push(scene::load(path, &arguments.set)?);
+        scenes.push(Scene::load_with(path, &arguments.set)?);
     }
+    let options = LayoutOptions {
+        as_built: arguments.as_built,
+        seed: arguments.seed,
+        coarse: arguments.coarse,
+    };
     let begin = Instant::now();
     let mut analyses = Vec::new();
     for scene in &scenes {
-        interrupt::check()?;
-        let seed = arguments.seed.unwrap_or(scene.seed);
-        let detail = if arguments.coarse {
-            Detail::Coarse
-        } else {
-            Detail::Full
-        };
-        let mut analysis = layout::analyze(scene, arguments.as_built.then_some(seed), detail)?;
-        if !arguments.coarse {
-            analysis.accuracy = Some(layout::predict(scene, seed));
-        }
-        analyses.push(analysis);
+        context.check()?;
+        analyses.push(layout(scene, &options)?);
     }
     context.detail(&format!("analyzed in {:.3} s", begin.elapsed().as_secs_f64()));
     let unmet = unmet(&requirements, &analyses)?;
-    let json = json(&analyses)?;
     let mut said = String::new();
     if let Some(out) = &arguments.out {
-        let drawn: Result<Vec<Drawn>, _> = scenes
-            .iter()
-            .zip(&analyses)
-            .map(|(scene, analysis)| Drawn::new(scene, analysis))
-            .collect();
-        write(out, &json, &drawn?)?;
-        said = format!("wrote {}\n", quoted(&out.join(PAGE)));
+        let layouts: Vec<(&Scene, &Analysis)> = scenes.iter().zip(&analyses).collect();
+        write_layouts(&layouts, out, &context.control())?;
+        said = format!("wrote {}\n", quoted(&out.join(LAYOUT_PAGE)));
     }
     if arguments.json {
-        print(&json)?;
+        print(&layout_json(&analyses)?)?;
     } else {
         let mut text: Vec<String> = analyses.iter().map(text).collect();
         if context.global.verbose > 0 {
             for (text, (scene, analysis)) in text.iter_mut().zip(scenes.iter().zip(&analyses)) {
-                text.push_str(&corners(&layout::Drawing::new(scene, analysis.seed)?));
+                text.push_str(&corners(&layout::Drawing::new(scene.resolved(), analysis.seed)?));
             }
         }
         print(&(text.join("\n") + &said + &next(arguments)))?;
@@ -115,13 +95,12 @@ pub(super) fn requirements(texts: &[String], example: &str) -> Result<Vec<Requir
 
 /// What is wrong with a requirement.
 pub(super) fn refused(error: RequirementError, example: &str) -> CliError {
-    CliError::Invalid {
-        message: format!("--require: {error}"),
-        help: Some(match error {
-            RequirementError::Form { .. } => format!("--require '{example}'"),
-            RequirementError::Unknown { help, .. } => help,
-        }),
-    }
+    let message = format!("--require: {error}");
+    let help = match error {
+        RequirementError::Form { .. } => format!("--require '{example}'"),
+        RequirementError::Unknown { help, .. } => help,
+    };
+    CliError::invalid(message, help)
 }
 
 fn unmet(requirements: &[Requirement], analyses: &[Analysis]) -> Result<Vec<String>, CliError> {
@@ -133,33 +112,6 @@ fn unmet(requirements: &[Requirement], analyses: &[Analysis]) -> Result<Vec<Stri
         }
     }
     Ok(unmet)
-}
-
-/// One layout by itself, several in a list.
-fn json(analyses: &[Analysis]) -> Result<String, CliError> {
-    let text = match analyses {
-        [one] => serde_json::to_string(one),
-        several => serde_json::to_string(&SideBySide {
-            schema_version: layout::SCHEMA_VERSION,
-            layouts: several,
-        }),
-    };
-    text.map(|t| t + "\n").map_err(|e| CliError::Output(e.into()))
-}
-
-/// Names of what is written.
-const JSON: &str = "layout.json";
-const PAGE: &str = "report.html";
-
-fn write(out: &Path, json: &str, drawn: &[Drawn]) -> Result<(), CliError> {
-    std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
-    for (name, bytes) in report::layout_pictures(drawn) {
-        interrupt::check()?;
-        io::write_file(out.join(name), &bytes)?;
-    }
-    io::write_file(out.join(PAGE), report::layout(drawn).as_bytes())?;
-    io::write_file(out.join(JSON), json.as_bytes())?;
-    Ok(())
 }
 
 fn next(arguments: &Arguments) -> String {

@@ -3,6 +3,7 @@
 use super::Cli;
 use super::error::CliError;
 use super::output::print;
+use catoptric::files::IoError;
 use clap::{Args, CommandFactory};
 use std::path::PathBuf;
 
@@ -22,10 +23,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
             .map_err(CliError::Output)?;
         return print(&String::from_utf8_lossy(&page));
     };
-    let write_error = |source| CliError::Write {
-        path: folder.clone(),
-        source,
-    };
+    let write_error = |source| IoError::write(folder, source);
     std::fs::create_dir_all(folder).map_err(write_error)?;
     clap_mangen::generate_to(Cli::command(), folder).map_err(write_error)?;
     print(&format!("wrote the manual pages to {}\n", folder.display()))

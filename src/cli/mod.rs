@@ -9,7 +9,6 @@ mod completions;
 mod demo;
 mod error;
 mod export;
-mod files;
 mod interrupt;
 mod layout;
 mod man;
@@ -22,18 +21,18 @@ mod report;
 mod schema;
 mod score;
 mod simulate;
-mod stream;
 mod study;
-mod sub_rays;
 mod tolerance;
 mod trace;
-mod truth_tables;
 mod validate;
 
+use catoptric::{Control, Stop};
 use clap::{ArgAction, Args, Parser, Subcommand};
 use error::CliError;
+use progress::Reporter;
+use std::ffi::OsString;
 use std::io::Write;
-use std::process::ExitCode;
+use std::sync::Arc;
 
 /// Said at the end of every help.
 const EXIT_CODES: &str = "Exit codes: 0 ok · 1 the verdict is \"not good enough\" · 2 usage or invalid input · \
@@ -110,16 +109,34 @@ enum Verb {
 }
 
 /// What every verb is given beside its own arguments.
-#[derive(Debug)]
-struct Context {
+pub(crate) struct Context {
     global: Global,
+    /// The command as it was given, without the program's name.
+    given: Vec<OsString>,
+    stop: Stop,
+    reporter: Arc<Reporter>,
 }
 
 impl Context {
+    /// How long verbs run: until Ctrl-C, with progress on stderr, on the threads of this run.
+    fn control(&self) -> Control {
+        let reporter = self.reporter.clone();
+        Control {
+            stop: self.stop.clone(),
+            progress: Some(Arc::new(move |progress| reporter.report(progress))),
+            threads: None,
+        }
+    }
+
+    /// An error once Ctrl-C was pressed.
+    fn check(&self) -> Result<(), CliError> {
+        Ok(self.stop.check().map_err(catoptric::Error::from)?)
+    }
+
     /// Says something on stderr, unless asked to be quiet.
     fn say(&self, text: &str) {
         if !self.global.quiet {
-            // With stderr closed there is nobody left to tell.
+            // With stderr closed there is nobody left to read it.
             let _ = writeln!(anstream::stderr(), "{text}");
         }
     }
@@ -132,52 +149,71 @@ impl Context {
     }
 }
 
-/// Runs the program.
-pub(crate) fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+/// Runs the program on its arguments, the first of which is its own name, and returns the code that it exits with.
+///
+/// Results go to standard output, all else to standard error. Ctrl-C stops the run that is under way.
+pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> u8 {
+    let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
+    let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(error) => {
             // Help on a closed pipe has nobody to read it; there is nothing to add.
             let _ = error.print();
-            return u8::try_from(error.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from);
+            return u8::try_from(error.exit_code()).unwrap_or(1);
         }
     };
-    match run(cli) {
-        Ok(()) => ExitCode::SUCCESS,
+    let context = Context {
+        stop: interrupt::listen(),
+        reporter: Arc::new(Reporter::new(cli.global.quiet)),
+        given: arguments.into_iter().skip(1).collect(),
+        global: cli.global,
+    };
+    let ended = on_threads(context.global.threads, || {
+        let ended = dispatch(&cli.verb, &context);
+        context.reporter.finish();
+        ended
+    });
+    match ended {
+        Ok(()) => 0,
         Err(error) => error.report(),
     }
 }
 
-fn run(cli: Cli) -> Result<(), CliError> {
-    interrupt::install();
-    let context = Context { global: cli.global };
-    if let Some(threads) = context.global.threads {
-        // Fails only if a pool exists already, and this is the first statement that could make one.
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
-        pool.build_global()
-            .map_err(|e| CliError::Output(std::io::Error::other(e)))?;
-    }
-    match cli.verb {
-        Verb::Demo(arguments) => demo::run(&arguments, &context),
-        Verb::Simulate(arguments) => simulate::run(&arguments, &context),
-        Verb::Trace(arguments) => trace::run(&arguments, &context),
-        Verb::Characterize(arguments) => characterize::run(&arguments, &context),
-        Verb::Calibrate(arguments) => calibrate::run(&arguments, &context),
-        Verb::Validate(arguments) => validate::run(&arguments),
-        Verb::Score(arguments) => score::run(&arguments, &context),
-        Verb::Compare(arguments) => compare::run(&arguments),
-        Verb::Study(arguments) => study::run(&arguments, &context),
-        Verb::Plan(arguments) => plan::run(&arguments, &context),
-        Verb::Layout(arguments) => layout::run(&arguments, &context),
-        Verb::Optimize(arguments) => optimize::run(&arguments, &context),
-        Verb::Tolerance(arguments) => tolerance::run(&arguments, &context),
-        Verb::Export(arguments) => export::run(&arguments, &context),
-        Verb::Apply(arguments) => apply::run(&arguments, &context),
-        Verb::Report(arguments) => report::run(&arguments, &context),
-        Verb::New(arguments) => new::run(&arguments),
-        Verb::Check(arguments) => check::run(&arguments, &context),
+/// Does some work on a pool of so many threads; on all of the machine's by default.
+fn on_threads(
+    threads: Option<u16>,
+    work: impl FnOnce() -> Result<(), CliError> + Send,
+) -> Result<(), CliError> {
+    let Some(threads) = threads else { return work() };
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.into())
+        .build()
+        .map_err(|e| catoptric::Error::Threads(e.to_string()))?
+        .install(work)
+}
+
+fn dispatch(verb: &Verb, context: &Context) -> Result<(), CliError> {
+    match verb {
+        Verb::Demo(arguments) => demo::run(arguments, context),
+        Verb::Simulate(arguments) => simulate::run(arguments, context),
+        Verb::Trace(arguments) => trace::run(arguments, context),
+        Verb::Characterize(arguments) => characterize::run(arguments, context),
+        Verb::Calibrate(arguments) => calibrate::run(arguments, context),
+        Verb::Validate(arguments) => validate::run(arguments),
+        Verb::Score(arguments) => score::run(arguments, context),
+        Verb::Compare(arguments) => compare::run(arguments),
+        Verb::Study(arguments) => study::run(arguments, context),
+        Verb::Plan(arguments) => plan::run(arguments, context),
+        Verb::Layout(arguments) => layout::run(arguments, context),
+        Verb::Optimize(arguments) => optimize::run(arguments, context),
+        Verb::Tolerance(arguments) => tolerance::run(arguments, context),
+        Verb::Export(arguments) => export::run(arguments, context),
+        Verb::Apply(arguments) => apply::run(arguments, context),
+        Verb::Report(arguments) => report::run(arguments, context),
+        Verb::New(arguments) => new::run(arguments),
+        Verb::Check(arguments) => check::run(arguments, context),
         Verb::Schema => schema::run(),
-        Verb::Completions(arguments) => completions::run(&arguments),
-        Verb::Man(arguments) => man::run(&arguments),
+        Verb::Completions(arguments) => completions::run(arguments),
+        Verb::Man(arguments) => man::run(arguments),
     }
 }

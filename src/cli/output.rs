@@ -1,6 +1,7 @@
 //! Standard output: data and results, and a quiet end when nobody reads them.
 
 use super::error::CliError;
+pub(crate) use catoptric::files::shell::quoted;
 use std::io::{ErrorKind, Write};
 
 /// Writes text to stdout as it is.
@@ -11,6 +12,12 @@ pub(crate) fn print(text: &str) -> Result<(), CliError> {
         ErrorKind::BrokenPipe => CliError::ClosedPipe,
         _ => CliError::Output(e),
     })
+}
+
+/// Writes a result to stdout as one line of JSON.
+pub(crate) fn print_json(value: &impl serde::Serialize) -> Result<(), CliError> {
+    let json = serde_json::to_string(value).map_err(|e| CliError::Output(e.into()))?;
+    print(&format!("{json}\n"))
 }
 
 /// Digits in groups of three, for people.
@@ -24,17 +31,6 @@ pub(crate) fn grouped(number: usize) -> String {
         out.push(digit);
     }
     out
-}
-
-/// A path as a shell takes it.
-pub(crate) fn quoted(path: &std::path::Path) -> String {
-    let text = path.display().to_string();
-    let plain = |c: char| c.is_alphanumeric() || "/\\._-+:".contains(c);
-    if !text.is_empty() && text.chars().all(plain) {
-        text
-    } else {
-        format!("'{}'", text.replace('\'', r"'\''"))
-    }
 }
 
 /// "1 board", "2 boards".
@@ -52,11 +48,5 @@ mod tests {
         assert_eq!(grouped(999), "999");
         assert_eq!(grouped(1000), "1 000");
         assert_eq!(grouped(1_234_567), "1 234 567");
-    }
-
-    #[test]
-    fn a_path_with_a_space_is_quoted() {
-        assert_eq!(quoted("a/b.toml".as_ref()), "a/b.toml");
-        assert_eq!(quoted("my scene's".as_ref()), r"'my scene'\''s'");
     }
 }

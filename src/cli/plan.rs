@@ -2,19 +2,14 @@
 
 use super::Context;
 use super::error::CliError;
-use super::interrupt;
-use super::output::{counted, print, quoted};
-use super::progress::Progress;
-use catoptric::calib::plan::{self, FacetPlan, Open, Plan, PlannedPose, Request, Situation, Standing};
-use catoptric::io::{self, dataset, scene};
-use catoptric::model::Dataset;
-use catoptric::model::place::nearest;
-use catoptric::plan::{PlanError, completed, situation, with_poses};
-use catoptric::report;
-use catoptric::sim::Scene;
+use super::output::{counted, print, print_json, quoted};
+use catoptric::calib::plan::{Criterion, FacetPlan, Open, Plan, PlannedPose, Request, Standing};
+use catoptric::files::{self, dataset};
+use catoptric::{
+    Dataset, PlanStart, Scene, completed_scene, plan, planned_scene, read_dataset, report, write_planned,
+};
 use clap::{Args, ValueEnum};
-use rayon::prelude::*;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Reasons printed for each facet before the rest is only counted.
@@ -72,93 +67,58 @@ enum CriterionName {
 }
 
 /// Where the plan starts from.
-enum Start {
-    Drawing(Box<Scene>),
-    Recording(Box<Dataset>),
+enum Source {
+    Drawing(Scene),
+    Recording(Dataset),
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let begin = Instant::now();
-    let (start, situation, readings) = start(arguments)?;
-    interrupt::check()?;
-    let facets = facets(arguments, &situation)?;
-    let request = request(arguments, readings)?;
-    let mut progress = Progress::new(context, "planning", facets.len());
-    let mut planned: Vec<FacetPlan> = Vec::with_capacity(facets.len());
-    for some in facets.chunks(rayon::current_num_threads()) {
-        interrupt::check()?;
-        let found: Result<Vec<FacetPlan>, _> = some
-            .par_iter()
-            .map(|facet| plan::plan_facet(&situation, facet, &request))
-            .collect();
-        planned.extend(found.map_err(impossible)?);
-        progress.advance(some.len());
-    }
-    drop(progress);
-    interrupt::check()?;
-    let plan = Plan {
-        schema_version: plan::SCHEMA_VERSION,
-        criterion: request.criterion,
-        facets: planned,
+    let source = source(arguments)?;
+    let start = match &source {
+        Source::Drawing(scene) => PlanStart::of_scene(scene)?,
+        Source::Recording(dataset) => PlanStart::of_dataset(dataset)?,
     };
-    let written = write(arguments, &start, &situation, &plan)?;
+    context.check()?;
+    let facets = start.facets(&arguments.facet)?;
+    let request = request(arguments, start.readings)?;
+    let plan = plan(&start, &facets, &request, &context.control())?;
+    let written = write(arguments, context, &source, &start, &plan)?;
     context.detail(&format!("planned in {:.2} s", begin.elapsed().as_secs_f64()));
     if arguments.json {
-        let json = serde_json::to_string(&plan).map_err(|e| CliError::Output(e.into()))?;
-        return print(&format!("{json}\n"));
+        return print_json(&plan);
     }
     let facets: String = plan.facets.iter().map(text).collect();
     print(&(facets + &written))
 }
 
-fn start(arguments: &Arguments) -> Result<(Start, Situation, usize), CliError> {
+fn source(arguments: &Arguments) -> Result<Source, CliError> {
     if !arguments.input.is_dir() {
-        let scene = scene::load(&arguments.input, &arguments.set)?;
-        let situation = situation(&scene).map_err(|error| match error {
-            PlanError::Scene(error) => error.into(),
-            PlanError::Plan(error) => impossible(error),
-        })?;
-        let readings = scene.experiment.scans_per_pose as usize;
-        return Ok((Start::Drawing(Box::new(scene)), situation, readings));
+        return Ok(Source::Drawing(Scene::load_with(
+            &arguments.input,
+            &arguments.set,
+        )?));
     }
     if !arguments.set.is_empty() {
-        return Err(CliError::Invalid {
-            message: "--set changes a scene; a dataset is what it is".to_owned(),
-            help: None,
-        });
+        let message = "--set changes a scene; a dataset is what it is";
+        return Err(CliError::invalid(message, None));
     }
-    let dataset = io::read_dataset(&arguments.input)?;
-    let situation = Situation::recorded(&dataset)?;
-    // What is recorded next is taken to be recorded as long as what there is: the median, for one odd stretch.
-    let mut scans: Vec<usize> = dataset
-        .poses
-        .iter()
-        .filter(|p| p.room_from_board.is_some())
-        .map(|p| p.label.scans)
-        .collect();
-    scans.sort_unstable();
-    let readings = scans
-        .get(scans.len() / 2)
-        .copied()
-        .unwrap_or(Request::default().readings);
-    Ok((Start::Recording(Box::new(dataset)), situation, readings))
+    Ok(Source::Recording(read_dataset(&arguments.input)?))
 }
 
 fn request(arguments: &Arguments, readings: usize) -> Result<Request, CliError> {
     let &[least, greatest] = arguments.range_m.as_slice() else {
-        return Err(CliError::Invalid {
-            message: format!(
-                "--range-m takes two numbers, it was given {}",
-                arguments.range_m.len()
-            ),
-            help: Some("--range-m 0.5,4".to_owned()),
-        });
+        let given = arguments.range_m.len();
+        return Err(CliError::invalid(
+            format!("--range-m takes two numbers, it was given {given}"),
+            "--range-m 0.5,4".to_owned(),
+        ));
     };
     Ok(Request {
         poses: arguments.poses.into(),
         criterion: match arguments.criterion {
-            CriterionName::D => plan::Criterion::D,
-            CriterionName::A => plan::Criterion::A,
+            CriterionName::D => Criterion::D,
+            CriterionName::A => Criterion::A,
         },
         seed: arguments.seed,
         range_m: [least, greatest],
@@ -168,117 +128,56 @@ fn request(arguments: &Arguments, readings: usize) -> Result<Request, CliError> 
     })
 }
 
-/// The facets asked for, in the order of the session; all without a question.
-fn facets(arguments: &Arguments, situation: &Situation) -> Result<Vec<String>, CliError> {
-    let names: Vec<&str> = situation
-        .session()
-        .facets
-        .iter()
-        .map(|f| f.name.as_str())
-        .collect();
-    if names.is_empty() {
-        return Err(CliError::Invalid {
-            message: "there is no facet that a beam meets".to_owned(),
-            help: None,
-        });
-    }
-    if let Some(unknown) = arguments.facet.iter().find(|f| !names.contains(&f.as_str())) {
-        let near = nearest(unknown, names.iter().copied());
-        return Err(CliError::Invalid {
-            message: format!("no facet is called {unknown:?}; there are {}", names.join(", ")),
-            help: near.map(|near| format!("did you mean --facet {near}?")),
-        });
-    }
-    let asked = |name: &&str| arguments.facet.is_empty() || arguments.facet.iter().any(|f| f == name);
-    Ok(names.into_iter().filter(asked).map(str::to_owned).collect())
-}
-
-fn impossible(error: catoptric::calib::CalibError) -> CliError {
-    CliError::Invalid {
-        message: error.to_string(),
-        help: Some("see --range-m and --max-incidence-deg, or plan for one --facet at a time".to_owned()),
-    }
-}
-
 /// Writes what was asked for, and says so.
 fn write(
     arguments: &Arguments,
-    start: &Start,
-    situation: &Situation,
+    context: &Context,
+    source: &Source,
+    start: &PlanStart,
     plan: &Plan,
 ) -> Result<String, CliError> {
     let mut said = String::new();
     if let Some(path) = &arguments.report {
-        io::write_file(path, report::plan(situation, plan).as_bytes())?;
+        files::write_file(path, report::plan(&start.situation, plan).as_bytes())?;
         said += &format!("wrote {}\n", path.display());
     }
     let Some(out) = &arguments.out else {
-        let blind = matches!(start, Start::Recording(_)) && !arguments.input.join(dataset::SCENE).exists();
+        let blind = matches!(source, Source::Recording(_)) && !arguments.input.join(dataset::SCENE).exists();
         let next = if blind {
             "next: record these poses, and calibrate\n".to_owned()
         } else {
             // The same again, whatever was asked for.
-            let given: Vec<String> = std::env::args_os().skip(1).map(|a| quoted(a.as_ref())).collect();
+            let given: Vec<String> = context.given.iter().map(|a| quoted(a.as_ref())).collect();
             format!("next: catoptric {} --out planned.toml\n", given.join(" "))
         };
         return Ok(said + &next);
     };
-    let (mut planned, folder) = match start {
-        Start::Drawing(scene) => (with_poses(scene, plan)?, folder_of(&arguments.input)),
-        Start::Recording(dataset) => {
+    let (planned, folder) = match source {
+        Source::Drawing(scene) => (planned_scene(scene, plan)?, scene.folder().to_owned()),
+        Source::Recording(dataset) => {
             let path = arguments.input.join(dataset::SCENE);
             if !path.exists() {
-                return Err(CliError::Invalid {
-                    message: format!(
-                        "{} is blind: there is no scene to put the poses in",
-                        arguments.input.display()
-                    ),
-                    help: Some("plan without --out".to_owned()),
-                });
+                let message = format!(
+                    "{} is blind: there is no scene to put the poses in",
+                    arguments.input.display()
+                );
+                return Err(CliError::invalid(message, "plan without --out".to_owned()));
             }
-            (
-                completed(&scene::load(&path, &[])?, dataset, plan),
-                folder_of(&path),
-            )
+            let scene = Scene::load(&path)?;
+            (completed_scene(&scene, dataset, plan), scene.folder().to_owned())
         }
     };
-    move_meshes(&mut planned, &folder, &folder_of(out))?;
-    let text = scene::to_toml(&planned).map_err(|e| CliError::Invalid {
-        message: format!("{}: {e}", out.display()),
-        help: None,
-    })?;
-    io::write_file(out, text.as_bytes())?;
+    let poses = planned.experiment.pose.len();
+    write_planned(planned, &folder, out)?;
     let stem = out.file_stem().unwrap_or(out.as_os_str()).to_string_lossy();
     Ok(said
         + &format!(
             "wrote {}: {}\nnext: catoptric simulate {} --out {}\n",
             out.display(),
-            counted(planned.experiment.pose.len(), "pose"),
+            counted(poses, "pose"),
             quoted(out),
             quoted(format!("{stem}-dataset").as_ref())
         ))
-}
-
-fn folder_of(path: &Path) -> PathBuf {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-    folder.unwrap_or(Path::new(".")).to_owned()
-}
-
-/// Meshes are named from the scene's folder; in another folder they get their whole path.
-fn move_meshes(scene: &mut Scene, from: &Path, to: &Path) -> Result<(), CliError> {
-    let whole = |path: &Path| {
-        path.canonicalize().map_err(|source| CliError::Write {
-            path: path.to_owned(),
-            source,
-        })
-    };
-    if scene.mesh_shapes().is_empty() || whole(from)? == whole(to)? {
-        return Ok(());
-    }
-    for mesh in scene.mesh_shapes_mut() {
-        mesh.file = whole(&from.join(&mesh.file))?.display().to_string();
-    }
-    Ok(())
 }
 
 fn text(facet: &FacetPlan) -> String {

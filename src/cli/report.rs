@@ -2,12 +2,8 @@
 
 use super::Context;
 use super::error::CliError;
-use super::files::{read_calibration, read_truth};
-use super::interrupt;
 use super::output::print;
-use catoptric::apply::{CloudFrame, apply};
-use catoptric::io;
-use catoptric::score::score;
+use catoptric::{CloudFrame, apply, files, read_calibration, read_dataset, read_truth, report, score};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -25,11 +21,11 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let dataset = io::read_dataset(&arguments.dataset)?;
+    let dataset = read_dataset(&arguments.dataset)?;
     let truth = read_truth(&arguments.dataset)?;
     let mut results = Vec::new();
     for path in &arguments.calibrations {
-        interrupt::check()?;
+        context.check()?;
         let calibration = read_calibration(path)?;
         let result = score(&dataset, &calibration, truth.as_ref());
         results.push((calibration, result));
@@ -45,8 +41,8 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         }
         None => None,
     };
-    let html = catoptric::report::report(&dataset, truth.as_ref(), &results, cloud.as_ref());
-    io::write_file(&arguments.out, html.as_bytes())?;
+    let html = report(&dataset, truth.as_ref(), &results, cloud.as_ref());
+    files::write_file(&arguments.out, html.as_bytes())?;
     print(&format!(
         "wrote {path}\nnext: open {path} in a browser\n",
         path = arguments.out.display()

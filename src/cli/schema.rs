@@ -2,7 +2,7 @@
 
 use super::error::CliError;
 use super::output::print;
-use catoptric::io::scene;
+use catoptric::files::scene;
 
 pub(crate) fn run() -> Result<(), CliError> {
     print(&format!("{:#}\n", scene::file_schema()))

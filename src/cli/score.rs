@@ -2,10 +2,8 @@
 
 use super::Context;
 use super::error::CliError;
-use super::files::{read_calibration, read_truth};
 use super::output::{print, quoted};
-use catoptric::io;
-use catoptric::score::{Score, Verdict, score};
+use catoptric::{Score, Verdict, read_calibration, read_dataset, read_truth, score};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -33,7 +31,7 @@ fn positive(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let dataset = io::read_dataset(&arguments.dataset)?;
+    let dataset = read_dataset(&arguments.dataset)?;
     let truth = read_truth(&arguments.dataset)?;
     let calibration = read_calibration(&arguments.calibration)?;
     let mut result = score(&dataset, &calibration, truth.as_ref());

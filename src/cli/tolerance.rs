@@ -2,21 +2,12 @@
 
 use super::Context;
 use super::error::CliError;
-use super::interrupt;
 use super::layout::{refused, requirements};
-use super::output::{print, quoted};
-use super::progress::Progress;
-use catoptric::io::{self, IoError, scene};
-use catoptric::layout::Requirement;
-use catoptric::sim::SimError;
-use catoptric::tolerance::{self, Bounds, Calibrated, Distribution, Tolerance, Workshop};
-use catoptric::{layout, report};
+use super::output::{print, print_json, quoted};
+use catoptric::tolerance::{Distribution, Tolerance};
+use catoptric::{Error, Scene, TOLERANCE_PAGE, ToleranceOptions, tolerance, write_tolerance};
 use clap::Args;
-use rayon::prelude::*;
-use std::path::{Path, PathBuf};
-
-/// Structures between two looks at whether Ctrl-C was pressed.
-const CHUNK: usize = 16;
+use std::path::PathBuf;
 
 /// Arguments of `tolerance`.
 #[derive(Debug, Args)]
@@ -56,91 +47,34 @@ pub(crate) struct Arguments {
 const EXAMPLE: &str = "direction_deg.p95<=2";
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let requirements = requirements(&arguments.require, EXAMPLE)?;
-    let scene = scene::load(&arguments.scene, &arguments.set)?;
-    let first = arguments.seed.unwrap_or(scene.seed);
-    let seeds = |count: u32| -> Vec<u64> { (0..count).map(|k| first.wrapping_add(k.into())).collect() };
-    let workshop = Workshop::new(&scene)?;
-    // A name that is no figure's is refused before the work is done.
-    let mut empty = workshop.summarize(&[]);
-    empty.bound = (arguments.bounds > 0).then(|| Bounds::of(&[]));
-    empty.calibrated = (arguments.calibrate > 0).then(|| Calibrated::of(&[]));
-    judge(&requirements, &empty)?;
-    let built = each(context, "building", &seeds(arguments.draws), |seed| {
-        workshop.build(seed)
+    let options = ToleranceOptions {
+        draws: arguments.draws,
+        seed: arguments.seed,
+        bounds: arguments.bounds,
+        calibrate: arguments.calibrate,
+        requirements: requirements(&arguments.require, EXAMPLE)?,
+    };
+    let scene = Scene::load_with(&arguments.scene, &arguments.set)?;
+    let (found, unmet) = tolerance(&scene, &options, &context.control()).map_err(|error| match error {
+        Error::Requirement(error) => refused(error, EXAMPLE),
+        other => other.into(),
     })?;
-    let mut found = workshop.summarize(&built);
-    if arguments.bounds > 0 {
-        let predicted = each(context, "predicting", &seeds(arguments.bounds), |seed| {
-            Ok(layout::predict(&scene, seed))
-        })?;
-        found.bound = Some(Bounds::of(&predicted));
-    }
-    if arguments.calibrate > 0 {
-        let runs = each(context, "calibrating", &seeds(arguments.calibrate), |seed| {
-            tolerance::calibrate(&scene, seed)
-        })?;
-        found.calibrated = Some(Calibrated::of(&runs));
-    }
-    let unmet = judge(&requirements, &found)?;
-    let json = serde_json::to_string(&found).map_err(|e| CliError::Output(e.into()))? + "\n";
     let mut said = String::new();
     if let Some(out) = &arguments.out {
-        write(out, &json, &found)?;
-        said = format!("wrote {}\n", quoted(&out.join(PAGE)));
+        write_tolerance(&found, out)?;
+        said = format!("wrote {}\n", quoted(&out.join(TOLERANCE_PAGE)));
     }
     if arguments.json {
-        print(&json)?;
+        print_json(&found)?;
     } else {
         print(&(text(&found) + &said + &next(arguments, &found)))?;
     }
     if unmet.is_empty() {
         Ok(())
     } else {
+        let unmet: Vec<String> = unmet.iter().map(|u| format!("not met: {u}")).collect();
         Err(CliError::Verdict(unmet.join("\n")))
     }
-}
-
-fn judge(requirements: &[Requirement], found: &Tolerance) -> Result<Vec<String>, CliError> {
-    let mut unmet = Vec::new();
-    for requirement in requirements {
-        let judged = tolerance::judge(requirement, found).map_err(|e| refused(e, EXAMPLE))?;
-        unmet.extend(judged.iter().map(|u| format!("not met: {u}")));
-    }
-    Ok(unmet)
-}
-
-/// Does the same for every seed, some at a time, in order.
-fn each<T: Send>(
-    context: &Context,
-    what: &'static str,
-    seeds: &[u64],
-    one: impl Fn(u64) -> Result<T, SimError> + Sync,
-) -> Result<Vec<T>, CliError> {
-    let mut progress = Progress::new(context, what, seeds.len());
-    let mut found = Vec::with_capacity(seeds.len());
-    for chunk in seeds.chunks(CHUNK) {
-        let of_one = |&seed: &u64| {
-            interrupt::check()?;
-            one(seed).map_err(CliError::from)
-        };
-        found.extend(chunk.par_iter().map(of_one).collect::<Result<Vec<T>, _>>()?);
-        progress.advance(chunk.len());
-    }
-    Ok(found)
-}
-
-/// Names of what is written.
-const JSON: &str = "tolerance.json";
-const PLOT: &str = "directions.svg";
-const PAGE: &str = "report.html";
-
-fn write(out: &Path, json: &str, found: &Tolerance) -> Result<(), CliError> {
-    std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
-    io::write_file(out.join(PLOT), report::tolerance_plot(found).as_bytes())?;
-    io::write_file(out.join(PAGE), report::tolerance(found).as_bytes())?;
-    io::write_file(out.join(JSON), json.as_bytes())?;
-    Ok(())
 }
 
 fn next(arguments: &Arguments, found: &Tolerance) -> String {

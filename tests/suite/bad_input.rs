@@ -3,8 +3,8 @@
 //! Positions are computed here from the spoiled text by searching it, not by the code under test.
 
 use crate::common::{VALID, folder_with, run, stderr};
-use catoptric::io::diagnostic::{Diagnostics, Place};
-use catoptric::io::scene::{self, SceneErrors};
+use catoptric::files::diagnostic::{Diagnostics, Place};
+use catoptric::files::scene::{self, SceneErrors};
 
 /// Everything that is wrong with a scene.
 pub(crate) fn problems_with(text: &str, sets: &[&str]) -> Diagnostics {
@@ -438,7 +438,7 @@ fn json_goes_through_the_same_checks() {
 
 #[test]
 fn the_resolved_scene_reads_back_as_itself() {
-    let templates = scene::Layout::ALL.map(scene::scene_template);
+    let templates = scene::Template::ALL.map(scene::Template::text);
     for text in templates.into_iter().chain([VALID]) {
         let scene = scene::parse(text, "scene.toml", &[]).unwrap();
         let resolved = scene::to_toml(&scene).unwrap();

@@ -137,7 +137,7 @@ fn the_schema_describes_every_key_of_a_scene() {
     let output = run(folder.path(), &["schema"]);
     assert_eq!(output.status.code(), Some(0));
     let schema: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
-    let scene = catoptric::io::scene::parse(VALID, "scene.toml", &[]).unwrap();
+    let scene = catoptric::files::scene::parse(VALID, "scene.toml", &[]).unwrap();
     let keys = serde_json::to_value(&scene).unwrap();
     for key in keys.as_object().unwrap().keys() {
         assert!(schema["properties"][key]["description"].is_string(), "{key}");

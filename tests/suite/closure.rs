@@ -5,7 +5,7 @@
 
 use crate::scenes::{PROTOTYPE, TWO_MIRROR, layouts, scene, without_errors};
 use catoptric::calib::{self, Method, Options};
-use catoptric::io::{DatasetWriter, Provenance, read_dataset};
+use catoptric::files::{DatasetWriter, Provenance, read_dataset};
 use catoptric::model::beam;
 use catoptric::sim::{Laboratory, Scene};
 use catoptric::testing::closure_of;

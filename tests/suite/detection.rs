@@ -9,7 +9,7 @@
 use crate::common::{folder_with, run, stderr};
 use crate::scenes::{BARE, scene};
 use catoptric::cast::{Polygon, Shape};
-use catoptric::io::scene as scene_file;
+use catoptric::files::scene as scene_file;
 use catoptric::model::{Stretch, beam};
 use catoptric::sim::build::Structure;
 use catoptric::sim::build::color;

@@ -4,7 +4,7 @@
 //! the sentences around it are true; the examples of the guide are run as doc tests.
 
 use crate::common::{run, stdout};
-use catoptric::io::scene::{self, Layout};
+use catoptric::files::scene::{self, Template};
 use catoptric::model::assessment::{Assessment, HeldOut, SharedParameter, VarianceComponent};
 use catoptric::model::calibration::{FacetEstimate, MountEstimate};
 use catoptric::model::{AngleTable, BeamEstimate, Calibration, RangeBias, Status};
@@ -480,7 +480,7 @@ waypoint = [{ time_s = 0, position_m = [0, 0, 1.8] }, { time_s = 0.025, position
 pose = 3
 moved_mm = [0, 0, 4]
 "#;
-    let small = scene::scene_template(Layout::TwoMirror).to_owned() + flight;
+    let small = Template::TwoMirror.text().to_owned() + flight;
     let small = scene::parse(&small, "two-mirror.toml", &quick).unwrap();
     let laboratory = sim::Laboratory::new(&small, small.seed).unwrap();
     let (dataset, truth) = (laboratory.dataset().unwrap(), laboratory.truth().unwrap());

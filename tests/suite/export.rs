@@ -5,8 +5,8 @@
 use crate::common::{run, stderr, stdout};
 use catoptric::cast::volume;
 use catoptric::export::{self, Part, Solid};
-use catoptric::io::mesh::read_mesh;
-use catoptric::io::scene as scenes;
+use catoptric::files::mesh::read_mesh;
+use catoptric::files::scene as scenes;
 use catoptric::layout::{Detail, Drawing, analyze};
 use catoptric::sim::Scene;
 use std::collections::BTreeMap;
@@ -457,7 +457,7 @@ fn a_blind_dataset_gives_the_same_board_table() {
     let read = |name: &str| std::fs::read(at.join(name)).unwrap();
     assert_eq!(read("seen.csv"), read("blind.csv"));
     // What the file says is what is in memory: floats as the recording holds them.
-    let dataset = catoptric::io::read_dataset(&at.join("seen")).unwrap();
+    let dataset = catoptric::files::read_dataset(&at.join("seen")).unwrap();
     assert_eq!(read("seen.csv"), export::board_table(&dataset).unwrap());
     // Only the columns that chapter 5 explains.
     let (header, _) = parsed(&read("seen.csv"));

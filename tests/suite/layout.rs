@@ -6,7 +6,7 @@
 
 use crate::common::{VALID, folder_with, run, stderr, stdout};
 use catoptric::cast::{Polygon, Shape};
-use catoptric::io::scene as scenes;
+use catoptric::files::scene as scenes;
 use catoptric::layout::{self, Analysis, Class, Detail};
 use catoptric::model::beam;
 use catoptric::sim::build::Structure;
@@ -85,8 +85,8 @@ fn assert_is_the_truth(scene: &Scene, analysis: &Analysis, name: &str) {
 fn classes_are_those_of_the_truth_in_every_scene() {
     let scenes = recordable();
     assert!(scenes.len() > 30, "{}", scenes.len());
-    for layout in scenes::Layout::ALL {
-        let drawn = scenes::parse(scenes::scene_template(layout), "template.toml", &[]).unwrap();
+    for layout in scenes::Template::ALL {
+        let drawn = scenes::parse(layout.text(), "template.toml", &[]).unwrap();
         assert!(
             scenes.iter().any(|(_, scene)| *scene == drawn),
             "{layout:?} is missing"

@@ -5,13 +5,13 @@
 
 use crate::common::{folder_with, run, stderr, stdout};
 use crate::parametric::PARAMETRIC;
-use catoptric::io::{scene, template::Template};
+use catoptric::files::{parametric::ParametricScene, scene};
 use catoptric::layout::{self, Detail, Requirement};
 use catoptric::optimize::{Goal, Optimum, Options, Wanted, optimize};
 use serde_json::Value;
 
-fn template(text: &str) -> Template {
-    Template::parse(text, "scene.toml", &[]).unwrap_or_else(|e| panic!("{e}"))
+fn template(text: &str) -> ParametricScene {
+    ParametricScene::parse(text, "scene.toml", &[]).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn options(goals: &[&str], requirements: &[&str], evaluations: usize) -> Options {

@@ -6,7 +6,7 @@
 use crate::bad_input::{expect_one_in, place_of, problems_with};
 use crate::common::{VALID, folder_with, run, stderr, stdout};
 use crate::scenes::PROTOTYPE;
-use catoptric::io::scene;
+use catoptric::files::scene;
 use catoptric::layout::{self, Detail};
 use catoptric::sim::Scene;
 use catoptric::sim::build::layout as shapes;

@@ -6,8 +6,8 @@
 
 use crate::common::{catoptric, run, stderr, stdout};
 use crate::scenes::{PROTOTYPE, TWO_MIRROR, scene};
-use catoptric::io::scene::load;
-use catoptric::io::{DatasetWriter, Provenance};
+use catoptric::files::scene::load;
+use catoptric::files::{DatasetWriter, Provenance};
 use catoptric::model::{Excerpt, Pose, beam};
 use catoptric::sim::build::Structure;
 use catoptric::sim::laboratory::Memory;

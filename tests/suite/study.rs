@@ -4,7 +4,7 @@
 
 use crate::common::{catoptric, run, stderr, stdout};
 use catoptric::calib::{CalibError, Calibrator, Method};
-use catoptric::io::scene as scenes;
+use catoptric::files::scene as scenes;
 use catoptric::model::{Calibration, Dataset};
 use catoptric::study::{Contestant, Study, run as run_one, summarize};
 use rayon::prelude::*;

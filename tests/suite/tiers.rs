@@ -4,8 +4,8 @@
 //! prove how good a method is on average.
 
 use catoptric::calib::{Calibrator, Method};
-use catoptric::io::scene;
-use catoptric::io::{DatasetWriter, Provenance, read_dataset};
+use catoptric::files::scene;
+use catoptric::files::{DatasetWriter, Provenance, read_dataset};
 use catoptric::sim::{Laboratory, Truth, noise};
 use catoptric::{Score, Verdict, score};
 use std::path::Path;

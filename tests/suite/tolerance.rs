@@ -4,7 +4,7 @@
 //! that real mirrors are off by what a scene says.
 
 use crate::common::{run, stderr, stdout};
-use catoptric::io::scene as scenes;
+use catoptric::files::scene as scenes;
 use catoptric::layout::{self, Class, Detail};
 use catoptric::model::beam;
 use catoptric::sim::build::Structure;

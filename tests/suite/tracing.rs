@@ -5,7 +5,7 @@
 use crate::common::{catoptric, run, stderr, stdout};
 use crate::traps::{file, forward, path, ray, trap, way};
 use catoptric::cast::Ray;
-use catoptric::io::{mesh, npy, scene};
+use catoptric::files::{mesh, npy, scene};
 use catoptric::model::beam;
 use catoptric::sim::light::Role;
 use catoptric::sim::noise::{Draws, Purpose};

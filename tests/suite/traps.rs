@@ -5,7 +5,7 @@
 
 use crate::common::{run, stderr};
 use catoptric::cast::Ray;
-use catoptric::io::scene;
+use catoptric::files::scene;
 use catoptric::model::beam;
 use catoptric::sim::light::Role;
 use catoptric::sim::light::footprint::{SubRay, sub_rays};

@@ -13,7 +13,8 @@ use crate::solve::BareDistance;
 use crate::tracking;
 use catoptric_model::session::{NominalFacet, Session};
 use catoptric_model::{
-    BeamEstimate, Calibration, Dataset, Deflection, MirrorPlane, Status, Summary, beam, calibration, mirror,
+    BeamEstimate, Calibration, Dataset, Deflection, MirrorPlane, Status, Stop, Summary, beam, calibration,
+    mirror,
 };
 use nalgebra::{Unit, Vector3};
 use rayon::prelude::*;
@@ -40,7 +41,21 @@ const LEAST_ELEMENTS: usize = 5;
 /// }
 /// ```
 pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result<Calibration, CalibError> {
+    calibrate_until(dataset, method, options, &Stop::default())
+}
+
+/// As [`calibrate`], unless it is stopped on the way.
+///
+/// # Errors
+/// As [`calibrate`], and [`CalibError::Stopped`].
+pub fn calibrate_until(
+    dataset: &Dataset,
+    method: Method,
+    options: &Options,
+    stop: &Stop,
+) -> Result<Calibration, CalibError> {
     let (dataset, warnings) = believable(dataset)?;
+    stop.check()?;
     let dataset = dataset.as_ref();
     let session = &dataset.session;
     let prepared = prepare(dataset)?;
@@ -55,6 +70,7 @@ pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result
         ..work
     };
     let first = estimates(&by_batch, &candidates, drawn);
+    stop.check()?;
     let built: Vec<MirrorPlane> = session
         .facets
         .iter()
@@ -81,6 +97,7 @@ pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result
                 ..work
             };
             calibration.beams = estimates(&alone, &candidates, &built);
+            stop.check()?;
             let assigned = assigned(&alone, &candidates, &built, &calibration.beams);
             together(&work, mount, &built, assigned, &mut calibration);
         }
@@ -88,6 +105,7 @@ pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result
             calibration.beams = estimates(&work, &candidates, &built);
         }
     }
+    stop.check()?;
     Ok(calibration)
 }
 

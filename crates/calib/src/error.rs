@@ -1,6 +1,6 @@
 //! What can keep a calibration from starting. An element that cannot be solved is data, not an error.
 
-use catoptric_model::ModelError;
+use catoptric_model::{ModelError, Stopped};
 
 /// A dataset or a request that no calibration can be made from.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -56,6 +56,9 @@ pub enum CalibError {
         /// What happened.
         what: String,
     },
+    /// The work was stopped on request.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
     /// A name that is no method's.
     #[error("no method is called {name:?}; there are {}", crate::options::Method::ALL.map(crate::options::Method::name).join(", "))]
     UnknownMethod {

@@ -44,7 +44,7 @@ pub mod solve;
 pub mod spread;
 pub mod tracking;
 
-pub use calibrate::calibrate;
+pub use calibrate::{calibrate, calibrate_until};
 pub use calibrator::Calibrator;
 pub use characterize::characterize;
 pub use covariance::{Budget, MountUncertainty};

@@ -4,7 +4,7 @@
 
 use crate::bias::RangeBias;
 use crate::calibration::MountEstimate;
-use crate::dataset::{SpotNote, TestKind};
+use crate::label::{SpotNote, TestKind};
 use serde::{Deserialize, Serialize};
 
 /// Version of `characterization.json`.

@@ -1,7 +1,63 @@
-//! From a planar scan to points in space: Cooper, Eqs. (9) and (10).
+//! From a planar scan to points in space: Cooper, Eqs. (9) and (10); and what such a cloud is.
 
 use crate::beam::{self, Deflection};
 use nalgebra::{Point3, Rotation3, Vector3};
+
+/// Frame of a cloud.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum CloudFrame {
+    /// The laser base frame.
+    Sensor,
+    /// The marker body on the superstructure.
+    Rig,
+    /// The frame of motion capture.
+    #[default]
+    Room,
+}
+
+impl CloudFrame {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Sensor, Self::Rig, Self::Room];
+
+    /// The word that files and commands use.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Sensor => "sensor",
+            Self::Rig => "rig",
+            Self::Room => "room",
+        }
+    }
+}
+
+/// A point and the reading it comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CloudPoint {
+    /// Where it is, in metres.
+    pub position: Point3<f64>,
+    /// Beam.
+    pub beam: usize,
+    /// Scan of the stretch, from 0.
+    pub scan: usize,
+}
+
+/// A cloud and what is not in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointCloud {
+    /// Its frame.
+    pub frame: CloudFrame,
+    /// Stretch it was made from.
+    pub pose: usize,
+    /// Whether the mounting was taken from the drawing because the calibration has none.
+    pub mount_is_nominal: bool,
+    /// The points, scan after scan.
+    pub points: Vec<CloudPoint>,
+    /// Readings that are no ranges: no return, too close, invalid.
+    pub without_range: usize,
+    /// Ranges of elements that the calibration gives no direction.
+    pub without_direction: usize,
+    /// Elements that the calibration gives no direction.
+    pub unsolved_elements: usize,
+}
 
 /// The rotation that takes the base beam's direction to the outgoing one: Rz(θ_b + θ_a)·Ry(−φ)·Rz(−θ_b).
 ///

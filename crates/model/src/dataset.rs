@@ -4,126 +4,11 @@
 
 use crate::error::ModelError;
 use crate::frame::Pose;
+use crate::label::{PoseKind, PoseLabel};
 use crate::motion::Motion;
 use crate::session::Session;
 use crate::summary::Summary;
-use crate::tracking::Watched;
-use nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use serde::{Deserialize, Serialize};
-
-/// What a stretch of scans was recorded for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum PoseKind {
-    /// Step 3: the structure before its mirrors were attached.
-    Bare,
-    /// Step 4: the known room, no board in it.
-    Room,
-    /// Steps 1 and 5: a board before beams that no mirror deflects.
-    Direct,
-    /// Steps 7–10: a board in the fan of a facet.
-    Facet,
-    /// The rig moves through the room while it scans: nothing a calibration is made from, something it is applied to.
-    Flight,
-}
-
-impl PoseLabel {
-    /// The note of a stretch of which nothing more is to be noted.
-    pub fn of(pose: usize, kind: PoseKind, scans: usize) -> Self {
-        Self {
-            pose,
-            kind,
-            scans,
-            board: None,
-            color: None,
-            facet: None,
-            beams: None,
-            test: None,
-            flight: None,
-        }
-    }
-}
-
-impl PoseKind {
-    /// Whether it says what the mirrors do: they are attached, and nothing moves.
-    pub fn is_evidence(self) -> bool {
-        match self {
-            Self::Room | Self::Direct | Self::Facet => true,
-            Self::Bare | Self::Flight => false,
-        }
-    }
-}
-
-/// What is tested of the bare sensor (step 1).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum TestKind {
-    /// Size of the spot over the distance: Figures 2 and 3, Table 1.
-    Spot,
-    /// Mean error and spread over the distance: Table 2.
-    Distance,
-    /// Error over the incidence: Figure 4, Table 3.
-    Angle,
-    /// Error and spread over color and distance: Table 4.
-    Color,
-}
-
-/// What was tested during a stretch.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TestNote {
-    /// What it was for.
-    pub kind: TestKind,
-    /// Number of the setting: stretches of one setting are trials of the same.
-    pub setting: usize,
-    /// Number of the trial, from 1.
-    pub trial: usize,
-    /// The spot as it was seen on the board.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub spot: Option<SpotNote>,
-}
-
-/// A spot on a board as seen through an infrared camera.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SpotNote {
-    /// Neighbouring beams that make it.
-    pub beams: usize,
-    /// Extent along the scan, in millimetres.
-    pub width_mm: f64,
-    /// Extent across the scan, in millimetres.
-    pub height_mm: f64,
-}
-
-/// What the experimenter noted about a stretch of scans: one message of `/session/pose`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PoseLabel {
-    /// Number of the pose, from 0.
-    pub pose: usize,
-    /// What it was recorded for.
-    pub kind: PoseKind,
-    /// Scans in the stretch.
-    pub scans: usize,
-    /// Board that was set up.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub board: Option<String>,
-    /// Color of that board.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub color: Option<String>,
-    /// Facet whose fan the board stands in.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub facet: Option<String>,
-    /// First and last beam that the board was set up for.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub beams: Option<[usize; 2]>,
-    /// What was tested of the bare sensor.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub test: Option<TestNote>,
-    /// Flight that was flown.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub flight: Option<String>,
-}
+use crate::tracking::{Track, Watched};
 
 /// Name of the rig as a motion-capture subject.
 pub const RIG_SUBJECT: &str = "rig";
@@ -137,26 +22,6 @@ pub fn nanoseconds(seconds: f64) -> u64 {
     )]
     let ns = (seconds * 1e9).round() as u64;
     ns
-}
-
-/// One motion-capture frame of one body, in the room frame.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TrackedFrame {
-    /// Time since the recording began, in seconds.
-    pub time_s: f64,
-    /// `room_from_body` as solved from the markers; `None` where too few were seen.
-    pub pose: Option<Pose>,
-    /// The markers in the order of the body's template, in metres; `None` where one was not seen.
-    pub markers: Vec<Option<Point3<f64>>>,
-}
-
-/// What motion capture recorded of one body.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Track {
-    /// Name of the body: [`RIG_SUBJECT`] or a board.
-    pub subject: String,
-    /// Its frames, in order of time.
-    pub frames: Vec<TrackedFrame>,
 }
 
 /// One stretch of scans as it was recorded, with nothing moving unless it is a flight.
@@ -218,30 +83,6 @@ pub struct Dataset {
     pub session: Session,
     /// The stretches, in the order they were recorded.
     pub poses: Vec<PoseRecord>,
-}
-
-impl Track {
-    /// Mean of the solved poses; `None` if the body was never seen.
-    ///
-    /// Positions are averaged, and quaternions after bringing them to one sign: exact to second order in the spread,
-    /// which is far below a milliradian here.
-    pub fn mean_pose(&self) -> Option<Pose> {
-        let mut poses = self.frames.iter().filter_map(|f| f.pose);
-        let first = poses.next()?;
-        let (mut translation, mut rotation) = (first.translation.vector, first.rotation.into_inner());
-        let mut count = 1.0;
-        for pose in poses {
-            translation += pose.translation.vector;
-            let q = pose.rotation.into_inner();
-            rotation += if q.dot(&first.rotation) < 0.0 { -q } else { q };
-            count += 1.0;
-        }
-        let rotation: Quaternion<f64> = rotation / count;
-        Some(Pose::from_parts(
-            Translation3::from(Vector3::from(translation / count)),
-            UnitQuaternion::new_normalize(rotation),
-        ))
-    }
 }
 
 impl Stretch {

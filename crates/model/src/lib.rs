@@ -37,12 +37,14 @@ pub mod cloud;
 pub mod dataset;
 pub mod error;
 pub mod frame;
+pub mod label;
 pub mod mirror;
 pub mod motion;
 pub mod paper;
 pub mod place;
 pub mod range;
 pub mod session;
+pub mod stop;
 pub mod summary;
 pub mod tracking;
 
@@ -52,15 +54,15 @@ pub use bias::{AngleBias, AngleTable, BiasTerms, ColorBias, DistanceBias, RangeB
 pub use board::{BoardPlane, Rectangle};
 pub use calibration::{BeamEstimate, Calibration, Status};
 pub use characterization::Characterization;
-pub use dataset::{
-    Dataset, Excerpt, PoseKind, PoseLabel, PoseRecord, SpotNote, Stretch, TestKind, TestNote, Track,
-    TrackedFrame,
-};
+pub use cloud::{CloudFrame, CloudPoint, PointCloud};
+pub use dataset::{Dataset, Excerpt, PoseRecord, Stretch};
 pub use error::ModelError;
 pub use frame::{Pose, PoseData};
+pub use label::{PoseKind, PoseLabel, SpotNote, TestKind, TestNote};
 pub use mirror::MirrorPlane;
 pub use motion::Motion;
 pub use range::{CorrectedRange, RawRange};
 pub use session::Session;
+pub use stop::{Stop, Stopped};
 pub use summary::{Summary, Window};
-pub use tracking::Watched;
+pub use tracking::{Track, TrackedFrame, Watched};

@@ -1,8 +1,8 @@
-//! What motion capture says of a body: the pose that its markers solve to, and whether they stayed where they were.
+//! What motion capture says of a body: its track frame by frame, the pose that its markers solve to, and whether they
+//! stayed where they were.
 
-use crate::dataset::Track;
 use crate::frame::Pose;
-use nalgebra::{Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 /// Parts of a stretch in which markers are averaged, at most.
 pub const MOST_PARTS: usize = 8;
@@ -12,6 +12,26 @@ const LEAST_FRAMES: usize = 2;
 
 /// Median of χ² with three degrees of freedom.
 const MEDIAN_SQUARE: f64 = 2.365_973_884_375_338;
+
+/// One motion-capture frame of one body, in the room frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackedFrame {
+    /// Time since the recording began, in seconds.
+    pub time_s: f64,
+    /// `room_from_body` as solved from the markers; `None` where too few were seen.
+    pub pose: Option<Pose>,
+    /// The markers in the order of the body's template, in metres; `None` where one was not seen.
+    pub markers: Vec<Option<Point3<f64>>>,
+}
+
+/// What motion capture recorded of one body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Track {
+    /// Name of the body: the rig's or a board's.
+    pub subject: String,
+    /// Its frames, in order of time.
+    pub frames: Vec<TrackedFrame>,
+}
 
 /// A marker averaged over some frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,6 +51,30 @@ pub struct Watched {
     pub parts: Vec<Vec<MeanMarker>>,
     /// How far a marker jumps about from frame to frame along one axis, 1σ, in metres; one movement does not count.
     pub jitter: f64,
+}
+
+impl Track {
+    /// Mean of the solved poses; `None` if the body was never seen.
+    ///
+    /// Positions are averaged, and quaternions after bringing them to one sign: exact to second order in the spread,
+    /// which is far below a milliradian here.
+    pub fn mean_pose(&self) -> Option<Pose> {
+        let mut poses = self.frames.iter().filter_map(|f| f.pose);
+        let first = poses.next()?;
+        let (mut translation, mut rotation) = (first.translation.vector, first.rotation.into_inner());
+        let mut count = 1.0;
+        for pose in poses {
+            translation += pose.translation.vector;
+            let q = pose.rotation.into_inner();
+            rotation += if q.dot(&first.rotation) < 0.0 { -q } else { q };
+            count += 1.0;
+        }
+        let rotation: Quaternion<f64> = rotation / count;
+        Some(Pose::from_parts(
+            Translation3::from(Vector3::from(translation / count)),
+            UnitQuaternion::new_normalize(rotation),
+        ))
+    }
 }
 
 /// The pose that takes a template to the points seen, in the sense of least squares (Kabsch); `None` for points seen

@@ -271,7 +271,7 @@ fn a_flight_is_recorded_applied_and_told_by_the_program() {
     }
     let output = run(folder.path(), &arguments);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    let dataset = io::read_dataset(&folder.path().join("set")).unwrap();
+    let dataset = files::read_dataset(&folder.path().join("set")).unwrap();
     let flown = dataset.poses.last().unwrap();
     assert_eq!((flown.label.kind, flown.label.scans), (PoseKind::Flight, 5));
     assert_eq!(flown.label.flight.as_deref(), Some("over the furniture"));

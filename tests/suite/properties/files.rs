@@ -2,7 +2,7 @@
 
 use super::cases;
 use crate::scenes::layouts;
-use catoptric::io::{mesh, npy, rays, scene};
+use catoptric::files::{mesh, npy, rays, scene};
 use catoptric::model::{BeamEstimate, Calibration, Status};
 use catoptric::sim::Mesh;
 use nalgebra::Point3;

@@ -1,0 +1,179 @@
+//! What was asked for, in the folder of the study: what makes two folders parts of one study.
+
+#[cfg(feature = "recording")]
+use super::Program;
+use super::{Cell, Contestant, Part, SCHEMA_VERSION, Study, StudyError};
+use catoptric_files::scene::{self, Template};
+use catoptric_files::{IoError, file, read_json, write_json};
+use catoptric_model::Stop;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+const FILE: &str = "plan.json";
+
+/// A study and a part of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    schema_version: u32,
+    version: String,
+    /// Name of the scene.
+    pub name: String,
+    /// Every cell's values and the SHA-256 of its scene.
+    cells: Vec<PlannedCell>,
+    seeds: u64,
+    contestants: Vec<String>,
+    /// Those of the contestants that are programs.
+    #[cfg(feature = "recording")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    programs: Vec<Program>,
+    /// Which part of how many.
+    pub shard: Part,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlannedCell {
+    values: Vec<(String, String)>,
+    scene_sha256: String,
+}
+
+impl Plan {
+    /// The plan of a part of a study.
+    pub fn of(study: &Study, shard: Part) -> Result<Self, StudyError> {
+        let cells = study.cells.iter().map(|cell| {
+            let text = scene::to_toml(&cell.scene).map_err(|e| {
+                StudyError::invalid(format!("the scene cannot be written: {e}"), "see `schema`")
+            })?;
+            Ok(PlannedCell {
+                values: cell.values.clone(),
+                scene_sha256: file::sha256(text.as_bytes()),
+            })
+        });
+        #[cfg(feature = "recording")]
+        let program = |contestant: &Contestant| match contestant {
+            Contestant::Program(program) => Some(program.clone()),
+            _ => None,
+        };
+        Ok(Self {
+            schema_version: SCHEMA_VERSION,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            name: study
+                .cells
+                .first()
+                .map_or(String::new(), |c| c.scene.name.clone()),
+            cells: cells.collect::<Result<_, StudyError>>()?,
+            seeds: study.seeds,
+            contestants: study.contestants.iter().map(Contestant::name).collect(),
+            #[cfg(feature = "recording")]
+            programs: study.contestants.iter().filter_map(program).collect(),
+            shard,
+        })
+    }
+
+    /// The plan of a folder.
+    pub fn read(folder: &Path) -> Result<Self, StudyError> {
+        Ok(read_json(folder.join(FILE))?)
+    }
+
+    /// Takes a folder that is new, or of the very same study.
+    pub fn claim(&self, out: &Path) -> Result<(), StudyError> {
+        if out.join(FILE).exists() {
+            let there = Self::read(out)?;
+            if there == *self {
+                return Ok(());
+            }
+            let what = there.difference(self);
+            return Err(StudyError::invalid(
+                format!("{} holds another study: {what}", out.display()),
+                "give another --out, or the same arguments to go on with it",
+            ));
+        }
+        if out.read_dir().is_ok_and(|mut entries| entries.next().is_some()) {
+            return Err(StudyError::invalid(
+                format!("{} is not empty and holds no study", out.display()),
+                "give another --out",
+            ));
+        }
+        std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
+        Ok(write_json(out.join(FILE), self)?)
+    }
+
+    /// What of another plan is not as here, in words.
+    pub fn difference(&self, wanted: &Self) -> String {
+        if self.version != wanted.version {
+            format!(
+                "it was begun by version {}, this is {}",
+                self.version, wanted.version
+            )
+        } else if self.seeds != wanted.seeds {
+            format!("{} seeds, {} asked for", self.seeds, wanted.seeds)
+        } else if self.contestants != wanted.contestants {
+            let names = |plan: &Self| plan.contestants.join(",");
+            format!("methods {}, {} asked for", names(self), names(wanted))
+        } else if self.programs_differ(wanted) {
+            "a program's command or its time differs".to_owned()
+        } else if self.shard != wanted.shard {
+            format!("shard {}, {} asked for", self.shard, wanted.shard)
+        } else if self.cells.len() == wanted.cells.len()
+            && self
+                .cells
+                .iter()
+                .zip(&wanted.cells)
+                .all(|(a, b)| a.values == b.values)
+        {
+            "its scene differs".to_owned()
+        } else {
+            "its axes differ".to_owned()
+        }
+    }
+
+    /// The study as far as names and values go; its scenes are not needed any more.
+    pub fn study(&self) -> Result<Study, StudyError> {
+        let scene = scene::parse(Template::Prototype.text(), "prototype.toml", &[])?;
+        let contestant = |name: &String| {
+            #[cfg(feature = "recording")]
+            if let Some(program) = self.programs.iter().find(|p| p.name == *name) {
+                return Ok(Contestant::Program(program.clone()));
+            }
+            if name == "oracle" {
+                return Ok(Contestant::Oracle);
+            }
+            match (name.parse(), name.strip_suffix(" uncorrected").map(str::parse)) {
+                (Ok(method), _) => Ok(Contestant::Method(method)),
+                (_, Some(Ok(method))) => Ok(Contestant::Uncorrected(method)),
+                _ => Err(StudyError::invalid(
+                    format!("{FILE}: {name:?} is no method of ours and no program of the plan"),
+                    "a plan is written by `catoptric study`; do the study again",
+                )),
+            }
+        };
+        Ok(Study {
+            cells: self
+                .cells
+                .iter()
+                .map(|c| Cell {
+                    values: c.values.clone(),
+                    scene: scene.clone(),
+                })
+                .collect(),
+            seeds: self.seeds,
+            contestants: self
+                .contestants
+                .iter()
+                .map(contestant)
+                .collect::<Result<_, _>>()?,
+            stop: Stop::default(),
+        })
+    }
+
+    #[cfg(feature = "recording")]
+    fn programs_differ(&self, other: &Self) -> bool {
+        self.programs != other.programs
+    }
+
+    #[cfg(not(feature = "recording"))]
+    fn programs_differ(&self, _: &Self) -> bool {
+        false
+    }
+}

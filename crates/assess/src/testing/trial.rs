@@ -1,0 +1,121 @@
+//! Independent trials: an experiment, a calibration of it, and one element drawn from it.
+
+use super::Failure;
+use crate::score::{Knowable, knowable, mahalanobis_squared, score_by};
+use crate::study::drawn;
+use catoptric_calib::Calibrator;
+use catoptric_model::{Calibration, Dataset};
+use catoptric_sim::truth::BeamClass;
+use catoptric_sim::{Laboratory, Scene, Truth};
+use nalgebra::Vector2;
+use rayon::prelude::*;
+
+/// What a gate sees of an experiment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trial {
+    /// Seed of the experiment.
+    pub seed: u64,
+    /// One of the deflected elements that were solved, drawn by the seed; `None` if there is none.
+    pub drawn: Option<Drawn>,
+}
+
+/// An element's error against two covariances of two angles each.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drawn {
+    /// Beam.
+    pub beam: usize,
+    /// eᵀP⁻¹e with the covariance P that is stated, χ² with two degrees of freedom if P is honest; `None` without one.
+    pub stated: Option<f64>,
+    /// eᵀC⁻¹e with the Cramér–Rao bound C, χ² with two degrees of freedom if the estimate is efficient; `None` where the
+    /// experiment has no bound, as without errors.
+    pub bound: Option<f64>,
+}
+
+/// An experiment with its truth.
+pub(super) struct Experiment {
+    seed: u64,
+    pub(super) dataset: Dataset,
+    pub(super) truth: Truth,
+}
+
+impl Experiment {
+    pub(super) fn of(scene: &Scene, seed: u64) -> Result<Self, Failure> {
+        let failed = |source| Failure::Scene { seed, source };
+        let laboratory = Laboratory::new(scene, seed).map_err(failed)?;
+        Ok(Self {
+            seed,
+            dataset: laboratory.dataset().map_err(failed)?,
+            truth: laboratory.truth().map_err(failed)?,
+        })
+    }
+
+    pub(super) fn calibrate(&self, calibrator: &(impl Calibrator + ?Sized)) -> Result<Calibration, Failure> {
+        let failed = |e: catoptric_calib::CalibError| Failure::Calibrator {
+            seed: self.seed,
+            calibrator: calibrator.name().to_owned(),
+            reason: e.to_string(),
+        };
+        calibrator.calibrate(&self.dataset).map_err(failed)
+    }
+}
+
+impl Trial {
+    /// A trial from files: a dataset, the truth about it, and anybody's calibration.
+    ///
+    /// ```no_run
+    /// use catoptric_assess::testing::Trial;
+    /// use catoptric::{io, model, sim};
+    /// use std::path::Path;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let dataset = io::read_dataset(Path::new("data"))?;
+    /// let truth: sim::Truth = io::read_json("data/truth/truth.json")?;
+    /// let calibration: model::Calibration = io::read_json("calibration.json")?;
+    /// let trial = Trial::of(&dataset, &truth, &calibration);
+    /// # let _ = trial;
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn of(dataset: &Dataset, truth: &Truth, calibration: &Calibration) -> Self {
+        Self::judged(dataset, truth, &knowable(dataset, truth), calibration)
+    }
+
+    fn judged(dataset: &Dataset, truth: &Truth, knowable: &Knowable, calibration: &Calibration) -> Self {
+        let score = score_by(dataset, calibration, Some((truth, knowable)));
+        let scored: Vec<_> = score
+            .elements
+            .iter()
+            .filter(|e| e.class == BeamClass::Deflected)
+            .collect();
+        let drawn = drawn(&scored, truth.seed).map(|e| Drawn {
+            beam: e.beam,
+            stated: e.mahalanobis_squared,
+            bound: e
+                .bound
+                .map(|c| mahalanobis_squared(&Vector2::new(e.across, e.up), &c)),
+        });
+        Self {
+            seed: truth.seed,
+            drawn,
+        }
+    }
+}
+
+/// One trial for each seed, in parallel, in the order of the seeds.
+///
+/// # Errors
+/// The first seed whose experiment cannot be simulated or calibrated.
+pub fn trials<C: Calibrator + Sync + ?Sized>(
+    scene: &Scene,
+    seeds: impl IntoIterator<Item = u64>,
+    calibrator: &C,
+) -> Result<Vec<Trial>, Failure> {
+    let seeds: Vec<u64> = seeds.into_iter().collect();
+    let of_one = |seed: &u64| {
+        let experiment = Experiment::of(scene, *seed)?;
+        let calibration = experiment.calibrate(calibrator)?;
+        Ok(Trial::of(&experiment.dataset, &experiment.truth, &calibration))
+    };
+    let all: Vec<Result<Trial, Failure>> = seeds.par_iter().map(of_one).collect();
+    all.into_iter().collect()
+}

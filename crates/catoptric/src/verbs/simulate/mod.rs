@@ -1,0 +1,58 @@
+//! From a scene to what a laboratory would have recorded, in memory or as a folder, with the truth beside it.
+
+#[cfg(feature = "recording")]
+mod folder;
+#[cfg(feature = "recording")]
+mod stream;
+#[cfg(feature = "recording")]
+mod sub_rays;
+#[cfg(feature = "recording")]
+mod tables;
+
+#[cfg(feature = "recording")]
+pub use folder::{Figures, Recording, simulate_into};
+
+use crate::{Control, Error, Scene};
+use catoptric_model::{Dataset, PoseRecord};
+use catoptric_sim::{Laboratory, Truth};
+use rayon::prelude::*;
+
+/// Simulates the experiment of a scene: what would have been recorded, and the truth about it.
+///
+/// The dataset holds nothing that leads to the truth. Experiments of many scans are better recorded with
+/// [`simulate_into`], which needs memory for a few of them only.
+///
+/// # Errors
+/// [`Error::Setup`] if the scene cannot be set up: a board that fits nowhere, no laboratory.
+pub fn simulate(scene: &Scene) -> Result<(Dataset, Truth), Error> {
+    simulate_with(scene, &Control::default())
+}
+
+/// As [`simulate`], with progress by stretches.
+///
+/// # Errors
+/// As [`simulate`], and [`Error::Stopped`].
+pub fn simulate_with(scene: &Scene, control: &Control) -> Result<(Dataset, Truth), Error> {
+    control.run(|| {
+        let scene = scene.resolved();
+        let laboratory = Laboratory::new(scene, scene.seed)?;
+        let truth = laboratory.truth()?;
+        let all: Vec<usize> = (0..laboratory.stretches()).collect();
+        let mut poses = Vec::with_capacity(all.len());
+        control.report("simulating", 0, all.len());
+        for window in all.chunks(rayon::current_num_threads()) {
+            let recorded: Vec<PoseRecord> = window
+                .par_iter()
+                .map(|number| {
+                    control.stop.check()?;
+                    Ok(laboratory.pose_record(*number)?)
+                })
+                .collect::<Result<_, Error>>()?;
+            poses.extend(recorded);
+            control.report("simulating", window.len(), all.len());
+        }
+        control.check()?;
+        let session = laboratory.session()?;
+        Ok((Dataset { session, poses }, truth))
+    })
+}

@@ -1,0 +1,265 @@
+//! What a mirror layout sees, loses and allows: everything that can be said before a mirror is cut.
+//!
+//! Without noise, through the same beams of sub-rays as [`simulate`](catoptric_sim::Laboratory), so that the class of
+//! every element is the one the truth of a recording states. [`analyze`] is cheap: with [`Detail::Coarse`] (one ray per
+//! beam) it takes a few milliseconds, and a search can call it thousands of times. [`predict`], the accuracy that a
+//! calibration can reach, looks at every board of the experiment and takes longer.
+//!
+//! **Field of regard.** A scanner's beams are discrete, so an element is given a cell of directions: along the scan half-way
+//! to its neighbors, across it as far as the 1/e² contour of its own beam reaches,
+//!
+//! ```text
+//! cell = [θ_b − step/2, θ_b + step/2] × [−δ/2, δ/2]      Ω = step·2·sin(δ/2)      δ² = (δ_wide·sin θ_b)² + (δ_narrow·cos θ_b)²
+//! ```
+//!
+//! (δ = δ_narrow where the spot does not turn). A plane mirror keeps solid angles, so that one flat facet sees ΣΩ over its
+//! elements, whatever its pose. The field of regard is the share of 4π that the cells of all unsplit elements cover, each
+//! direction counted once. Beside it stands the share of directions within 5° of a beam, for those who move the rig or
+//! look for large things.
+//!
+//! ```
+//! use catoptric::{layout, sim};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let scene: sim::Scene = toml::from_str(include_str!("../../../../scenes/prototype.toml"))?;
+//! let drawn = layout::analyze(&scene, None, layout::Detail::Coarse)?;
+//! assert_eq!(drawn.elements.len(), 1081);
+//! assert!(drawn.facets.iter().all(|f| f.elements > 50));
+//! assert!(drawn.field_of_regard > 0.003 && drawn.share_within_5_deg > 0.07);
+//! # Ok(())
+//! # }
+//! ```
+
+mod accuracy;
+mod depth;
+mod drawing;
+mod element;
+mod facet;
+mod field;
+mod footprint;
+mod require;
+mod sensitivity;
+mod size;
+mod ways;
+
+pub use accuracy::{Accuracy, FacetAccuracy, predict};
+pub use depth::{Depth, depth};
+pub use drawing::{Drawing, DrawnPart, DrawnRay};
+pub use element::{Class, DARK, Element};
+pub(crate) use element::{Traced, exit, trace};
+pub use facet::FacetView;
+pub use field::{Cell, NEAR_DEG};
+pub use footprint::{Footprint, OUTLINE};
+pub(crate) use require::numbers;
+pub use require::{Requirement, RequirementError, Unmet, figures};
+pub use sensitivity::center;
+pub(crate) use size::plate_thickness;
+pub use size::{MIRROR_DENSITY, POST_DENSITY, Size};
+pub use ways::Layout;
+
+use catoptric_model::beam;
+use catoptric_sim::build::Structure;
+use catoptric_sim::receive::Sensor;
+use catoptric_sim::{Scene, SimError};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Version of what an analysis is written as.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// Ranges at which the spot is stated, in metres.
+pub const SPOT_RANGES_M: [f64; 3] = [1.0, 4.0, 10.0];
+
+/// How closely to look.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Detail {
+    /// The scene's own sub-rays.
+    #[default]
+    Full,
+    /// One ray per beam: elements that an edge cuts are not told from others.
+    Coarse,
+}
+
+/// What a layout sees, loses and allows.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Analysis {
+    /// Version of this format.
+    pub schema_version: u32,
+    /// Name of the scene.
+    pub name: String,
+    /// Seed of the structure as built; `None` for the drawing.
+    pub seed: Option<u64>,
+    /// Sub-rays per beam.
+    pub sub_rays: usize,
+    /// Elements of each class.
+    pub counts: BTreeMap<Class, usize>,
+    /// Elements with a direction of their own: direct, deflected, or leaving after several mirrors.
+    pub seeing: usize,
+    /// Elements without one.
+    pub lost: usize,
+    /// Elements whose chief ray's way ends at a facet: facets that shade others, or are seen from behind.
+    pub stopped_by_facets: usize,
+    /// Longest run of neighboring elements without one, in degrees of the scan.
+    pub largest_gap_deg: f64,
+    /// Share of all directions, 4π, that the cells of the seeing elements cover.
+    pub field_of_regard: f64,
+    /// The same in steradians.
+    pub solid_angle_sr: f64,
+    /// Part of it that undeflected elements cover, as a share of 4π.
+    pub direct_field_of_regard: f64,
+    /// Share of all directions within 5° of a seeing element's beam.
+    pub share_within_5_deg: f64,
+    /// Least and greatest elevation of a seeing element, in degrees; `None` without any.
+    pub elevation_deg: Option<[f64; 2]>,
+    /// Degrees of elevation, of 180, in which an element looks.
+    pub elevation_covered_deg: f64,
+    /// Degrees of azimuth, of 360, in which an element looks.
+    pub azimuth_covered_deg: f64,
+    /// Facet by facet.
+    pub facets: Vec<FacetView>,
+    /// Spot and spacing of the beams over the range.
+    pub spots: Vec<Spot>,
+    /// Size, mirror area and mass.
+    pub size: Size,
+    /// What a calibration can reach; `None` where nobody asked.
+    pub accuracy: Option<Accuracy>,
+    /// Neighboring elements with one fate, in order.
+    pub runs: Vec<Run>,
+    /// Every element.
+    pub elements: Vec<Element>,
+}
+
+/// Spot and spacing at a range, whatever mirrors are on the way: a plane mirror changes neither.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Spot {
+    /// Length of the way from the scanner, in metres.
+    pub range_m: f64,
+    /// Full width of the 1/e² contour along its long axis, in millimetres.
+    pub wide_mm: f64,
+    /// Full width along its short axis, in millimetres.
+    pub narrow_mm: f64,
+    /// Distance between neighboring beams of a fan, in millimetres.
+    pub spacing_mm: f64,
+}
+
+/// Neighboring elements of one class that meet the same things.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Run {
+    /// First and last beam.
+    pub beams: [usize; 2],
+    /// Azimuths that they take up in the scan, in degrees.
+    pub azimuth_deg: [f64; 2],
+    /// Their class.
+    pub class: Class,
+    /// Facets that they meet.
+    pub facets: Vec<String>,
+    /// What ends their way.
+    pub stopped_by: Option<String>,
+}
+
+/// Looks at a layout: as drawn, or as built under a seed.
+///
+/// # Errors
+/// [`SimError`] for a facet without a shape, an unknown color or a mesh that nobody has read.
+pub fn analyze(scene: &Scene, seed: Option<u64>, detail: Detail) -> Result<Analysis, SimError> {
+    Layout::new(scene, seed, detail)?.analysis()
+}
+
+/// What is said of a layout whose beams are known.
+fn analysis(layout: &Layout, names: &[&str], traced: &[&Traced], footprints: &[&Footprint]) -> Analysis {
+    let Layout {
+        scene,
+        structure,
+        sensor,
+        ..
+    } = layout;
+    let ways = field::Ways::new(structure, traced);
+    let cells = field::cells(sensor.shape());
+    let elements = element::elements(scene, structure, names, traced, footprints);
+    let field = field::field(&ways, &cells, traced);
+    let mut counts: BTreeMap<Class, usize> = Class::ALL.map(|class| (class, 0)).into();
+    for element in &elements {
+        *counts.entry(element.class).or_default() += 1;
+    }
+    let seeing = elements.iter().filter(|e| e.class.sees()).count();
+    let runs = runs(&elements);
+    Analysis {
+        schema_version: SCHEMA_VERSION,
+        name: scene.name.clone(),
+        seed: layout.seed,
+        sub_rays: sensor.sub_rays(),
+        counts,
+        seeing,
+        lost: elements.len() - seeing,
+        stopped_by_facets: stopped_by_facets(structure, &elements),
+        largest_gap_deg: largest_gap(&elements),
+        field_of_regard: field.covered_sr / SPHERE_SR,
+        solid_angle_sr: field.covered_sr,
+        direct_field_of_regard: field.direct_sr / SPHERE_SR,
+        share_within_5_deg: field.near,
+        elevation_deg: field.elevation_deg,
+        elevation_covered_deg: field.elevation_covered_deg,
+        azimuth_covered_deg: field.azimuth_covered_deg,
+        facets: facet::facets(structure, &elements, traced, &cells, footprints),
+        spots: spots(sensor),
+        size: size::size(scene, structure),
+        accuracy: None,
+        runs,
+        elements,
+    }
+}
+
+/// Solid angle of all directions.
+pub(crate) const SPHERE_SR: f64 = 4.0 * std::f64::consts::PI;
+
+/// 1/e² full widths of the beam at a range, from its divergence and its width where it leaves.
+fn spots(sensor: &Sensor) -> Vec<Spot> {
+    let shape = sensor.shape();
+    let width = |aperture_mm: f64, full_mrad: f64, range: f64| {
+        aperture_mm + 2e3 * range * libm::tan(0.5e-3 * full_mrad)
+    };
+    SPOT_RANGES_M
+        .map(|range_m| Spot {
+            range_m,
+            wide_mm: width(shape.wide_aperture_mm, shape.wide_full_mrad, range_m),
+            narrow_mm: width(shape.narrow_aperture_mm, shape.narrow_full_mrad, range_m),
+            spacing_mm: 2e3 * range_m * libm::sin(0.5 * beam::STEP),
+        })
+        .to_vec()
+}
+
+fn runs(elements: &[Element]) -> Vec<Run> {
+    let same =
+        |a: &Element, b: &Element| a.class == b.class && a.facets == b.facets && a.stopped_by == b.stopped_by;
+    let half_step = 0.5 * beam::STEP.to_degrees();
+    elements
+        .chunk_by(same)
+        .filter_map(|run| {
+            let (first, last) = (run.first()?, run.last()?);
+            Some(Run {
+                beams: [first.beam, last.beam],
+                azimuth_deg: [
+                    first.scan_azimuth_deg - half_step,
+                    last.scan_azimuth_deg + half_step,
+                ],
+                class: first.class,
+                facets: first.facets.clone(),
+                stopped_by: first.stopped_by.clone(),
+            })
+        })
+        .collect()
+}
+
+fn stopped_by_facets(structure: &Structure, elements: &[Element]) -> usize {
+    let is_facet = |name: &str| structure.facets.iter().any(|f| f.name == name);
+    let stopped = elements.iter().filter_map(|e| e.stopped_by.as_deref());
+    stopped.filter(|name| is_facet(name)).count()
+}
+
+/// The longest run of elements that do not see, in degrees of the scan.
+fn largest_gap(elements: &[Element]) -> f64 {
+    let runs = elements.chunk_by(|a, b| a.class.sees() == b.class.sees());
+    let blind = runs.filter(|run| run.first().is_some_and(|e| !e.class.sees()));
+    blind.map(<[Element]>::len).max().unwrap_or(0) as f64 * beam::STEP.to_degrees()
+}

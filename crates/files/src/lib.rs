@@ -1,0 +1,71 @@
+//! Files: the only part of the library that reads or writes.
+//!
+//! A dataset is a folder ([`dataset`]) whose observations are a recording in the Robot Operating System's own
+//! format ([`recording`], [`playback`]), so that others' tools open it. Whatever is written appears whole or not
+//! at all ([`file`](mod@file), [`folder`]); whatever goes wrong names the file ([`error`]).
+
+#[cfg(feature = "recording")]
+mod bodies;
+#[cfg(feature = "recording")]
+mod container;
+pub mod error;
+pub mod file;
+pub mod folder;
+
+#[cfg(feature = "recording")]
+pub mod cdr;
+#[cfg(feature = "recording")]
+pub mod definitions;
+#[cfg(feature = "recording")]
+mod gathering;
+#[cfg(feature = "recording")]
+pub mod messages;
+#[cfg(feature = "recording")]
+pub mod playback;
+#[cfg(feature = "recording")]
+pub mod recording;
+#[cfg(feature = "recording")]
+mod schedule;
+
+#[cfg(feature = "scene")]
+pub mod diagnostic;
+#[cfg(feature = "scene")]
+mod expression;
+#[cfg(feature = "scene")]
+mod format;
+#[cfg(feature = "scene")]
+mod parameters;
+#[cfg(feature = "scene")]
+pub mod parametric;
+#[cfg(feature = "scene")]
+pub mod scene;
+#[cfg(feature = "scene")]
+mod tree;
+
+pub mod cloud;
+#[cfg(feature = "recording")]
+pub mod dataset;
+pub mod manifest;
+#[cfg(feature = "scene")]
+pub mod mesh;
+pub mod npy;
+#[cfg(feature = "scene")]
+pub mod rays;
+pub mod results;
+pub mod shell;
+
+#[cfg(feature = "recording")]
+pub use dataset::{DatasetWriter, read_dataset, read_session};
+pub use error::IoError;
+pub use file::{StagedOutput, read_json, write_file, write_json};
+pub use manifest::{Manifest, Provenance};
+#[cfg(feature = "recording")]
+pub use playback::read_recording;
+#[cfg(feature = "recording")]
+pub use recording::RecordingWriter;
+#[cfg(all(feature = "recording", feature = "scene"))]
+pub use results::read_truth;
+pub use results::{read_calibration, read_characterization};
+
+#[cfg(all(test, feature = "recording", feature = "scene"))]
+mod tests;

@@ -1,0 +1,49 @@
+//! Results as JSON: calibrations, ours or anybody's, characterizations, the truth of a simulated dataset.
+
+use super::error::IoError;
+use super::file::read_json;
+use catoptric_model::{Calibration, Characterization, calibration, characterization};
+use std::path::Path;
+
+/// Reads the truth of a dataset; `None` if the dataset is blind.
+///
+/// # Errors
+/// [`IoError`] if it is there and cannot be read, or is of another version.
+#[cfg(all(feature = "recording", feature = "scene"))]
+pub fn read_truth(dataset: &Path) -> Result<Option<catoptric_sim::Truth>, IoError> {
+    let path = dataset.join(super::dataset::TRUTH);
+    if !path.exists() {
+        return Ok(None);
+    }
+    let found: catoptric_sim::Truth = read_json(&path)?;
+    require_version(&path, found.schema_version, catoptric_sim::truth::SCHEMA_VERSION)?;
+    Ok(Some(found))
+}
+
+/// Reads a calibration, ours or anybody's.
+///
+/// # Errors
+/// [`IoError`] with line and column if it is not one, or is of another version.
+pub fn read_calibration(path: &Path) -> Result<Calibration, IoError> {
+    let found: Calibration = read_json(path)?;
+    require_version(path, found.schema_version, calibration::SCHEMA_VERSION)?;
+    Ok(found)
+}
+
+/// Reads a characterization of the bare sensor.
+///
+/// # Errors
+/// [`IoError`] with line and column if it is not one, or is of another version.
+pub fn read_characterization(path: &Path) -> Result<Characterization, IoError> {
+    let found: Characterization = read_json(path)?;
+    require_version(path, found.schema_version, characterization::SCHEMA_VERSION)?;
+    Ok(found)
+}
+
+fn require_version(path: &Path, found: u32, known: u32) -> Result<(), IoError> {
+    if found == known {
+        return Ok(());
+    }
+    let message = format!("schema_version is {found}, this program reads {known}");
+    Err(IoError::content(path, message))
+}

@@ -1,0 +1,173 @@
+//! The cloud from above, and how much of it comes by which mirror.
+
+use super::super::figure::{self, Axes, GRID, Stroke};
+use super::super::page::{figure as block, number};
+use super::elements::{color_of, facet_of, legend};
+use catoptric_model::{Calibration, Dataset, Pose, Status};
+use catoptric_model::{CloudFrame, PointCloud};
+use nalgebra::Point3;
+use plotters::style::{BLACK, RGBColor};
+
+/// Points of a cloud that are drawn at most.
+const MOST_POINTS: usize = 6000;
+
+/// The cloud from above.
+pub(crate) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud: &PointCloud) -> String {
+    let facets: Vec<Option<usize>> = (0..dataset.session.scanner.beams)
+        .map(|b| facet_of(dataset, calibration?.beam(b)?))
+        .collect();
+    // Whole scans are left out: every n-th point would favour some beams.
+    let step = cloud.points.len().div_ceil(MOST_POINTS).max(1);
+    let points: Vec<(f64, f64, RGBColor)> = cloud
+        .points
+        .iter()
+        .filter(|p| p.scan % step == 0)
+        .map(|p| {
+            let facet = facets.get(p.beam).copied().flatten();
+            let is_direct = calibration
+                .and_then(|c| c.beam(p.beam))
+                .is_some_and(|b| b.status == Status::Direct);
+            let color = if is_direct {
+                RGBColor(0x8C, 0x8C, 0x8C)
+            } else {
+                color_of(facet)
+            };
+            (p.position.x, p.position.y, color)
+        })
+        .collect();
+    let mut strokes = Vec::new();
+    let mut corners = Vec::new();
+    let surveyed = dataset.session.room.as_ref();
+    if let Some(room) = surveyed.filter(|_| cloud.frame == CloudFrame::Room) {
+        let [[x0, y0, _], [x1, y1, _]] = [room.min_m, room.max_m];
+        corners = vec![(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)];
+        strokes.push(Stroke {
+            points: corners.clone(),
+            color: GRID,
+            width: 3,
+            opacity: 1.0,
+        });
+        strokes.extend(
+            dataset
+                .poses
+                .first()
+                .map(|p| cross(&p.room_from_rig))
+                .into_iter()
+                .flatten(),
+        );
+    }
+    let all = || points.iter().map(|p| (p.0, p.1)).chain(corners.iter().copied());
+    let limits = |value: fn((f64, f64)) -> f64| {
+        let low = all().map(value).fold(f64::INFINITY, f64::min);
+        let high = all().map(value).fold(f64::NEG_INFINITY, f64::max);
+        if low < high {
+            low - 0.3..high + 0.3
+        } else {
+            -1.0..1.0
+        }
+    };
+    let axes = Axes {
+        x: limits(|p| p.0),
+        y: limits(|p| p.1),
+        x_label: format!("x of the {} (m)", cloud.frame.word()),
+        y_label: format!("y of the {} (m)", cloud.frame.word()),
+    };
+    let title = "The cloud from above";
+    let svg = figure::scatter(level_size(&axes), &axes, title, &points, &strokes);
+    let rows = cloud_rows(dataset, calibration, cloud, &facets);
+    let outline = if cloud.frame == CloudFrame::Room && surveyed.is_some() {
+        "The outline is the surveyed room: points belong on its walls, or inside on floor and ceiling; a wall of points that \
+         leaves the outline is a mirror whose directions are off. The cross is the scanner. "
+    } else {
+        ""
+    };
+    let caption = format!(
+        "Points of pose {} in the {} frame, colored by mirror; grey points were seen past the mirrors. {outline}{}",
+        cloud.pose,
+        cloud.frame.word(),
+        if step > 1 {
+            format!("One scan in {step} is drawn.")
+        } else {
+            String::new()
+        },
+    );
+    let plot = format!("<div class=\"plot\"><h4>{title}</h4>{svg}</div>\n");
+    block(
+        &plot,
+        caption.trim_end(),
+        &legend(dataset),
+        &["Part", "Points", "x (m)", "y (m)", "z (m)"],
+        &rows,
+    )
+}
+
+/// A cross where the rig stood.
+fn cross(room_from_rig: &Pose) -> [Stroke; 2] {
+    const ARM_M: f64 = 0.12;
+    let (x, y) = (room_from_rig.translation.x, room_from_rig.translation.y);
+    [(ARM_M, 0.0), (0.0, ARM_M)].map(|(dx, dy)| Stroke {
+        points: vec![(x - dx, y - dy), (x + dx, y + dy)],
+        color: BLACK,
+        width: 2,
+        opacity: 1.0,
+    })
+}
+
+/// A size at which one metre is as long upward as across.
+fn level_size(axes: &Axes) -> (u32, u32) {
+    /// What margins and axis labels take, in pixels.
+    const FRAME: f64 = 72.0;
+    let (width, height) = (axes.x.end - axes.x.start, axes.y.end - axes.y.start);
+    let across = 800.0 - FRAME;
+    let up = (across * height / width).clamp(150.0, 1200.0);
+    // Between 150 and 1272 by the clamp.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    let up = (up + FRAME) as u32;
+    (800, up)
+}
+
+/// Points and extent of the cloud, and of the part that each mirror shows.
+fn cloud_rows(
+    dataset: &Dataset,
+    calibration: Option<&Calibration>,
+    cloud: &PointCloud,
+    facets: &[Option<usize>],
+) -> Vec<Vec<String>> {
+    let status = |b: usize| calibration.and_then(|c| c.beam(b)).map(|b| b.status);
+    let row = |name: &str, keep: &dyn Fn(usize) -> bool| {
+        let points: Vec<Point3<f64>> = cloud
+            .points
+            .iter()
+            .filter(|p| keep(p.beam))
+            .map(|p| p.position)
+            .collect();
+        let extent = |axis: usize| {
+            let low = points.iter().map(|p| p[axis]).fold(f64::NAN, f64::min);
+            let high = points.iter().map(|p| p[axis]).fold(f64::NAN, f64::max);
+            format!("{} … {}", number(low, 2), number(high, 2))
+        };
+        vec![
+            name.to_owned(),
+            points.len().to_string(),
+            extent(0),
+            extent(1),
+            extent(2),
+        ]
+    };
+    let mut rows = vec![row("All points", &|_| true)];
+    for (i, facet) in dataset.session.facets.iter().enumerate() {
+        rows.push(row(&facet.name, &|b| {
+            facets.get(b).copied().flatten() == Some(i) && status(b) == Some(Status::Solved)
+        }));
+    }
+    rows.push(row("Past the mirrors", &|b| status(b) == Some(Status::Direct)));
+    let count = |name: &str, count: usize| {
+        let mut row = vec![String::new(); 5];
+        row[0] = name.to_owned();
+        row[1] = count.to_string();
+        row
+    };
+    rows.push(count("Left out: no direction", cloud.without_direction));
+    rows.push(count("Left out: no range", cloud.without_range));
+    rows
+}
