@@ -1,7 +1,7 @@
 //! Standard output: data and results, and a quiet end when nobody reads them.
 
 use super::error::CliError;
-pub(crate) use catoptric::files::shell::quoted;
+pub(crate) use catoptric::files::paths::quoted;
 use std::io::{ErrorKind, Write};
 
 /// Writes text to stdout as it is.

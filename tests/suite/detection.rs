@@ -13,7 +13,7 @@ use catoptric::files::scene as scene_file;
 use catoptric::model::{Stretch, beam};
 use catoptric::sim::build::Structure;
 use catoptric::sim::build::color;
-use catoptric::sim::light::{self, Mirrors, Role, Setting};
+use catoptric::sim::light::{Mirrors, Role, Setting};
 use catoptric::sim::receive::phase;
 use catoptric::sim::receive::{Return, Sensor};
 use catoptric::sim::scene::{BeamShape, Detector, ErrorModel, Preset};
@@ -71,7 +71,7 @@ fn forward(scene: &Scene, boards: &[Target]) -> Option<Return> {
         .map(|Target(distance, tilt_deg, [from, to], color)| {
             let (sin, cos) = libm::sincos(tilt_deg.to_radians());
             let at = |y: f64, z: f64| Point3::new(distance + y * sin, y * cos, z);
-            optics::Target {
+            catoptric::sim::light::Target {
                 name: "board".to_owned(),
                 shape: Shape::Polygon(
                     Polygon::new(vec![at(*to, -1.0), at(*from, -1.0), at(*from, 1.0), at(*to, 1.0)])

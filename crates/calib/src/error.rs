@@ -60,9 +60,11 @@ pub enum CalibError {
     #[error(transparent)]
     Stopped(#[from] Stopped),
     /// A name that is no method's.
-    #[error("no method is called {name:?}; there are {}", crate::options::Method::ALL.map(crate::options::Method::name).join(", "))]
+    #[error("no method is called {name:?}; there are {known}")]
     UnknownMethod {
         /// The name asked for.
         name: String,
+        /// The names there are.
+        known: String,
     },
 }

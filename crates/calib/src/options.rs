@@ -64,6 +64,7 @@ impl FromStr for Method {
             .find(|m| m.name() == name)
             .ok_or_else(|| CalibError::UnknownMethod {
                 name: name.to_owned(),
+                known: Self::ALL.map(Self::name).join(", "),
             })
     }
 }

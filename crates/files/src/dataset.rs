@@ -11,8 +11,9 @@
 //! Reading never opens `truth/`.
 
 use super::error::IoError;
-use super::file::{sha256, sha256_file, to_json};
+use super::file::{sha256, sha256_file};
 use super::folder::{Occupant, StagedFile, StagedFolder, list};
+use super::json::to_json;
 use super::manifest::{Manifest, Provenance};
 use super::playback::parse_recording;
 use super::recording::{Encoded, RecordingEncoder, RecordingWriter};

@@ -1,8 +1,9 @@
 //! One file, whole or not at all: written beside its place, brought to disk, then renamed.
 
 use super::error::IoError;
+use super::json::to_json;
+use super::paths::parent;
 use serde::Serialize;
-use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, Write};
@@ -151,30 +152,12 @@ fn write_through(path: &Path, bytes: &[u8]) -> io::Result<()> {
     file.flush()
 }
 
-/// The folder a file is in.
-pub(super) fn parent(path: &Path) -> &Path {
-    match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    }
-}
-
 /// Brings a rename to disk.
 pub(super) fn sync_folder(folder: &Path) {
     // Not every system lets a folder be opened; there the rename reaches the disk in its own time.
     if let Ok(folder) = File::open(folder) {
         let _ = folder.sync_all();
     }
-}
-
-/// Value as indented JSON with a newline at its end; numbers that are not finite become null.
-///
-/// # Errors
-/// [`IoError::Text`] if the value has no JSON form, such as a map whose keys are not text; `path` names it.
-pub fn to_json(path: impl AsRef<Path>, value: &impl Serialize) -> Result<Vec<u8>, IoError> {
-    let mut bytes = serde_json::to_vec_pretty(value).map_err(|e| IoError::json(path, &e))?;
-    bytes.push(b'\n');
-    Ok(bytes)
 }
 
 /// Writes a value as JSON, whole or not at all; numbers that are not finite become null.
@@ -186,16 +169,6 @@ pub fn write_json(path: impl AsRef<Path>, value: &impl Serialize) -> Result<(), 
     write_file(path, &to_json(path, value)?)
 }
 
-/// Reads a value from JSON.
-///
-/// # Errors
-/// [`IoError::Read`] if the file cannot be read, [`IoError::Text`] with line and column if it is not such a value.
-pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T, IoError> {
-    let path = path.as_ref();
-    let bytes = fs::read(path).map_err(|e| IoError::read(path, e))?;
-    serde_json::from_slice(&bytes).map_err(|e| IoError::json(path, &e))
-}
-
 /// SHA-256 of some bytes, as hexadecimal digits.
 pub fn sha256(bytes: &[u8]) -> String {
     hexadecimal(&Sha256::digest(bytes))
@@ -205,7 +178,6 @@ pub fn sha256(bytes: &[u8]) -> String {
 ///
 /// # Errors
 /// What the system says if it cannot be read.
-#[cfg(feature = "recording")]
 pub(super) fn sha256_file(path: &Path) -> io::Result<String> {
     let mut hasher = Sha256::new();
     let mut file = File::open(path)?;
@@ -225,6 +197,7 @@ fn hexadecimal(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::read_json;
 
     fn names(folder: &Path) -> Vec<String> {
         let entries = fs::read_dir(folder).expect("folder");

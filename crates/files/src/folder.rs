@@ -1,7 +1,8 @@
 //! One folder, whole or not at all: filled beside its place, brought to disk, then renamed.
 
 use super::error::IoError;
-use super::file::{parent, sync_folder};
+use super::file::sync_folder;
+use super::paths::parent;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};

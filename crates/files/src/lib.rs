@@ -9,8 +9,12 @@ mod bodies;
 #[cfg(feature = "recording")]
 mod container;
 pub mod error;
+#[cfg(feature = "recording")]
 pub mod file;
+#[cfg(feature = "recording")]
 pub mod folder;
+pub mod json;
+pub mod paths;
 
 #[cfg(feature = "recording")]
 pub mod cdr;
@@ -45,19 +49,22 @@ mod tree;
 pub mod cloud;
 #[cfg(feature = "recording")]
 pub mod dataset;
+#[cfg(feature = "recording")]
 pub mod manifest;
 #[cfg(feature = "scene")]
 pub mod mesh;
 pub mod npy;
-#[cfg(feature = "scene")]
+#[cfg(all(feature = "recording", feature = "scene"))]
 pub mod rays;
 pub mod results;
-pub mod shell;
 
 #[cfg(feature = "recording")]
 pub use dataset::{DatasetWriter, read_dataset, read_session};
 pub use error::IoError;
-pub use file::{StagedOutput, read_json, write_file, write_json};
+#[cfg(feature = "recording")]
+pub use file::{StagedOutput, write_file, write_json};
+pub use json::read_json;
+#[cfg(feature = "recording")]
 pub use manifest::{Manifest, Provenance};
 #[cfg(feature = "recording")]
 pub use playback::read_recording;

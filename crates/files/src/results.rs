@@ -1,7 +1,7 @@
 //! Results as JSON: calibrations, ours or anybody's, characterizations, the truth of a simulated dataset.
 
 use super::error::IoError;
-use super::file::read_json;
+use super::json::read_json;
 use catoptric_model::{Calibration, Characterization, calibration, characterization};
 use std::path::Path;
 

@@ -5,10 +5,12 @@
 
 use super::diagnostic::{Diagnostic, Diagnostics, Place, position};
 use super::error::IoError;
-use super::file::{parent, sha256};
+#[cfg(feature = "recording")]
+use super::file::sha256;
 use super::format;
 use super::mesh;
 use super::parameters;
+use super::paths::parent;
 use super::tree::{self, Node, Source};
 use catoptric_model::place::{Problem, nearest};
 use catoptric_sim::Scene;
@@ -167,6 +169,7 @@ pub fn read_meshes(scene: &mut Scene, folder: &Path) -> Result<(), SceneErrors> 
 
 /// The scene with its meshes under names made of their content, below a folder beside it, and those files: what a
 /// dataset keeps, so that it can be made again. A scene that is kept already keeps its names.
+#[cfg(feature = "recording")]
 pub fn kept(scene: &Scene) -> (Scene, Vec<(String, Vec<u8>)>) {
     let mut scene = scene.clone();
     let mut files: Vec<(String, Vec<u8>)> = Vec::new();

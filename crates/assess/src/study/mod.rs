@@ -28,15 +28,18 @@
 
 mod elements;
 mod error;
+#[cfg(feature = "recording")]
 pub mod folder;
 mod grid;
 mod merge;
 mod oracle;
 mod part;
+#[cfg(feature = "recording")]
 mod plan;
 #[cfg(feature = "recording")]
 mod program;
 mod run;
+#[cfg(feature = "recording")]
 mod shards;
 mod spread;
 mod statistics;
@@ -49,12 +52,14 @@ pub use grid::{Axis, grid};
 pub use merge::{in_order, merge};
 pub use oracle::Oracle;
 pub use part::Part;
+#[cfg(feature = "recording")]
 pub use plan::Plan;
 #[cfg(feature = "recording")]
 pub use program::Program;
 #[cfg(feature = "testing")]
 pub(crate) use run::drawn;
 pub use run::{Run, run, run_with_elements};
+#[cfg(feature = "recording")]
 pub use shards::gather;
 pub use spread::{Spread, spread, spread_to_csv};
 #[cfg(feature = "testing")]

@@ -1,8 +1,6 @@
 //! What was asked for, in the folder of the study: what makes two folders parts of one study.
 
-#[cfg(feature = "recording")]
-use super::Program;
-use super::{Cell, Contestant, Part, SCHEMA_VERSION, Study, StudyError};
+use super::{Cell, Contestant, Part, Program, SCHEMA_VERSION, Study, StudyError};
 use catoptric_files::scene::{self, Template};
 use catoptric_files::{IoError, file, read_json, write_json};
 use catoptric_model::Stop;
@@ -24,7 +22,6 @@ pub struct Plan {
     seeds: u64,
     contestants: Vec<String>,
     /// Those of the contestants that are programs.
-    #[cfg(feature = "recording")]
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     programs: Vec<Program>,
     /// Which part of how many.
@@ -50,7 +47,6 @@ impl Plan {
                 scene_sha256: file::sha256(text.as_bytes()),
             })
         });
-        #[cfg(feature = "recording")]
         let program = |contestant: &Contestant| match contestant {
             Contestant::Program(program) => Some(program.clone()),
             _ => None,
@@ -65,7 +61,6 @@ impl Plan {
             cells: cells.collect::<Result<_, StudyError>>()?,
             seeds: study.seeds,
             contestants: study.contestants.iter().map(Contestant::name).collect(),
-            #[cfg(feature = "recording")]
             programs: study.contestants.iter().filter_map(program).collect(),
             shard,
         })
@@ -111,7 +106,7 @@ impl Plan {
         } else if self.contestants != wanted.contestants {
             let names = |plan: &Self| plan.contestants.join(",");
             format!("methods {}, {} asked for", names(self), names(wanted))
-        } else if self.programs_differ(wanted) {
+        } else if self.programs != wanted.programs {
             "a program's command or its time differs".to_owned()
         } else if self.shard != wanted.shard {
             format!("shard {}, {} asked for", self.shard, wanted.shard)
@@ -132,7 +127,6 @@ impl Plan {
     pub fn study(&self) -> Result<Study, StudyError> {
         let scene = scene::parse(Template::Prototype.text(), "prototype.toml", &[])?;
         let contestant = |name: &String| {
-            #[cfg(feature = "recording")]
             if let Some(program) = self.programs.iter().find(|p| p.name == *name) {
                 return Ok(Contestant::Program(program.clone()));
             }
@@ -165,15 +159,5 @@ impl Plan {
                 .collect::<Result<_, _>>()?,
             stop: Stop::default(),
         })
-    }
-
-    #[cfg(feature = "recording")]
-    fn programs_differ(&self, other: &Self) -> bool {
-        self.programs != other.programs
-    }
-
-    #[cfg(not(feature = "recording"))]
-    fn programs_differ(&self, _: &Self) -> bool {
-        false
     }
 }

@@ -2,8 +2,8 @@
 
 use super::design::Design;
 use crate::error::CalibError;
-use crate::mount_data::{DirectBoard, Selector};
-use crate::pose::{motion_between, moved};
+use crate::mount::mount_data::{DirectBoard, Selector};
+use crate::mount::pose::{motion_between, moved};
 use catoptric_model::calibration::MountEstimate;
 use catoptric_model::characterization::Fit;
 use catoptric_model::{Pose, PoseData, Session};

@@ -22,11 +22,11 @@ mod noise;
 mod rows;
 mod spot;
 
-use crate::calibrate::check_session;
 use crate::error::CalibError;
-use crate::locate;
-use crate::mount_data::{DirectBoard, Selection, Selector};
-use crate::pose;
+use crate::mount::mount_data::{DirectBoard, Selection, Selector};
+use crate::mount::pose;
+use crate::prepare::check_session;
+use crate::readings::locate;
 use adjust::{Adjustment, Prior, adjust};
 use catoptric_model::characterization::{
     Characterization, Fit, Law, Parameter, SCHEMA_VERSION, Scatter, StretchRow,

@@ -1,6 +1,6 @@
 //! White noise by color and distance: Table 4, and the spread in Table 2.
 
-use crate::mount_data::{DirectBoard, Selector};
+use crate::mount::mount_data::{DirectBoard, Selector};
 use catoptric_model::characterization::NoiseRow;
 use catoptric_model::{Dataset, Pose, Summary, TestKind};
 

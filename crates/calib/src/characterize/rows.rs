@@ -1,7 +1,7 @@
 //! One line for every stretch: what the beam nearest to the board's center read of it.
 
-use crate::mount_data::{DirectBoard, Selector};
-use crate::observations::{BoardInSensor, azimuth};
+use crate::mount::mount_data::{DirectBoard, Selector};
+use crate::readings::observations::{BoardInSensor, azimuth};
 use catoptric_model::characterization::StretchRow;
 use catoptric_model::frame::tangent_basis;
 use catoptric_model::{Dataset, Pose, Summary, beam};

@@ -1,6 +1,6 @@
 //! Table 1: spots as they were noted, and lines through them.
 
-use crate::observations::BoardInSensor;
+use crate::readings::observations::BoardInSensor;
 use catoptric_model::characterization::{SpotLaw, SpotRow};
 use catoptric_model::{Dataset, Pose};
 

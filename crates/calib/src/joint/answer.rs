@@ -3,13 +3,15 @@
 //! Given the other parameters x, an element's departure is normal about L(y − A·x) with L = τ²(I + τ²HᵀH)⁻¹Hᵀ. With C the
 //! covariance of x, that of the direction is (G − LA)·C·(G − LA)ᵀ + τ²(I + τ²HᵀH)⁻¹.
 
-use super::linear::{Boards, Linear};
-use super::problem::{Element, FACET_PARAMETERS, Group, Joint};
-use crate::least_squares::{GroupJacobian, Information, Solution, State};
-use crate::pose;
+use super::group::{Element, FACET_PARAMETERS, Group};
+use super::linear::Linear;
+use super::placed::Boards;
+use super::problem::Joint;
+use crate::lsq::{GroupJacobian, Information, Solution, State};
+use crate::mount::pose;
 use catoptric_model::calibration::{FacetEstimate, MountEstimate};
 use catoptric_model::{Deflection, PoseData, RangeBias, frame};
-use nalgebra::{DMatrix, DVector, Dyn, Matrix2, Matrix6, OMatrix, U6, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix2, Vector6};
 use std::collections::BTreeSet;
 
 /// Part of a residual's variance that must be left for it to say anything.
@@ -296,29 +298,4 @@ impl Joint<'_> {
         let w = solution.state.shared.numbers(0)?;
         Some(self.common.applied(&w.as_slice()[self.first_common..]))
     }
-}
-
-/// Motion matrix of a mounting that is known as its uncertainty says: independent errors first, then the common ones.
-pub(super) fn motion_of(
-    independent: &Matrix6<f64>,
-    common: &OMatrix<f64, U6, Dyn>,
-    count: usize,
-) -> OMatrix<f64, U6, Dyn> {
-    let eigen = independent.symmetric_eigen();
-    let root = eigen.eigenvectors * Matrix6::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0).sqrt()));
-    let mut motion = OMatrix::<f64, U6, Dyn>::zeros(6 + count);
-    motion.columns_mut(0, 6).copy_from(&root);
-    if common.ncols() == count {
-        motion.columns_mut(6, count).copy_from(common);
-    }
-    motion
-}
-
-/// Mean of w for a prior at another mounting: what of it is a motion over its standard deviation.
-pub(super) fn prior_mean(motion: &Vector6<f64>, sd: &Vector6<f64>, count: usize) -> DVector<f64> {
-    let mut mean = DVector::zeros(6 + count);
-    for i in 0..6 {
-        mean[i] = motion[i] / sd[i];
-    }
-    mean
 }

@@ -6,8 +6,9 @@
 
 use super::answer::Answer;
 use super::fit::Fit;
-use super::problem::{BOARD_ERRORS, FACET_PARAMETERS, Joint};
-use crate::least_squares::Solution;
+use super::group::{BOARD_ERRORS, FACET_PARAMETERS};
+use super::problem::Joint;
+use crate::lsq::Solution;
 use catoptric_model::Assessment;
 use catoptric_model::Session;
 use catoptric_model::assessment::{

@@ -7,8 +7,10 @@
 //! L(σ, τ) = ‖f‖² + ln det(JᵀJ) + Σ ln det(I + τ²HᵀH)      least at (σ̂, τ̂);  L(0, 0) − L(σ̂, τ̂) tests planeness
 //! ```
 
-use super::problem::{BOARD_ERRORS, FACET_BLOCKS, FACET_PARAMETERS, FIGURE, Flatness, Group, Joint};
-use crate::least_squares::{self, Block, Point, Prior, ProblemError, Reduced, Solution, State, WithPriors};
+use super::fan::Flatness;
+use super::group::{BOARD_ERRORS, FACET_BLOCKS, FACET_PARAMETERS, FIGURE, Group};
+use super::problem::Joint;
+use crate::lsq::{self, Block, Point, Prior, ProblemError, Reduced, Solution, State, WithPriors};
 use catoptric_model::MirrorPlane;
 use nalgebra::DVector;
 
@@ -34,13 +36,9 @@ pub(super) struct Fit {
 
 impl Joint<'_> {
     /// Solves with the present τ from a state.
-    pub(super) fn solve(
-        &self,
-        start: State,
-        options: &least_squares::Options,
-    ) -> Result<Solution, ProblemError> {
+    pub(super) fn solve(&self, start: State, options: &lsq::Options) -> Result<Solution, ProblemError> {
         let problem = self.with_priors(self);
-        least_squares::minimize(&problem, start, options)
+        lsq::minimize(&problem, start, options)
     }
 
     /// A problem in these parameters with what is believed of w, of the boards' errors and of the facets' figures, all in
@@ -70,8 +68,8 @@ impl Joint<'_> {
 
     /// Solves with facets that are plane, and estimates σ and τ from where that ends.
     pub(super) fn fit(&mut self, start: State) -> Result<Fit, ProblemError> {
-        let exact = least_squares::Options::default();
-        let rough = least_squares::Options {
+        let exact = lsq::Options::default();
+        let rough = lsq::Options {
             reduction_tolerance: 1e-6,
             ..exact
         };

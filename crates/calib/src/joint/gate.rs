@@ -2,7 +2,7 @@
 
 use super::linear::Linear;
 use super::problem::Joint;
-use crate::least_squares::State;
+use crate::lsq::State;
 
 /// χ² of an element's rows beyond which it is not what its facet and boards say: standard deviations of χ² above its mean.
 const GATE_SIGMAS: f64 = 7.0;

@@ -4,8 +4,9 @@
 //! A reading that weighs a million times less than it should is left out, while its prediction and the variance of that,
 //! by everything that is estimated and by the board's own errors, come out of the same algebra as all others.
 
-use super::problem::{Group, Joint};
-use crate::least_squares::{self, ProblemError, State};
+use super::group::Group;
+use super::problem::Joint;
+use crate::lsq::{self, ProblemError, State};
 use catoptric_model::assessment::HeldOut;
 
 /// Parts that the boards of a facet are left out in.
@@ -31,7 +32,7 @@ impl Joint<'_> {
                     sight.sd *= LEFT_OUT;
                 }
             }
-            let solution = rest.solve(from.clone(), &least_squares::Options::default())?;
+            let solution = rest.solve(from.clone(), &lsq::Options::default())?;
             for answer in rest.answers(&solution) {
                 // Without boards of its own an element's direction is that of its facet; without a covariance it is open.
                 for sight in answer

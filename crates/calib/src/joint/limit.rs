@@ -4,13 +4,17 @@
 //! priors, so this is the Bayesian (van Trees) form of the Cramér–Rao bound; for an element by itself see
 //! [`crate::covariance::Budget::bound`].
 
-use super::problem::{FIGURE, FIGURE_ORDERS, FIGURE_RMS, Flatness, orders};
-use super::{Assigned, along, begin, components, direct_group, group, mounting_as_drawn};
-use crate::calibrate::{believable, plane_between, prepare};
+use super::assemble::{Assigned, along, begin, components, direct_group, group, mounting_as_drawn};
+use super::fan::{FIGURE_RMS, Flatness, orders};
+use super::group::{FIGURE, FIGURE_ORDERS};
+use crate::element::choose;
+use crate::element::facet_plane::plane_between;
 use crate::error::CalibError;
-use crate::least_squares;
-use crate::observations::azimuth;
+use crate::judge::levers::libm_cos;
+use crate::lsq;
 use crate::options::{Method, Options};
+use crate::prepare::{believable, prepare};
+use crate::readings::observations::azimuth;
 use catoptric_model::{Dataset, Deflection, MirrorPlane, frame};
 use nalgebra::{DMatrix, DVector, Matrix2, Unit, Vector3};
 use std::collections::BTreeMap;
@@ -60,7 +64,7 @@ pub fn limit(
             .collect::<Vec<_>>();
         flat.push(flatness(&mean, &built, &places));
         for t in of_facet {
-            if let Some(poses) = work.boards_at(t.beam, facet, &mean, &t.deflection)
+            if let Some(poses) = choose::boards_at(&work, t.beam, facet, &mean, &t.deflection)
                 && !poses.is_empty()
             {
                 assigned.push(Assigned {
@@ -92,17 +96,16 @@ pub fn limit(
         figure: of_all(|f| f.figure),
         tau: of_all(|f| f.tau),
     };
-    let linear = least_squares::linearize(&joint.with_priors(&joint), &state).map_err(|problem| {
-        CalibError::Foreign {
+    let linear =
+        lsq::linearize(&joint.with_priors(&joint), &state).map_err(|problem| CalibError::Foreign {
             name: "limit".to_owned(),
             what: problem.to_string(),
-        }
-    })?;
+        })?;
     Ok(joint
         .covariances(&state, &linear.information)
         .into_iter()
         .map(|(beam, elevation, tangent)| {
-            let cos = crate::solve::libm_cos(elevation);
+            let cos = libm_cos(elevation);
             let scale = Matrix2::new(1.0 / cos, 0.0, 0.0, 1.0);
             (beam, tangent.map(|c| scale * c * scale))
         })

@@ -1,43 +1,17 @@
 //! One element at a point: what it should read of its boards, how far it departs from its facet, and how that changes.
 
-use super::problem::{BOARD_ERRORS, Element, FACET_PARAMETERS, FIGURE_ORDERS, Fan, Group, Joint};
-use crate::covariance::PlaneFit;
-use crate::jacobian;
-use crate::least_squares::{GroupJacobian, Point};
-use catoptric_model::bias::ColoredBias;
-use catoptric_model::{BoardPlane, frame};
-use nalgebra::{DVector, Dyn, Matrix2, Matrix3, OMatrix, Point3, U2, U6, Unit, Vector2, Vector3};
-
-/// Step of (range, cosine) over which a bias is differentiated: tables are linear over centimeters and degrees.
-const BIAS_STEP: f64 = 1e-4;
+use super::fan::Fan;
+use super::group::{BOARD_ERRORS, Element, FACET_PARAMETERS, FIGURE_ORDERS, Group};
+use super::placed::{Boards, Placed};
+use super::problem::Joint;
+use crate::lsq::{GroupJacobian, Point};
+use crate::readings::jacobian;
+use catoptric_model::frame;
+use nalgebra::{DVector, Dyn, Matrix2, OMatrix, Point3, U2, Unit, Vector2, Vector3};
 
 /// Rounds in which a beam's own departure settles, and the change that ends them, in radians.
 const DEPARTURE_ROUNDS: usize = 8;
 const SETTLED: f64 = 1e-14;
-
-/// Boards of a group in the sensor frame, and how w moves the sensor.
-pub(super) struct Boards<'j> {
-    pub(super) placed: Vec<Placed<'j>>,
-    pub(super) motion: OMatrix<f64, U6, Dyn>,
-}
-
-/// A board in the sensor frame with its errors.
-pub(super) struct Placed<'j> {
-    pub(super) plane: BoardPlane,
-    pub(super) fit: PlaneFit,
-    /// Height error of each of three unit errors, by (1, x, y).
-    pub(super) errors: Matrix3<f64>,
-    /// Drift, in metres.
-    pub(super) drift: f64,
-    pub(super) paint: Paint<'j>,
-}
-
-/// The believed biases on one color.
-pub(super) struct Paint<'j> {
-    bias: ColoredBias<'j>,
-    /// Where the color stands among the common errors.
-    place: Option<usize>,
-}
 
 /// An element linearized: prediction errors, and derivatives of the predicted range.
 pub(super) struct Linear {
@@ -75,23 +49,6 @@ pub(super) struct Weight<'l> {
     inner: Matrix2<f64>,
     /// ln det(I + τ²HᵀH).
     pub(super) log_determinant: f64,
-}
-
-impl<'j> Paint<'j> {
-    pub(super) fn of(joint: &'j Joint, color: &str) -> Self {
-        Self {
-            bias: joint.bias.on(color),
-            place: joint.common.place(color),
-        }
-    }
-
-    /// Derivatives of the biased range with respect to the range and to the cosine of the incidence.
-    fn slopes(&self, range: f64, cos: f64) -> (f64, f64) {
-        let at = |range: f64, cos: f64| self.bias.terms(range, cos).total();
-        let slope = (at(range + BIAS_STEP, cos) - at(range - BIAS_STEP, cos)) / (2.0 * BIAS_STEP);
-        let (low, high) = ((cos - BIAS_STEP).max(0.0), (cos + BIAS_STEP).min(1.0));
-        (1.0 + slope, (at(range, high) - at(range, low)) / (high - low))
-    }
 }
 
 impl Linear {

@@ -6,9 +6,10 @@
 //! Applications", 1988, section 6.1): it rises by k² over k standard deviations as far as the problem is linear, and by
 //! k²(1 ± 1/q)² where it bends, with q = δ̂ over the standard deviation.
 
+use super::group::Element;
 use super::linear::Linear;
-use super::problem::{Element, Joint};
-use crate::least_squares::{self, GroupJacobian, GroupedProblem, Point, Solution};
+use super::problem::Joint;
+use crate::lsq::{self, GroupJacobian, GroupedProblem, Point, Solution};
 use catoptric_model::frame;
 use nalgebra::{DVector, Matrix2, Vector2, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
@@ -26,7 +27,7 @@ pub(super) const STRAIGHT_SD: f64 = 0.1 * std::f64::consts::PI / 180.0;
 const HELD: f64 = 1e-2;
 
 /// How closely a profile is wanted: its rise is compared with a quarter.
-const SEARCH: least_squares::Options = least_squares::Options {
+const SEARCH: lsq::Options = lsq::Options {
     reduction_tolerance: 1e-6,
     step_tolerance: 1e-9,
     gradient_tolerance: 1e-9,
@@ -122,7 +123,7 @@ impl Joint<'_> {
             held: HELD * weakest.sd,
         };
         let problem = self.with_priors(&moved);
-        let profile = least_squares::minimize(&problem, solution.state.retract(&(step * k)), &SEARCH).ok()?;
+        let profile = lsq::minimize(&problem, solution.state.retract(&(step * k)), &SEARCH).ok()?;
         Some((profile.sum_of_squares - solution.sum_of_squares) / (k * k))
     }
 }

@@ -8,10 +8,10 @@
 //! Beam divergence bounds the lever s·tan α. A spot on a tilted board bends the leading edge by about κ(s·tan α)²,
 //! κ = k·σ_δ²/(2p), which no belief of a session covers; where that passes `UNMODELED` a longer lever is no gain.
 
-use super::Request;
+use super::request::Request;
 use super::situation::{Element, Fan, Situation, in_sensor};
 use crate::error::CalibError;
-use crate::observations::{BoardInSensor, cone_half_angle};
+use crate::readings::observations::{BoardInSensor, cone_half_angle};
 use catoptric_model::frame::tangent_basis;
 use catoptric_model::session::BoardSheet;
 use catoptric_model::{Pose, Session};

@@ -4,16 +4,18 @@
 //! C − (Cg)(Cg)ᵀ/(σ² + gᵀCg), whatever the order of boards. The angles start from a prior so wide that it does not count,
 //! so that elements without boards have a large but finite cost.
 
+use super::answer::{Open, Standing};
 use super::candidates::{Candidate, Site, candidates};
+use super::request::{Criterion, Request};
 use super::situation::{Element, Fan, Situation};
-use super::{Criterion, Open, Request, Standing, words};
-use crate::common::CommonErrors;
-use crate::covariance::{self, MountUncertainty, Sighting};
-use crate::element::LEAST_BOARDS;
+use super::words;
+use crate::element::attempt::LEAST_BOARDS;
 use crate::error::CalibError;
-use crate::observability::{self, WEAKEST_SD};
-use crate::observations::BoardView;
-use crate::solve::libm_cos;
+use crate::judge::common::CommonErrors;
+use crate::judge::covariance::{self, MountUncertainty, Sighting};
+use crate::judge::levers::libm_cos;
+use crate::judge::observability::{self, WEAKEST_SD};
+use crate::readings::observations::BoardView;
 use catoptric_model::Session;
 use nalgebra::{DMatrix, DVector, Matrix6};
 

@@ -1,12 +1,15 @@
 //! What the experimenter knows before the next pose: the drawing or what was recorded, never the truth.
 
-use crate::calibrate::{believable, calibrate, plane_as_built, plane_as_drawn, prepare};
-use crate::covariance::MountUncertainty;
+use crate::calibrate::calibrate;
+use crate::element::choose;
+use crate::element::facet_plane::{plane_as_built, plane_as_drawn};
 use crate::error::CalibError;
-use crate::observations::{BoardInSensor, azimuth, cone_half_angle};
+use crate::judge::covariance::MountUncertainty;
+use crate::mount::pose;
 use crate::options::{Method, Options};
-use crate::pose;
-use crate::spread;
+use crate::prepare::{believable, prepare};
+use crate::readings::observations::{BoardInSensor, azimuth, cone_half_angle};
+use crate::readings::spread;
 use catoptric_model::session::{BoardSheet, NominalFacet};
 use catoptric_model::{
     BoardPlane, Dataset, Deflection, MirrorPlane, Pose, PoseKind, PoseLabel, PoseRecord, Session, Status,
@@ -161,7 +164,7 @@ impl Situation {
                 if let Some(found) = estimate.and_then(|e| e.deflection()) {
                     element.deflection = found;
                 }
-                let hit = work.boards_at(element.beam, facet, &plane, &element.deflection);
+                let hit = choose::boards_at(&work, element.beam, facet, &plane, &element.deflection);
                 for pose in hit.unwrap_or_default() {
                     if let Some(number) = number_of[pose] {
                         let summary = &work.summaries[pose][element.beam];

@@ -1,8 +1,8 @@
 //! One facet in a room of 6 m: the search against the budget of the estimator, and what a design must never do.
 
 use super::*;
-use crate::covariance::{self, MountUncertainty};
-use crate::observations::BoardView;
+use crate::judge::covariance::{self, MountUncertainty};
+use crate::readings::observations::BoardView;
 use catoptric_model::frame::tangent_basis;
 use catoptric_model::session::*;
 use catoptric_model::{Pose, PoseData, RangeBias, beam};

@@ -1,7 +1,7 @@
 //! A pose as a person is told it, and runs of beams.
 
+use super::answer::{Open, PlannedPose, Standing};
 use super::candidates::Candidate;
-use super::{Open, PlannedPose, Standing};
 use catoptric_model::Pose;
 use catoptric_model::frame::tangent_basis;
 use nalgebra::{Unit, Vector3};

@@ -1,9 +1,9 @@
 //! Numbers that no good beam shows: no return, too close, of the structure, or spread too far in the known room.
 
-use super::Screen;
-use crate::observations::azimuth;
-use crate::spread;
-use catoptric_model::{PoseKind, PoseRecord, Summary, beam};
+use super::evidence::Screen;
+use crate::readings::observations::azimuth;
+use crate::readings::spread;
+use catoptric_model::{PoseKind, Summary, beam};
 use nalgebra::Point3;
 
 /// A reading this near is of the structure around the sensor, in metres, wherever the mirrors are.
@@ -12,7 +12,7 @@ const STRUCTURE_RANGE: f64 = 0.12;
 /// How far behind the farthest mirror point a reading is still of the structure, in metres.
 const STRUCTURE_DEPTH: f64 = 0.03;
 
-impl<'a> Screen<'a> {
+impl Screen<'_> {
     /// Numbers that no good beam shows, in words.
     pub(super) fn abnormal(&self, beam: usize, facets: &[usize]) -> Option<String> {
         let session = &self.dataset.session;
@@ -78,14 +78,5 @@ impl<'a> Screen<'a> {
             // Beyond its own polygon a facet's plane runs off to anywhere; mirrors stand within a hand of the sensor.
             .filter(|d| *d < 3.0 * STRUCTURE_RANGE)
             .fold(STRUCTURE_RANGE, f64::max)
-    }
-
-    /// All stretches with the mirrors on and nothing moving, with their statistics.
-    fn screened(&self) -> impl Iterator<Item = (&'a PoseRecord, &'a Vec<Summary>)> {
-        self.dataset
-            .poses
-            .iter()
-            .zip(self.summaries)
-            .filter(|(record, _)| record.label.kind.is_evidence())
     }
 }

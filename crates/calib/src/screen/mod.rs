@@ -2,20 +2,20 @@
 //! that no mirror touches would have read.
 
 mod abnormal;
+mod evidence;
 mod near;
 mod tally;
 
-use crate::common::CommonErrors;
-use crate::observations::BoardInSensor;
-use crate::pose::Mount;
-use catoptric_model::{Dataset, Pose, Summary};
-use nalgebra::Matrix6;
-
-pub use near::{EDGE_BEAMS, facets_near};
+use crate::mount::pose::Mount;
+use crate::readings::observations::BoardInSensor;
+use catoptric_model::{Dataset, Summary};
+use evidence::Screen;
+use near::facets_near;
+use rayon::prelude::*;
 
 /// What screening makes of an element.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Candidate {
+pub(crate) enum Candidate {
     /// It reads what a beam without a mirror reads; the text says how often.
     Direct(String),
     /// A mirror may deflect it: indices of facets, the likeliest first.
@@ -24,41 +24,21 @@ pub enum Candidate {
     Rejected(String),
 }
 
-/// The stretches of a dataset prepared for screening.
-pub struct Screen<'a> {
-    dataset: &'a Dataset,
-    summaries: &'a [Vec<Summary>],
-    /// Covariance of the mounting.
-    mount: Matrix6<f64>,
-    common: CommonErrors<'a>,
-    boards: &'a [Option<BoardInSensor>],
-    rooms_from_sensor: Vec<Pose>,
+/// The class of every element, in order; `boards` holds each pose's board in the sensor frame.
+pub(crate) fn candidates(
+    dataset: &Dataset,
+    summaries: &[Vec<Summary>],
+    mount: &Mount,
+    boards: &[Option<BoardInSensor>],
+) -> Vec<Candidate> {
+    let screen = Screen::new(dataset, summaries, mount, boards);
+    let beams = (0..dataset.session.scanner.beams).into_par_iter();
+    beams.map(|b| screen.classify(b)).collect()
 }
 
-impl<'a> Screen<'a> {
-    /// Prepares the stretches; `boards` holds each pose's board in the sensor frame.
-    pub fn new(
-        dataset: &'a Dataset,
-        summaries: &'a [Vec<Summary>],
-        mount: &'a Mount,
-        boards: &'a [Option<BoardInSensor>],
-    ) -> Self {
-        Self {
-            dataset,
-            summaries,
-            mount: mount.uncertainty.total(),
-            common: CommonErrors::of(&dataset.session),
-            boards,
-            rooms_from_sensor: dataset
-                .poses
-                .iter()
-                .map(|p| p.room_from_rig * mount.rig_from_sensor)
-                .collect(),
-        }
-    }
-
+impl Screen<'_> {
     /// The class of one element, from statistics alone.
-    pub fn classify(&self, beam: usize) -> Candidate {
+    fn classify(&self, beam: usize) -> Candidate {
         let session = &self.dataset.session;
         let facets = facets_near(&session.facets, beam);
         let tally = self.tally(beam, &facets);

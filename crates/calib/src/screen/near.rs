@@ -7,10 +7,10 @@ use catoptric_model::session::NominalFacet;
 /// At 65 mm a millimetre is 3.5 beams: an optical center a millimetre off in its housing, a facet half a millimetre and
 /// 1° off in its frame, and posts that hide an edge on the drawing add up to several. Being generous costs nothing:
 /// a beam that no mirror deflects is known by its readings, not by this.
-pub const EDGE_BEAMS: usize = 10;
+pub(super) const EDGE_BEAMS: usize = 10;
 
 /// The facets whose drawn range of beams is at most [`EDGE_BEAMS`] away, the nearest first.
-pub fn facets_near(facets: &[NominalFacet], beam: usize) -> Vec<usize> {
+pub(super) fn facets_near(facets: &[NominalFacet], beam: usize) -> Vec<usize> {
     let mut near: Vec<(usize, usize)> = facets
         .iter()
         .enumerate()

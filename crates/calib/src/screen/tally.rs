@@ -1,10 +1,10 @@
 //! How often a beam reads what is straight ahead of it: what an undeflected beam would have read, stretch by stretch.
 
-use super::Screen;
-use crate::ahead::{AGREEMENT_FLOOR, ahead};
-use crate::jacobian;
-use crate::observations::{azimuth, cone_half_angle};
-use crate::spread;
+use super::evidence::Screen;
+use crate::readings::ahead::{AGREEMENT_FLOOR, ahead};
+use crate::readings::jacobian;
+use crate::readings::observations::{azimuth, cone_half_angle};
+use crate::readings::spread;
 use catoptric_model::{PoseKind, Summary, beam};
 use nalgebra::Point3;
 

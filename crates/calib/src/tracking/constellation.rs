@@ -1,6 +1,6 @@
 //! Do the markers of a body stand to each other as its template says?
 
-use super::{Body, limit, solved};
+use super::body::{Body, limit, solved};
 use catoptric_model::{Pose, Watched};
 use nalgebra::{Point3, Vector3};
 

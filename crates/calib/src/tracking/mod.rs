@@ -5,33 +5,17 @@
 //! shows them there from the first frame to the last. What is off is said in words, pose by pose; where it is certain
 //! what happened, the pose is put right, else it is left out.
 
+mod body;
 mod constellation;
 mod movement;
 
+use body::{Body, body, name_of};
 use catoptric_model::dataset::RIG_SUBJECT;
-use catoptric_model::session::Marker;
-use catoptric_model::{Dataset, Pose, PoseKind, PoseRecord, Session, Watched};
+use catoptric_model::{Dataset, PoseKind, PoseRecord, Watched};
 use constellation::Misfit;
 use nalgebra::Point3;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-
-/// Standard normal deviate of the limits: exceeded by chance once in 10⁹.
-const SIGMAS: f64 = 6.0;
-
-/// χ² that is exceeded by chance once in 10⁹ (Wilson and Hilferty 1931).
-fn limit(degrees_of_freedom: usize) -> f64 {
-    let n = degrees_of_freedom as f64;
-    let root = 1.0 - 2.0 / (9.0 * n) + SIGMAS * (2.0 / (9.0 * n)).sqrt();
-    n * root * root * root
-}
-
-/// A tracked body as the session knows it.
-struct Body<'a> {
-    subject: &'a str,
-    markers: &'a [Marker],
-    template: Vec<Point3<f64>>,
-}
 
 /// What is wrong with one body in one pose.
 struct Finding {
@@ -115,23 +99,6 @@ pub fn put_right(dataset: &Dataset) -> (Cow<'_, Dataset>, Vec<String>) {
     (Cow::Owned(repaired), warnings)
 }
 
-/// The rig, or the board that was set up; other bodies are of no use here.
-fn body<'a>(session: &'a Session, record: &PoseRecord, subject: &str) -> Option<Body<'a>> {
-    let (subject, markers) = if subject == RIG_SUBJECT {
-        (RIG_SUBJECT, &session.rig_markers)
-    } else if record.label.board.as_deref() == Some(subject) {
-        let sheet = session.board(subject)?;
-        (sheet.name.as_str(), &sheet.markers)
-    } else {
-        return None;
-    };
-    Some(Body {
-        subject,
-        markers,
-        template: markers.iter().map(Marker::position).collect(),
-    })
-}
-
 fn examine(record: &PoseRecord, body: &Body<'_>, watched: &Watched, marker_sd: f64) -> Option<What> {
     if watched.parts.iter().any(|p| p.len() != body.template.len()) {
         return None;
@@ -170,34 +137,4 @@ fn without_templates_that_never_fit(
     let warnings = odd.iter().map(said).collect();
     let kept = |f: &Finding| !(unexplained(f) && odd.contains_key(&f.subject));
     (warnings, findings.into_iter().filter(kept).collect())
-}
-
-fn name_of(subject: &str) -> String {
-    if subject == RIG_SUBJECT {
-        "the rig".to_owned()
-    } else {
-        format!("board {subject:?}")
-    }
-}
-
-/// The pose of a body, and the squared distance of each marker from where it then should be.
-fn solved(template: &[Point3<f64>], seen: &[Option<Point3<f64>>]) -> Option<(Pose, Vec<f64>)> {
-    let pose = catoptric_model::tracking::solve_pose(template, seen)?;
-    let off = template.iter().zip(seen);
-    let squares = off.map(|(t, s)| s.map_or(0.0, |s| (s - pose * t).norm_squared()));
-    Some((pose, squares.collect()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_limit_is_six_sigma() {
-        // Exact quantiles at an upper tail of 0.987e-9, from the closed form for even degrees of freedom.
-        for (n, exact) in [(6, 53.373_68), (10, 62.976_24), (40, 118.721_77)] {
-            let over = limit(n) / exact;
-            assert!((1.0..1.07).contains(&over), "{n} degrees of freedom: {over}");
-        }
-    }
 }

@@ -1,6 +1,6 @@
 //! Did a body stay where it was while it was scanned?
 
-use super::{limit, solved};
+use super::body::{limit, solved};
 use catoptric_model::tracking::MeanMarker;
 use catoptric_model::{PoseRecord, Session, Watched};
 use nalgebra::{Point3, Vector3};

@@ -1,7 +1,7 @@
 //! Problems of Moré, Garbow, Hillstrom (1981), from their starts and from 10 and 100 times as far.
 
 use super::duals::{ByDuals, Formula};
-use catoptric_calib::least_squares::{Options, Point, Solution, Stop, minimize};
+use catoptric_calib::lsq::{Options, Point, Solution, Stop, minimize};
 use num_dual::DualNumCopy;
 
 struct Rosenbrock;

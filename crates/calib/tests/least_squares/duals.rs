@@ -1,6 +1,6 @@
 //! Problems written once for numbers and dual numbers; the Jacobian is exact.
 
-use catoptric_calib::least_squares::{Point, Problem};
+use catoptric_calib::lsq::{Point, Problem};
 use nalgebra::{DMatrix, DVector};
 use num_dual::{Dual64, DualNumCopy};
 

@@ -1,7 +1,7 @@
 //! Grouped problems: elimination gives what the dense matrix gives, at the size of a joint calibration.
 
 use super::sample::Sample;
-use catoptric_calib::least_squares::{
+use catoptric_calib::lsq::{
     Block, Flat, GroupJacobian, GroupedProblem, Options, Point, Prior, Problem, Reduced, State, WithPriors,
     linearize, minimize,
 };

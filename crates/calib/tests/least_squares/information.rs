@@ -1,7 +1,7 @@
 //! Rank, open directions and covariance, against finite differences and known null spaces.
 
 use super::duals::{ByDuals, Formula};
-use catoptric_calib::least_squares::{Options, Point, ProblemError, Solution, minimize};
+use catoptric_calib::lsq::{Options, Point, ProblemError, Solution, minimize};
 use nalgebra::{DMatrix, DVector};
 use num_dual::DualNumCopy;
 
@@ -157,7 +157,7 @@ fn what_cannot_be_solved_is_an_error() {
     assert!((found.state.shared.numbers(0).expect("numbers")[0] - 1.0).abs() < 1e-12);
 
     struct Narrow;
-    impl catoptric_calib::least_squares::Problem for Narrow {
+    impl catoptric_calib::lsq::Problem for Narrow {
         fn residuals(&self, _: &Point) -> Option<DVector<f64>> {
             Some(DVector::zeros(2))
         }

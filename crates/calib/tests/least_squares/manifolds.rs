@@ -1,7 +1,7 @@
 //! Laws of the retractions, and their derivatives against dual numbers.
 
 use super::sample::Sample;
-use catoptric_calib::least_squares::{Block, Options, Point, Problem, Stop, minimize};
+use catoptric_calib::lsq::{Block, Options, Point, Problem, Stop, minimize};
 use catoptric_model::Pose;
 use nalgebra::{DMatrix, DVector, Translation3, Unit, UnitQuaternion, Vector3};
 use num_dual::{Dual64, DualNumCopy};

@@ -4,7 +4,7 @@
 //! can reach, so its standard deviations are compared with the certified ‖f‖².
 
 use super::duals::{ByDuals, Formula};
-use catoptric_calib::least_squares::{Options, Point, minimize};
+use catoptric_calib::lsq::{Options, Point, minimize};
 use num_dual::DualNumCopy;
 use std::fs;
 use std::path::Path;

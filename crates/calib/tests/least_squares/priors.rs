@@ -1,7 +1,7 @@
 //! Priors against closed forms.
 
 use super::sample::Sample;
-use catoptric_calib::least_squares::{
+use catoptric_calib::lsq::{
     Block, GroupedProblem, Options, Point, Prior, Problem, State, WithPriors, minimize,
 };
 use catoptric_model::Pose;

@@ -2,7 +2,7 @@
 
 use super::duals::{ByDuals, Formula};
 use super::sample::Sample;
-use catoptric_calib::least_squares::{
+use catoptric_calib::lsq::{
     Block, Loss, Options, Point, Prior, RobustOptions, RobustSolution, Surrogate, WithPriors, gate, minimize,
     minimize_graduated, minimize_robust,
 };

@@ -13,6 +13,7 @@ mod simulate;
 mod study;
 #[cfg(feature = "design")]
 mod tolerance;
+#[cfg(feature = "recording")]
 mod trace;
 
 pub use calibrate::{calibrate, calibrate_with, characterize};
@@ -31,9 +32,12 @@ pub use plan::{PlanStart, completed_scene, plan, planned_scene, write_planned};
 #[cfg(feature = "recording")]
 pub use simulate::{Figures, Recording, simulate_into};
 pub use simulate::{simulate, simulate_with};
-pub use study::{STUDY_PAGE, merge_studies, study, study_into};
+pub use study::study;
+#[cfg(feature = "recording")]
+pub use study::{STUDY_PAGE, merge_studies, study_into};
 #[cfg(all(feature = "design", feature = "report"))]
 pub use tolerance::write_tolerance;
 #[cfg(feature = "design")]
 pub use tolerance::{TOLERANCE_PAGE, ToleranceOptions, tolerance};
+#[cfg(feature = "recording")]
 pub use trace::{MAX_BOUNCES, TraceFigures, trace};

@@ -6,7 +6,7 @@ use super::sub_rays;
 use super::tables::{READINGS_HEADER, RETURNS_HEADER};
 use crate::{Control, Error, Scene};
 use catoptric_files::folder::StagedFile;
-use catoptric_files::shell::quoted;
+use catoptric_files::paths::quoted;
 use catoptric_files::{DatasetWriter, IoError, Provenance, dataset, scene as scenes};
 use catoptric_model::beam;
 use catoptric_sim::{Laboratory, noise};

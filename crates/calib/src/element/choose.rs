@@ -1,0 +1,98 @@
+//! Which boards an element hits: those that hold its spot where the estimate puts it, and whose range agrees.
+
+use crate::element::attempt::{Attempt, LEAST_BOARDS, Workspace};
+use crate::readings::observations::{azimuth, cone_half_angle};
+use catoptric_model::session::NominalFacet;
+use catoptric_model::{BeamEstimate, Deflection, MirrorPlane, beam};
+
+/// Residual that is always taken as the board's own, in metres; a wall behind it differs by decimeters.
+pub(crate) const GATE_FLOOR: f64 = 0.03;
+
+/// Standard deviations within which a residual is taken as the board's own.
+pub(crate) const GATE_SIGMAS: f64 = 6.0;
+
+/// Board to spare around a spot once the direction is known, in metres.
+const EDGE_MARGIN: f64 = 5e-3;
+
+/// The poses whose board holds the beam and whose range agrees, for a direction known to `stage` radians.
+pub(crate) fn choose(attempt: &Attempt, at: &Deflection, stage: f64) -> Vec<usize> {
+    let strict = choose_within(attempt, at, stage, 0.0);
+    if strict.len() < LEAST_BOARDS && stage > 0.0 {
+        choose_within(attempt, at, stage, stage)
+    } else {
+        strict
+    }
+}
+
+/// `overhang` lets the predicted hit lie that far, in radians of direction, outside the board.
+fn choose_within(attempt: &Attempt, at: &Deflection, stage: f64, overhang: f64) -> Vec<usize> {
+    let (origin, v) = (
+        at.deflection_point(attempt.azimuth),
+        at.exit_direction(attempt.azimuth),
+    );
+    let cone = cone_half_angle(attempt.session);
+    let agrees = |pose: &usize| {
+        let board = attempt.work.boards[*pose].as_ref()?;
+        let hit = board.hit(&origin, &v)?;
+        let cos_incidence = board.plane.cos_incidence(&v);
+        let tan = (1.0 / (cos_incidence * cos_incidence) - 1.0).max(0.0).sqrt();
+        // While the direction is a guess, the chief ray on the board is enough; later the whole spot has to be.
+        let (radius, margin) = if stage > 0.0 {
+            (0.0, -overhang * hit.distance / cos_incidence)
+        } else {
+            (cone * (at.distance + hit.distance), EDGE_MARGIN)
+        };
+        if !board.holds(&hit, radius, margin) {
+            return None;
+        }
+        let observation = attempt.observations(&[*pose]);
+        let residual = attempt.element(&observation).residuals(at)?.first()?.abs();
+        let gate = GATE_FLOOR + stage * hit.distance * tan;
+        let inside = residual <= gate
+            || residual
+                <= stage * hit.distance * tan
+                    + GATE_SIGMAS * attempt.budget(at, &observation)?.covariance[(0, 0)].sqrt();
+        inside.then_some(())
+    };
+    attempt
+        .usable
+        .iter()
+        .copied()
+        .filter(|p| agrees(p).is_some())
+        .collect()
+}
+
+/// The stretches whose boards an element hits, where its estimate or else its facet's plane puts it.
+pub(crate) fn boards_hit(
+    work: &Workspace,
+    estimate: &BeamEstimate,
+    facet: &NominalFacet,
+    mirror: &MirrorPlane,
+) -> Option<Vec<usize>> {
+    let session = &work.dataset.session;
+    let by_plane = mirror.deflect(beam::direction(azimuth(session, estimate.beam)))?;
+    boards_at(
+        work,
+        estimate.beam,
+        facet,
+        mirror,
+        &estimate.deflection().unwrap_or(by_plane),
+    )
+}
+
+/// The stretches whose boards an element of a facet hits with a known deflection.
+pub(crate) fn boards_at(
+    work: &Workspace,
+    beam: usize,
+    facet: &NominalFacet,
+    mirror: &MirrorPlane,
+    at: &Deflection,
+) -> Option<Vec<usize>> {
+    let session = &work.dataset.session;
+    let by_plane = mirror.deflect(beam::direction(azimuth(session, beam)))?;
+    Some(choose(
+        &Attempt::new(work, session, beam, facet, &by_plane),
+        at,
+        0.0,
+    ))
+}

@@ -1,0 +1,212 @@
+//! One element from its readings to its estimate: boards and angles chosen in turn until both stand.
+
+use crate::element::attempt::{Attempt, Failure, Fit, LEAST_BOARDS, Workspace, lost};
+use crate::element::choose::choose;
+use crate::element::gls::generalized;
+use crate::element::initial::{self, FARTHEST_START};
+use crate::element::recursive::recursive;
+use crate::element::solve::{self, Element, Solution};
+use crate::element::verdict::{judge, residuals_agree};
+use crate::options::Method;
+use crate::readings::locate;
+use crate::readings::observations::azimuth;
+use crate::screen::Candidate;
+use catoptric_model::session::NominalFacet;
+use catoptric_model::{BeamEstimate, Deflection, MirrorPlane, Status, beam};
+use rayon::prelude::*;
+
+/// Direction errors allowed for while the boards of an element are chosen, in radians, from the drawing's to none.
+///
+/// A mirror doubles its tilt: 1° (1σ) of the facet and up to 1° of the scanner in its housing turn a beam by 8° now
+/// and then.
+const STAGES: [f64; 8] = [0.15, 0.05, 0.02, 0.007, 0.0, 0.0, 0.0, 0.0];
+
+/// How far a solution may end from the estimate that its boards were chosen with, in radians.
+const FARTHEST_END: f64 = 0.007;
+
+/// Largest ||v| − 1| of a start in closed form that is believed.
+const LARGEST_EXCESS: f64 = 0.2;
+
+/// The estimate of every element, with facets at the given planes.
+pub(crate) fn estimates(
+    work: &Workspace,
+    candidates: &[Candidate],
+    mirrors: &[MirrorPlane],
+) -> Vec<BeamEstimate> {
+    let facets = &work.dataset.session.facets;
+    let of_one = |(beam, candidate): (usize, &Candidate)| match candidate {
+        Candidate::Direct(reason) => BeamEstimate::without_angles(beam, Status::Direct, Some(reason.clone())),
+        Candidate::Rejected(reason) => {
+            BeamEstimate::without_angles(beam, Status::Rejected, Some(reason.clone()))
+        }
+        Candidate::Deflected(near) => {
+            let mut tried = near
+                .iter()
+                .map(|f| estimate(work, beam, &facets[*f], &mirrors[*f]));
+            let nearest = tried.next();
+            match nearest {
+                Some(solved) if solved.status == Status::Solved => solved,
+                // At the seam of two facets the neighbor may be the one that was met.
+                other => tried
+                    .find(|e| e.status == Status::Solved)
+                    .or(other)
+                    .unwrap_or_else(|| {
+                        let reason = "no facet is near it".to_owned();
+                        BeamEstimate::without_angles(beam, Status::Rejected, Some(reason))
+                    }),
+            }
+        }
+    };
+    candidates.par_iter().enumerate().map(of_one).collect()
+}
+
+/// The estimate of one element on a facet whose plane is believed to be `mirror`.
+fn estimate(work: &Workspace, beam: usize, facet: &NominalFacet, mirror: &MirrorPlane) -> BeamEstimate {
+    let session = &work.dataset.session;
+    let azimuth = azimuth(session, beam);
+    let without = |status, reason| BeamEstimate {
+        facet: Some(facet.name.clone()),
+        ..BeamEstimate::without_angles(beam, status, Some(reason))
+    };
+    let Some(nominal) = mirror.deflect(beam::direction(azimuth)) else {
+        let reason = format!("the plane of facet {:?} does not face it", facet.name);
+        return without(Status::Rejected, reason);
+    };
+    let attempt = Attempt::new(work, session, beam, facet, &nominal);
+    let mut estimate = match fit(&attempt, &nominal) {
+        Ok(fit) => judge(&attempt, &fit).unwrap_or_else(|f| without(f.status, f.reason)),
+        Err(failure) => without(failure.status, failure.reason),
+    };
+    if matches!(estimate.status, Status::TooFewPoses | Status::NotConverged) {
+        // A solver that wandered off may only have had nothing to hold on to.
+        let chosen = choose(&attempt, &nominal, STAGES[0]);
+        if chosen.len() >= LEAST_BOARDS
+            && let Some(weakness) = attempt.weakness(&nominal, &chosen)
+        {
+            estimate = without(Status::Unobservable, weakness.reason.clone());
+            estimate.null_direction = Some(weakness.null_direction);
+            estimate.poses = Some(chosen.len());
+        }
+    }
+    estimate
+}
+
+/// Chooses boards and solves, ever more strictly, until the choice no longer changes.
+fn fit(attempt: &Attempt, nominal: &Deflection) -> Result<Fit, Failure> {
+    let mut at = Element::place(&attempt.element(&[]), nominal.azimuth, nominal.elevation);
+    let mut poses = Vec::new();
+    let mut start = at;
+    for (round, stage) in STAGES.iter().enumerate() {
+        let chosen = choose(attempt, &at, *stage);
+        if chosen.len() < LEAST_BOARDS {
+            return Err(too_few(attempt, chosen.len()));
+        }
+        if *stage == 0.0 && chosen == poses {
+            break;
+        }
+        poses = chosen;
+        let observations = attempt.observations(&poses);
+        let element = attempt.element(&observations);
+        if round == 0 {
+            start = first_guess(attempt, &element, nominal);
+            at = start;
+        }
+        at = solve::batch(&element, &at, attempt.work.options)
+            .ok_or_else(lost)?
+            .deflection;
+    }
+    let fit = by_method(attempt, poses, &start, &at)?;
+    if fit.poses.len() > LEAST_BOARDS && !residuals_agree(attempt, &fit) {
+        // One foreign surface among the boards pulls the rest along; without it, it stands out.
+        if let Some(better) = without_one(attempt, &fit) {
+            return Ok(better);
+        }
+    }
+    Ok(fit)
+}
+
+/// The solution by the method asked for, from the start; from the present estimate if that does not settle.
+fn by_method(
+    attempt: &Attempt,
+    poses: Vec<usize>,
+    start: &Deflection,
+    at: &Deflection,
+) -> Result<Fit, Failure> {
+    let observations = attempt.observations(&poses);
+    let element = attempt.element(&observations);
+    let options = attempt.work.options;
+    let run = |from: &Deflection| match attempt.work.method {
+        Method::BeamGls => generalized(attempt, &element, from),
+        Method::ClosedForm => without_iteration(attempt, &element, at),
+        Method::Recursive => {
+            let readings: Vec<Vec<f64>> = poses
+                .iter()
+                .map(|p| {
+                    let record = &attempt.work.dataset.poses[*p];
+                    locate::kept(record, attempt.beam, attempt.summary(*p), attempt.noise)
+                })
+                .collect();
+            // Where the readings leave a direction open there is nothing to recurse on; the batch says which.
+            recursive(&element, &readings, from, options).or_else(|| solve::batch(&element, from, options))
+        }
+        Method::Beam | Method::Facet | Method::Joint | Method::Prior => solve::batch(&element, from, options),
+    };
+    let near = |s: &Solution| {
+        let (a, b) = (
+            s.deflection.exit_direction(attempt.azimuth),
+            at.exit_direction(attempt.azimuth),
+        );
+        s.converged && beam::angle_between(&a, &b) < FARTHEST_END
+    };
+    let solution = run(start).filter(near).or_else(|| run(at)).ok_or_else(lost)?;
+    Ok(Fit {
+        poses,
+        solution,
+        start: *start,
+    })
+}
+
+/// The closed form as the answer, its mirror and biases placed by the estimate that the boards were chosen with.
+fn without_iteration(attempt: &Attempt, element: &Element, at: &Deflection) -> Option<Solution> {
+    let found = initial::closed_form(at, attempt.azimuth, element.observations, element.bias)?;
+    let at = Deflection::from_exit(attempt.azimuth, &found.direction, at.distance);
+    element.finish(&element.place(at.azimuth, at.elevation), 0, true)
+}
+
+/// The start in closed form where it is to be believed, else the drawing.
+fn first_guess(attempt: &Attempt, element: &Element, nominal: &Deflection) -> Deflection {
+    let found = initial::closed_form(nominal, attempt.azimuth, element.observations, element.bias);
+    let v = nominal.exit_direction(attempt.azimuth);
+    found
+        .filter(|f| f.excess.abs() < LARGEST_EXCESS && beam::angle_between(&f.direction, &v) < FARTHEST_START)
+        .map_or(*nominal, |f| {
+            Deflection::from_exit(attempt.azimuth, &f.direction, nominal.distance)
+        })
+}
+
+/// A consistent solution without one of the boards, if that board is then plainly not what the element read.
+fn without_one(attempt: &Attempt, fit: &Fit) -> Option<Fit> {
+    let fits = fit.poses.iter().filter_map(|omitted| {
+        let rest: Vec<usize> = fit.poses.iter().copied().filter(|p| p != omitted).collect();
+        let observations = attempt.observations(&rest);
+        let at = solve::batch(&attempt.element(&observations), &fit.start, attempt.work.options)?.deflection;
+        if choose(attempt, &at, 0.0) != rest {
+            return None;
+        }
+        let fit = by_method(attempt, rest, &fit.start, &at).ok()?;
+        residuals_agree(attempt, &fit).then_some(fit)
+    });
+    fits.min_by(|a, b| a.rms().total_cmp(&b.rms()))
+}
+
+fn too_few(attempt: &Attempt, chosen: usize) -> Failure {
+    Failure {
+        status: Status::TooFewPoses,
+        reason: format!(
+            "{LEAST_BOARDS} boards are needed; of {} set up for facet {:?} it read {} in order and hit {chosen}",
+            attempt.recorded,
+            attempt.facet.name,
+            attempt.usable.len()
+        ),
+    }
+}

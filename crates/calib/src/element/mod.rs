@@ -1,0 +1,17 @@
+//! One element by itself (steps 11 and 12): which boards it hits, its angles by each method, and whether they are to be
+//! believed (step 13).
+
+mod ambiguity;
+pub(crate) mod attempt;
+pub(crate) mod choose;
+mod drawn;
+mod estimate;
+pub(crate) mod facet_plane;
+mod gls;
+pub mod initial;
+pub mod recursive;
+pub mod solve;
+mod verdict;
+
+pub(crate) use drawn::as_drawn;
+pub(crate) use estimate::estimates;

@@ -1,0 +1,254 @@
+//! Where the sensor sits in the rig (step 5), from boards before beams that no mirror deflects.
+//!
+//! The tracked board predicts the range of a beam from the origin, r = n·c/(n·u), for any mounting `rig_from_sensor`;
+//! Gauss–Newton over small motions of the sensor makes the predictions meet the corrected ranges. The readings of one
+//! board share its drift and its markers' error, so each board is weighted by its whole covariance (Woodbury), not
+//! reading by reading.
+
+use crate::judge::covariance::MountUncertainty;
+use crate::mount::mount_data::{DirectBoard, Selection, Selector};
+use catoptric_model::session::MountTolerance;
+use catoptric_model::{Dataset, Pose, PoseData, Summary, calibration::MountEstimate};
+use nalgebra::{
+    DMatrix, Dyn, Matrix6, OMatrix, SymmetricEigen, Translation3, U6, UnitQuaternion, Vector3, Vector6,
+};
+
+/// A step shorter than this (metres and radians alike) ends the iteration: some roundings of a pose.
+const STEP_TOLERANCE: f64 = 1e-14;
+
+/// Below this length a step that no longer shrinks is rounding, and the iteration has ended.
+const ROUNDING_STEP: f64 = 1e-11;
+
+/// Steps of one iteration, at most.
+const MAX_STEPS: usize = 50;
+
+/// Rounds of choosing beams and solving, at most.
+const MAX_ROUNDS: usize = 12;
+
+/// Smallest tolerance taken as a prior, in radians and metres: a drawing is never better than 0.1° and 1 mm.
+const LEAST_TOLERANCE: [f64; 2] = [1.745e-3, 1e-3];
+
+/// Tolerance, in radians and metres, that stands for none: a mounting that was measured and is known.
+const NO_TOLERANCE: f64 = 1e-9;
+
+/// The mounting of the sensor as estimated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mount {
+    /// Takes coordinates in the sensor frame to the rig as tracked.
+    pub rig_from_sensor: Pose,
+    /// How well it is known.
+    pub uncertainty: MountUncertainty,
+    /// Boards used.
+    pub boards: usize,
+    /// Means of a beam over a board used.
+    pub sightings: usize,
+    /// Motions, of six, that the boards did not determine to better than the mount tolerance, which then stands in.
+    pub undetermined: usize,
+    /// The boards and the beams on them.
+    pub(crate) selection: Vec<DirectBoard>,
+}
+
+/// Sums of the weighted least squares at one mounting.
+struct NormalEquations {
+    information: Matrix6<f64>,
+    right: Vector6<f64>,
+    /// JᵀΣ⁻¹ times the change of the residuals by one standard deviation of each common error.
+    common: OMatrix<f64, U6, Dyn>,
+}
+
+/// The drawing's word on the mounting, used only along motions that the boards leave open.
+pub(crate) struct Prior {
+    pub(crate) nominal: Pose,
+    /// 1σ of each motion: shifts, then turns.
+    pub(crate) sd: Vector6<f64>,
+}
+
+/// Estimates the mounting from the poses recorded for it; `summaries` holds every pose's statistics by beam.
+///
+/// Without boards, or along motions that they do not determine, the answer is the nominal mounting with the session's
+/// tolerance, and its covariance says so. A well determined mounting is not drawn towards the nominal one.
+pub fn estimate(dataset: &Dataset, summaries: &[Vec<Summary>]) -> Mount {
+    let session = &dataset.session;
+    let prior = Prior::of(
+        &Pose::from(&session.nominal_rig_from_sensor),
+        &session.mount_tolerance,
+    );
+    let selector = Selector::new(dataset, summaries);
+    let mut rig_from_sensor = prior.nominal;
+    let mut selection = selector.select(&rig_from_sensor, &Selection::initial(&session.mount_tolerance));
+    let mut stage = Selection::initial(&session.mount_tolerance);
+    for _ in 0..MAX_ROUNDS {
+        rig_from_sensor = solve(&selection, &rig_from_sensor, &prior, &selector);
+        stage = stage.narrower();
+        let next = selector.select(&rig_from_sensor, &stage);
+        let same = same_beams(&next, &selection);
+        selection = next;
+        if same && stage.is_narrowest() {
+            break;
+        }
+    }
+    rig_from_sensor = solve(&selection, &rig_from_sensor, &prior, &selector);
+    let sums = normal_equations(&selection, &rig_from_sensor, &selector);
+    let (information, undetermined) = prior.complete(&sums.information);
+    // Positive definite: completed along every motion that the boards leave open.
+    let independent = information.try_inverse().unwrap_or_else(|| prior.covariance());
+    let common = -(independent * sums.common);
+    Mount {
+        rig_from_sensor,
+        uncertainty: MountUncertainty { independent, common },
+        boards: selection.len(),
+        sightings: selection.iter().map(|b| b.rays.len()).sum(),
+        undetermined,
+        selection,
+    }
+}
+
+impl Mount {
+    /// The mounting as the calibration file holds it.
+    pub fn to_file(&self) -> MountEstimate {
+        let data = PoseData::from(&self.rig_from_sensor);
+        let total = self.uncertainty.total();
+        let mut covariance = [[0.0; 6]; 6];
+        for (row, values) in covariance.iter_mut().enumerate() {
+            for (column, value) in values.iter_mut().enumerate() {
+                // Halved over both sides of the diagonal: symmetric to the last bit.
+                *value = 0.5 * (total[(row, column)] + total[(column, row)]);
+            }
+        }
+        MountEstimate {
+            translation_m: data.translation_m,
+            rotation_xyzw: data.rotation_xyzw,
+            covariance: Some(covariance),
+        }
+    }
+}
+
+/// The mounting moved by a small motion of the sensor about its own axes.
+pub fn moved(rig_from_sensor: &Pose, motion: &Vector6<f64>) -> Pose {
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(motion[3], motion[4], motion[5]));
+    let mut pose =
+        rig_from_sensor * Pose::from_parts(Translation3::new(motion[0], motion[1], motion[2]), turn);
+    pose.rotation.renormalize();
+    pose
+}
+
+/// The small motion that takes one mounting to another, about the first one's axes.
+pub fn motion_between(from: &Pose, to: &Pose) -> Vector6<f64> {
+    let between = from.inverse() * to;
+    let (t, w) = (between.translation.vector, between.rotation.scaled_axis());
+    Vector6::new(t.x, t.y, t.z, w.x, w.y, w.z)
+}
+
+/// Whether two selections hold the same beams of the same poses.
+pub(crate) fn same_beams(a: &[DirectBoard], b: &[DirectBoard]) -> bool {
+    let beams = |s: &[DirectBoard]| -> Vec<(usize, usize)> {
+        s.iter()
+            .flat_map(|board| board.rays.iter().map(|r| (board.pose, r.beam)))
+            .collect()
+    };
+    beams(a) == beams(b)
+}
+
+/// Gauss–Newton over a fixed selection of beams.
+fn solve(selection: &[DirectBoard], start: &Pose, prior: &Prior, selector: &Selector) -> Pose {
+    let mut pose = *start;
+    let mut last = f64::INFINITY;
+    for _ in 0..MAX_STEPS {
+        let sums = normal_equations(selection, &pose, selector);
+        let step = prior.step(&sums, &pose);
+        pose = moved(&pose, &step);
+        let length = step.norm();
+        if length < STEP_TOLERANCE || (length < ROUNDING_STEP && length >= last) {
+            break;
+        }
+        last = length;
+    }
+    pose
+}
+
+fn normal_equations(
+    selection: &[DirectBoard],
+    rig_from_sensor: &Pose,
+    selector: &Selector,
+) -> NormalEquations {
+    let width = selector.common.len();
+    let mut sums = NormalEquations {
+        information: Matrix6::zeros(),
+        right: Vector6::zeros(),
+        common: OMatrix::<f64, U6, Dyn>::zeros(width),
+    };
+    for board in selection {
+        let Some(block) = selector.linearize(board, rig_from_sensor) else {
+            continue;
+        };
+        let mut right_side = DMatrix::zeros(block.sightings.len(), 7 + width);
+        right_side.columns_mut(0, 6).copy_from(&block.jacobian);
+        for (row, seen) in block.sightings.iter().enumerate() {
+            right_side[(row, 6)] = selector.corrected(seen, &block.color).0 - seen.distance;
+            let common = selector
+                .common
+                .row(seen.distance, seen.cos_incidence, &block.color);
+            right_side.view_mut((row, 7), (1, width)).copy_from(&common);
+        }
+        let products = block.jacobian.transpose() * block.weighted(&right_side);
+        sums.information += products.fixed_view::<6, 6>(0, 0);
+        sums.right += products.column(6);
+        sums.common += products.columns(7, width);
+    }
+    sums
+}
+
+impl Prior {
+    pub(crate) fn of(nominal: &Pose, tolerance: &MountTolerance) -> Self {
+        // None at all says that the mounting is known, not that it was drawn with care.
+        let least = |sd: f64, least: f64| if sd == 0.0 { NO_TOLERANCE } else { sd.max(least) };
+        let shift = tolerance
+            .translation_sd_mm
+            .map(|mm| least(mm * 1e-3, LEAST_TOLERANCE[1]));
+        let turn = tolerance
+            .rotation_sd_deg
+            .map(|deg| least(deg.to_radians(), LEAST_TOLERANCE[0]));
+        Self {
+            nominal: *nominal,
+            sd: Vector6::new(shift[0], shift[1], shift[2], turn[0], turn[1], turn[2]),
+        }
+    }
+
+    fn covariance(&self) -> Matrix6<f64> {
+        Matrix6::from_diagonal(&self.sd.component_mul(&self.sd))
+    }
+
+    /// Projector, in units of the tolerance, onto the motions about which the boards say less than the drawing.
+    fn open_motions(&self, information: &Matrix6<f64>) -> (Matrix6<f64>, usize) {
+        let scale = Matrix6::from_diagonal(&self.sd);
+        let eigen = SymmetricEigen::new(scale * information * scale);
+        let mut projector = Matrix6::zeros();
+        let mut count = 0;
+        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            if *value < 1.0 {
+                projector += vector * vector.transpose();
+                count += 1;
+            }
+        }
+        (projector, count)
+    }
+
+    /// The information with the prior's added along open motions, and how many those are.
+    fn complete(&self, information: &Matrix6<f64>) -> (Matrix6<f64>, usize) {
+        let (projector, count) = self.open_motions(information);
+        let unscale = Matrix6::from_diagonal(&self.sd.map(|sd| 1.0 / sd));
+        (information + unscale * projector * unscale, count)
+    }
+
+    fn step(&self, sums: &NormalEquations, pose: &Pose) -> Vector6<f64> {
+        let (projector, _) = self.open_motions(&sums.information);
+        let scale = Matrix6::from_diagonal(&self.sd);
+        let deviation = motion_between(&self.nominal, pose).component_div(&self.sd);
+        let information = scale * sums.information * scale + projector;
+        let right = scale * sums.right - projector * deviation;
+        let solved = information
+            .cholesky()
+            .map_or_else(Vector6::zeros, |c| c.solve(&right));
+        scale * solved
+    }
+}

@@ -1,0 +1,91 @@
+//! What a plan says: poses facet by facet, and what each of them changes.
+
+use super::request::Criterion;
+use serde::Serialize;
+
+/// Version of what a plan is written as.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// The poses to record next.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Plan {
+    /// Version of this format.
+    pub schema_version: u32,
+    /// What was to be small.
+    pub criterion: Criterion,
+    /// Facet by facet.
+    pub facets: Vec<FacetPlan>,
+}
+
+/// The poses to record next before one facet.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FacetPlan {
+    /// The facet.
+    pub facet: String,
+    /// Poses of the sequence that were possible.
+    pub candidates: usize,
+    /// Before any of the poses.
+    pub before: Standing,
+    /// After all of them.
+    pub after: Standing,
+    /// The poses, the most informative first.
+    pub poses: Vec<PlannedPose>,
+    /// Elements that are open before the first pose, and why.
+    pub lacking: Vec<Open>,
+    /// Elements that are open after the last pose, and why.
+    pub open: Vec<Open>,
+}
+
+/// How well the elements of a facet are determined.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Standing {
+    /// Elements whose boards determine both angles.
+    pub determined: usize,
+    /// Elements whose boards do not.
+    pub open: usize,
+    /// Root mean square of the bound over the determined elements, in degrees per axis, the mounting taken as known;
+    /// `None` if there is none.
+    pub bound_deg: Option<f64>,
+    /// The same with the mounting as well known as it is.
+    pub bound_with_mounting_deg: Option<f64>,
+}
+
+/// One board pose to record.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlannedPose {
+    /// The board.
+    pub board: String,
+    /// Center of its face in the room, in metres.
+    pub center_m: [f64; 3],
+    /// Normal of its face in the room.
+    pub normal: [f64; 3],
+    /// Turn about the normal, in degrees; at 0 the board's x axis is horizontal.
+    pub turn_deg: f64,
+    /// The board's attitude in the room as yaw, pitch and roll, in degrees.
+    pub yaw_pitch_roll_deg: [f64; 3],
+    /// Beam that the center is on.
+    pub beam: usize,
+    /// Way from the mirror to the center, in metres.
+    pub range_m: f64,
+    /// Tilt against that beam, in degrees.
+    pub tilt_deg: f64,
+    /// Direction to which the normal leans, seen along that beam, in degrees: 0 to growing azimuth, 90 up.
+    pub direction_deg: f64,
+    /// The same in words.
+    pub words: String,
+    /// First and last of each run of beams that the board serves.
+    pub beams: Vec<[usize; 2]>,
+    /// Before this pose, with the poses above.
+    pub before: Standing,
+    /// With this pose.
+    pub after: Standing,
+}
+
+/// Neighboring elements that are open for the same reason.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Open {
+    /// First and last beam.
+    pub beams: [usize; 2],
+    /// Why.
+    pub reason: String,
+}

@@ -1,0 +1,169 @@
+//! Where a beam's readings of one stretch lie, when some of them are of something else.
+//!
+//! Another scanner's pulses, dust or a passer-by throw single readings far off, and a mean goes with them. Readings that
+//! all lie where noise puts them are averaged as they are. Otherwise their main body is sought, from the median outward;
+//! it stands for the beam as long as no more readings lie outside than happens to other beams. A beam that reads two
+//! surfaces by turns has more, keeps its wide spread and is judged by that (step 4).
+
+use crate::readings::spread;
+use catoptric_model::{Dataset, PoseRecord, Summary, Window};
+use rayon::prelude::*;
+
+/// One beam in so many, those with most readings outside, does not count when it is asked how often that happens.
+const LEFT_OUT: usize = 4;
+
+/// Standard deviations by which a beam may have more readings outside than others.
+const CHANCE_SIGMAS: f64 = 5.0;
+
+/// Readings, and part of a beam's readings, that may be outside in any case.
+const FREE: f64 = 3.0;
+const FREE_PART: f64 = 0.05;
+
+/// Statistics of every beam in every stretch: of its main body, where it has one beside outliers.
+pub fn summaries(dataset: &Dataset) -> Vec<Vec<Summary>> {
+    let noise = dataset.session.believed.range_noise_sd_mm * 1e-3;
+    let plain: Vec<Vec<Summary>> = dataset.poses.par_iter().map(PoseRecord::summarize).collect();
+    let robust: Vec<Vec<Option<Summary>>> = dataset
+        .poses
+        .par_iter()
+        .zip(&plain)
+        .map(|(record, plain)| {
+            let strays = strays(record, plain, noise);
+            let one = |beam: usize| {
+                strays[beam]
+                    .then(|| Summary::of_main_body(record.readings(beam), noise))
+                    .flatten()
+            };
+            (0..record.beams).map(one).collect()
+        })
+        .collect();
+    let usual = usual_share(&plain, &robust);
+    let choose = |(plain, robust): (Vec<Summary>, Vec<Option<Summary>>)| {
+        let of_one = |(plain, robust): (Summary, Option<Summary>)| match robust {
+            Some(found) if is_chance(&found, usual) && !spread::is_abnormal(&found, noise) => found,
+            _ => plain,
+        };
+        plain.into_iter().zip(robust).map(of_one).collect()
+    };
+    plain.into_iter().zip(robust).map(choose).collect()
+}
+
+/// The readings of a beam without its outliers, where its summary leaves some out.
+pub(crate) fn kept(record: &PoseRecord, beam: usize, summary: &Summary, noise: f64) -> Vec<f64> {
+    let window = (summary.outliers > 0)
+        .then(|| Window::around(record.readings(beam), noise))
+        .flatten();
+    let inside = |r: &f64| window.is_none_or(|w| w.holds(*r));
+    record
+        .readings(beam)
+        .filter(|r| r.is_finite())
+        .filter(inside)
+        .collect()
+}
+
+/// Whether some reading lies farther out than noise throws any, or all of them too far apart; of every beam.
+fn strays(record: &PoseRecord, plain: &[Summary], noise: f64) -> Vec<bool> {
+    let mut strays: Vec<bool> = plain.iter().map(|s| spread::is_abnormal(s, noise)).collect();
+    let far = Window::half_width(spread::largest_spread(noise, usize::MAX));
+    for scan in record.ranges.chunks(record.beams.max(1)) {
+        for ((stray, r), of) in strays.iter_mut().zip(scan).zip(plain) {
+            *stray |= r.is_finite() && (r - of.mean).abs() > far;
+        }
+    }
+    strays
+}
+
+/// How large a part of a beam's readings is usually outside.
+fn usual_share(plain: &[Vec<Summary>], robust: &[Vec<Option<Summary>>]) -> f64 {
+    let pairs = plain.iter().flatten().zip(robust.iter().flatten());
+    let mut shares: Vec<f64> = pairs
+        .filter(|(plain, _)| plain.count > plain.missing)
+        .map(|(plain, robust)| robust.map_or(0.0, |r| r.outliers as f64 / plain.count as f64))
+        .collect();
+    shares.sort_by(f64::total_cmp);
+    let counted = shares.len() - shares.len() / LEFT_OUT;
+    shares[..counted].iter().sum::<f64>() / counted.max(1) as f64
+}
+
+/// Whether a beam has no more readings outside than chance gives it, where others have a share of that size outside.
+fn is_chance(found: &Summary, usual: f64) -> bool {
+    let n = (found.count + found.outliers) as f64;
+    let free = FREE.min(FREE_PART * n);
+    found.outliers as f64 <= n * usual + CHANCE_SIGMAS * (n * usual * (1.0 - usual)).sqrt() + free
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use catoptric_model::{Pose, PoseKind, PoseLabel};
+
+    /// One stretch of some beams, each with its readings.
+    fn record(beams: &[Vec<f64>]) -> PoseRecord {
+        let scans = beams[0].len();
+        PoseRecord {
+            label: PoseLabel::of(0, PoseKind::Room, scans),
+            room_from_rig: Pose::identity(),
+            room_from_board: None,
+            motion: None,
+            watched: Vec::new(),
+            beams: beams.len(),
+            ranges: (0..scans).flat_map(|s| beams.iter().map(move |b| b[s])).collect(),
+        }
+    }
+
+    /// A hundred readings of 2 m with 4 mm of something like noise, some of them off by 0.3 m either way.
+    fn readings(outliers: usize) -> Vec<f64> {
+        let noise = |i: usize| 0.004 * (((i * 37) % 100) as f64 / 50.0 - 0.99) * 3.0_f64.sqrt();
+        let step = |i: usize| if i.is_multiple_of(2) { 0.3 } else { -0.3 };
+        (0..100)
+            .map(|i| 2.0 + noise(i) + if i < outliers { step(i) } else { 0.0 })
+            .collect()
+    }
+
+    #[test]
+    fn the_main_body_of_readings_is_found() {
+        let record = record(&[readings(15), readings(0), readings(45)]);
+        let found = Summary::of_main_body(record.readings(0), 0.004).expect("most readings are together");
+        assert_eq!((found.count, found.outliers, found.missing), (85, 15, 0));
+        // What is left is the mean of the same 85 readings without any outlier among them.
+        let exact: f64 = readings(0)[15..].iter().sum::<f64>() / 85.0;
+        assert!((found.mean - exact).abs() < 1e-12);
+        assert_eq!(kept(&record, 0, &found, 0.004), readings(0)[15..].to_vec());
+        let plain = record.summarize();
+        assert_eq!(strays(&record, &plain, 0.004), [true, false, true]);
+        assert_eq!(Summary::of_main_body(record.readings(2), 0.004), None);
+    }
+
+    #[test]
+    fn more_outliers_than_others_have_are_no_chance() {
+        let with = |outliers: usize| Summary {
+            count: 100 - outliers,
+            outliers,
+            ..Summary::default()
+        };
+        assert!(is_chance(&with(3), 0.0) && !is_chance(&with(4), 0.0));
+        assert!(is_chance(&with(30), 0.15) && !is_chance(&with(40), 0.15));
+    }
+
+    #[test]
+    fn how_often_readings_stray_is_asked_of_most_beams() {
+        let plain = vec![
+            Summary {
+                count: 100,
+                ..Summary::default()
+            };
+            100
+        ];
+        let robust: Vec<Option<Summary>> = (0..100)
+            .map(|beam| {
+                let outliers = if beam < 80 { 10 } else { 40 };
+                Some(Summary {
+                    count: 100 - outliers,
+                    outliers,
+                    ..Summary::default()
+                })
+            })
+            .collect();
+        assert!((usual_share(&[plain], &[robust]) - 0.10).abs() < 1e-12);
+    }
+}
