@@ -23,14 +23,13 @@ struct Room {
     /// Its folders and files from the ground up, each of which may use those before it; none if any order without a
     /// circle will do.
     floors: &'static [&'static str],
-    /// Whether its files are held to have no circles yet.
+    /// Whether circles within it are refused; where they are not yet, only its arrows to other rooms are looked at.
     untied: bool,
 }
 
 /// The program's package, at the root.
 const PROGRAM: &str = "the program";
 
-/// A room of which any order of its folders without a circle will do.
 const fn room(name: &'static str, on: &'static [&'static str]) -> Room {
     Room {
         name,
@@ -40,63 +39,65 @@ const fn room(name: &'static str, on: &'static [&'static str]) -> Room {
     }
 }
 
+impl Room {
+    const fn with_floors(self, floors: &'static [&'static str]) -> Self {
+        Self { floors, ..self }
+    }
+
+    const fn still_tied(self) -> Self {
+        Self {
+            untied: false,
+            ..self
+        }
+    }
+}
+
 const ROOMS: [Room; 16] = [
-    Room {
-        untied: false,
-        ..room("model", &[])
-    },
-    Room {
-        floors: &[
-            "lanes", "rounding", "hit", "ray", "solid", "index", "packet", "mesh", "shape", "skin", "world",
-            "sweep",
-        ],
-        ..room("cast", &["model"])
-    },
-    Room {
-        floors: &[
-            "error",
-            "lanes",
-            "noise",
-            "scene",
-            "build",
-            "check",
-            "light",
-            "receive",
-            "laboratory",
-            "trace",
-        ],
-        ..room("sim", &["model", "cast"])
-    },
-    Room {
-        untied: false,
-        ..room("calib", &["model"])
-    },
-    Room {
-        untied: false,
-        ..room("files", &["model", "sim"])
-    },
-    Room {
-        untied: false,
-        ..room("assess", &["files", "sim", "calib"])
-    },
-    Room {
-        untied: false,
-        ..room("design", &["assess"])
-    },
-    Room {
-        untied: false,
-        ..room("report", &["assess", "design"])
-    },
+    room("model", &[]),
+    room("cast", &["model"]).with_floors(&[
+        "lanes", "rounding", "hit", "ray", "solid", "index", "packet", "mesh", "shape", "skin", "world",
+        "sweep",
+    ]),
+    room("sim", &["model", "cast"]).with_floors(&[
+        "error",
+        "lanes",
+        "noise",
+        "scene",
+        "build",
+        "check",
+        "light",
+        "receive",
+        "laboratory",
+        "trace",
+    ]),
+    room("calib", &["model"]).with_floors(&[
+        "tracking",
+        "error",
+        "options",
+        "lsq",
+        "readings",
+        "judge",
+        "mount",
+        "screen",
+        "element",
+        "prepare",
+        "joint",
+        "calibrate",
+        "plan",
+        "characterize",
+        "calibrator",
+    ]),
+    room("files", &["model", "sim"]).still_tied(),
+    room("assess", &["files", "sim", "calib"]).still_tied(),
+    room("design", &["assess"]).still_tied(),
+    room("report", &["assess", "design"]).still_tied(),
     room("catoptric", &["files", "assess", "design", "report"]),
     room("fixtures", &["model", "sim"]),
     room("studio", &["catoptric"]),
     room("import", &["catoptric"]),
     room("live", &["catoptric"]),
     room("flight", &["catoptric"]),
-    Room {
-        untied: false,
-        ..room(PROGRAM, &["catoptric", "studio", "import", "live", "flight"])
-    },
+    room(PROGRAM, &["catoptric", "studio", "import", "live", "flight"]).still_tied(),
     room("py", &[PROGRAM]),
 ];
 
