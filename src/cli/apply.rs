@@ -3,10 +3,8 @@
 use super::Context;
 use super::error::CliError;
 use super::output::{counted, print};
-use catoptric::files;
-use catoptric::files::IoError;
-use catoptric::files::cloud::{CloudFormat, cloud_bytes};
-use catoptric::{CloudFrame, Error, apply, read_calibration, read_dataset};
+use catoptric::files::cloud::CloudFormat;
+use catoptric::{CloudFrame, apply_into, read_calibration, read_dataset};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -40,7 +38,8 @@ enum FrameName {
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let path = &arguments.out;
-    let format = CloudFormat::of_path(path).map_err(|e| CliError::invalid(e.to_string(), None))?;
+    // Said before anything is read.
+    CloudFormat::of_path(path).map_err(|e| CliError::invalid(e.to_string(), None))?;
     let dataset = read_dataset(&arguments.dataset)?;
     let calibration = read_calibration(&arguments.calibration)?;
     let frame = match arguments.frame {
@@ -48,9 +47,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         FrameName::Rig => CloudFrame::Rig,
         FrameName::Room => CloudFrame::Room,
     };
-    let cloud = apply(&dataset, &calibration, arguments.pose, frame).map_err(Error::from)?;
-    let bytes = cloud_bytes(format, &cloud).map_err(|e| IoError::write(path, e))?;
-    files::write_file(path, &bytes)?;
+    let cloud = apply_into(&dataset, &calibration, arguments.pose, frame, path)?;
     if cloud.mount_is_nominal {
         context.say("the calibration has no mounting: the drawing's was taken");
     }
@@ -58,7 +55,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         "wrote {}: {} in the {} frame, pose {}; left out: {} without a range, {} of {} without a direction\n\
          next: open {} in a viewer such as CloudCompare or Open3D\n",
         path.display(),
-        counted(cloud.points.len(), "point"),
+        counted(cloud.points, "point"),
         frame.word(),
         cloud.pose,
         counted(cloud.without_range, "reading"),

@@ -5,7 +5,7 @@ use super::output::{counted, print};
 use super::score::figure;
 use catoptric::compare::{CONTRADICTION, Row};
 use catoptric::score::Honesty;
-use catoptric::{Comparison, Contestant, compare, read_calibration, read_dataset, read_truth};
+use catoptric::{Comparison, Contestant, Error, compare, read_calibration, read_dataset, read_truth};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -36,7 +36,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
             })
         })
         .collect::<Result<_, CliError>>()?;
-    let found = compare(&dataset, &contestants, truth.as_ref());
+    let found = compare(&dataset, &contestants, truth.as_ref()).map_err(Error::from)?;
     if arguments.json {
         let json = serde_json::to_string_pretty(&found).map_err(|e| CliError::Output(e.into()))?;
         return print(&format!("{json}\n"));

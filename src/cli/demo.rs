@@ -5,11 +5,12 @@ use super::calibrate::summary;
 use super::error::CliError;
 use super::output::{counted, grouped, print, quoted};
 use super::score::figure;
+use catoptric::apply::{CloudSketch, Lift};
 use catoptric::calib::Options;
-use catoptric::files::cloud::{CloudFormat, cloud_bytes};
-use catoptric::files::{self, IoError};
+use catoptric::files;
+use catoptric::report::MOST_POINTS;
 use catoptric::{
-    CloudFrame, Error, Method, Recording, Scene, Template, Verdict, apply, calibrate_with, read_dataset,
+    CloudFrame, Error, Method, Recording, Scene, Template, Verdict, apply_into, calibrate_with, read_dataset,
     read_truth, report, score, simulate_into, write_json,
 };
 use clap::Args;
@@ -65,7 +66,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         context.say(&format!("calibrating: {name}"));
         let calibration = calibrate_with(&dataset, method, &Options::default(), &control)?;
         write_json(folder.join(format!("calibration-{name}.json")), &calibration)?;
-        let result = score(&dataset, &calibration, truth.as_ref());
+        let result = score(&dataset, &calibration, truth.as_ref()).map_err(Error::from)?;
         write_json(folder.join(format!("score-{name}.json")), &result)?;
         lines.push(format!(
             "{name:8}  {}; per-axis error {} rms",
@@ -77,11 +78,11 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     context.check()?;
     context.say("writing cloud and report");
     let cloud_path = folder.join("cloud.ply");
-    let cloud = apply(&dataset, &results[0].0, None, CloudFrame::Room).map_err(Error::from)?;
-    let bytes = cloud_bytes(CloudFormat::Ply, &cloud).map_err(|e| IoError::write(&cloud_path, e))?;
-    files::write_file(&cloud_path, &bytes)?;
+    let cloud = apply_into(&dataset, &results[0].0, None, CloudFrame::Room, &cloud_path)?;
+    let lift = Lift::new(&dataset, &results[0].0, None, CloudFrame::Room).map_err(Error::from)?;
+    let sketch = CloudSketch::of(&lift, MOST_POINTS).map_err(Error::from)?;
     let report_path = folder.join("report.html");
-    let html = report(&dataset, truth.as_ref(), &results, Some(&cloud));
+    let html = report(&dataset, truth.as_ref(), &results, Some(&sketch));
     files::write_file(&report_path, html.as_bytes())?;
 
     let (scene, score) = (scene.resolved(), &results[0].1);
@@ -117,7 +118,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         quoted(&dataset_folder),
         quoted(&report_path),
         quoted(&cloud_path),
-        counted(cloud.points.len(), "point"),
+        counted(cloud.points, "point"),
     ))?;
     match score.verdict {
         Verdict::Fail => Err(CliError::Verdict(format!(

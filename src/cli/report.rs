@@ -3,7 +3,9 @@
 use super::Context;
 use super::error::CliError;
 use super::output::print;
-use catoptric::{CloudFrame, apply, files, read_calibration, read_dataset, read_truth, report, score};
+use catoptric::apply::{CloudSketch, Lift};
+use catoptric::report::MOST_POINTS;
+use catoptric::{CloudFrame, Error, files, read_calibration, read_dataset, read_truth, report, score};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -27,14 +29,14 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     for path in &arguments.calibrations {
         context.check()?;
         let calibration = read_calibration(path)?;
-        let result = score(&dataset, &calibration, truth.as_ref());
+        let result = score(&dataset, &calibration, truth.as_ref()).map_err(Error::from)?;
         results.push((calibration, result));
     }
     let cloud = results
         .first()
-        .map(|(calibration, _)| apply(&dataset, calibration, None, CloudFrame::Room));
+        .map(|(calibration, _)| Lift::new(&dataset, calibration, None, CloudFrame::Room));
     let cloud = match cloud {
-        Some(Ok(cloud)) => Some(cloud),
+        Some(Ok(lift)) => Some(CloudSketch::of(&lift, MOST_POINTS).map_err(Error::from)?),
         Some(Err(error)) => {
             context.say(&format!("without a cloud: {error}"));
             None

@@ -330,7 +330,7 @@ fn step_1_teaches_a_calibration_the_walk_of_a_threshold() {
     let options = calib::Options::default();
     let accuracy = |dataset: &catoptric::model::Dataset| {
         let calibration = calib::calibrate(dataset, calib::Method::Beam, &options).unwrap();
-        score(dataset, &calibration, Some(&truth))
+        score(dataset, &calibration, Some(&truth)).expect("in memory")
     };
     let before = accuracy(&dataset);
     dataset.session.believed = dataset.session.believed.after(&found);

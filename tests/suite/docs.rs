@@ -496,7 +496,7 @@ moved_mm = [0, 0, 4]
     );
 
     let calibration = calib::calibrate(&dataset, calib::Method::Beam, &calib::Options::default()).unwrap();
-    let score = score(&dataset, &calibration, Some(&truth));
+    let score = score(&dataset, &calibration, Some(&truth)).expect("in memory");
     same(
         "score.json",
         &json(serde_json::to_value(&score)),

@@ -397,7 +397,8 @@ fn a_board_table_is_the_recording_to_the_bit() {
                 let inside = (0.45 - x.abs()).min(0.35 - y.abs());
                 assert!((number("inside_edge_m") - inside).abs() < 1e-12);
             }
-            let found: Vec<f64> = record.readings(beam).filter(|r| r.is_finite()).collect();
+            let scans = record.scans().map(|scan| scan.unwrap()[beam]);
+            let found: Vec<f64> = scans.filter(|r| r.is_finite()).collect();
             assert_eq!(text("readings"), found.len().to_string());
             assert_eq!(text("missing"), (3 - found.len()).to_string());
             if found.is_empty() {

@@ -109,7 +109,7 @@ fn layouts_of_the_gallery_can_be_calibrated() {
             let laboratory = Laboratory::new(&scene, seed).unwrap();
             let (dataset, truth) = (laboratory.dataset().unwrap(), laboratory.truth().unwrap());
             let calibration = Method::Joint.calibrate(&dataset).unwrap();
-            let score = catoptric::score(&dataset, &calibration, Some(&truth));
+            let score = catoptric::score(&dataset, &calibration, Some(&truth)).expect("in memory");
             assert!(score.beams.solved >= 10, "{name} {seed}: {:?}", score.beams);
             assert_eq!(
                 (score.beams.missed, score.beams.wrong),
@@ -610,7 +610,7 @@ fn the_predicted_accuracy_is_the_bound_that_recordings_are_scored_by() {
         let method = catoptric::calib::Method::Joint;
         let calibration =
             catoptric::calib::calibrate(&dataset, method, &catoptric::calib::Options::default()).unwrap();
-        let score = catoptric::score(&dataset, &calibration, Some(&truth));
+        let score = catoptric::score(&dataset, &calibration, Some(&truth)).expect("in memory");
         let predicted = layout::predict(&scene, scene.seed);
         let bound = predicted.per_axis_deg.unwrap();
         assert!(

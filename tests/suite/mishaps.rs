@@ -29,7 +29,7 @@ fn calibrated(scene: &Scene, seed: u64, method: Method) -> (Calibration, catoptr
     let laboratory = Laboratory::new(scene, seed).expect("the scene is good");
     let dataset = laboratory.dataset().expect("recorded");
     let calibration = calib::calibrate(&dataset, method, &Options::default()).expect("it calibrates");
-    let scored = score(&dataset, &calibration, Some(&laboratory.truth().expect("known")));
+    let scored = score(&dataset, &calibration, Some(&laboratory.truth().expect("known"))).expect("in memory");
     (calibration, scored)
 }
 
@@ -62,6 +62,7 @@ fn exchanged_labels_are_named_and_put_back() {
             let dataset = Dataset {
                 session: laboratory.session().expect("known"),
                 poses: vec![laboratory.pose_record(pose as usize).expect("recorded")],
+                id: None,
             };
             let (right, warnings) = calib::tracking::put_right(&dataset);
             assert_eq!(warnings.len(), 1, "{warnings:?}");
@@ -143,7 +144,7 @@ fn a_board_that_moved_spoils_a_calibration_that_believes_it() {
     let rms = |dataset: &_| {
         let calibration =
             calib::calibrate(dataset, Method::Beam, &Options::default()).expect("it calibrates");
-        let scored = score(dataset, &calibration, Some(&truth));
+        let scored = score(dataset, &calibration, Some(&truth)).expect("in memory");
         (scored.per_axis_rms_deg, scored.beams.solved)
     };
     let (found, solved) = rms(&dataset);

@@ -43,7 +43,7 @@ const FEW_SCANS: [&str; 3] = [
 fn scored(name: &str, sets: &[&str], method: Method) -> Score {
     let (dataset, truth) = tier(name, sets);
     let calibration = method.calibrate(&dataset).unwrap();
-    score(&dataset, &calibration, Some(&truth))
+    score(&dataset, &calibration, Some(&truth)).expect("in memory")
 }
 
 #[test]
@@ -91,7 +91,7 @@ fn tier_5_is_not_answered_with_a_guess() {
     let (dataset, truth) = tier("t5-degenerate", &FEW_SCANS);
     for method in [Method::Beam, Method::BeamGls, Method::Joint] {
         let calibration = method.calibrate(&dataset).unwrap();
-        let found = score(&dataset, &calibration, Some(&truth));
+        let found = score(&dataset, &calibration, Some(&truth)).expect("in memory");
         let open = found.open.unwrap();
         assert_eq!(
             found.verdict,

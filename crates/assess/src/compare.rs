@@ -13,7 +13,7 @@
 
 use crate::score::{Honesty, Score, Verdict, score};
 use catoptric_calib::observations;
-use catoptric_model::{BeamEstimate, Calibration, Dataset, beam};
+use catoptric_model::{BeamEstimate, Calibration, Dataset, Unreadable, beam};
 use catoptric_sim::Truth;
 use nalgebra::{Matrix2, Vector2};
 use serde::Serialize;
@@ -105,11 +105,18 @@ pub struct Pair {
 }
 
 /// Compares calibrations of one dataset, with its truth or without.
-pub fn compare(dataset: &Dataset, contestants: &[Contestant], truth: Option<&Truth>) -> Comparison {
+///
+/// # Errors
+/// [`Unreadable`] if the recording of the dataset can no longer be read.
+pub fn compare(
+    dataset: &Dataset,
+    contestants: &[Contestant],
+    truth: Option<&Truth>,
+) -> Result<Comparison, Unreadable> {
     let mut scored: Vec<(&Contestant, Score)> = contestants
         .iter()
-        .map(|c| (c, score(dataset, &c.calibration, truth)))
-        .collect();
+        .map(|c| Ok((c, score(dataset, &c.calibration, truth)?)))
+        .collect::<Result<_, Unreadable>>()?;
     let key = |s: &Score| {
         if truth.is_some() {
             s.point_mm.at_4m
@@ -125,12 +132,12 @@ pub fn compare(dataset: &Dataset, contestants: &[Contestant], truth: Option<&Tru
         .flat_map(|(i, (first, _))| scored[i + 1..].iter().map(move |(second, _)| (*first, *second)))
         .map(|(first, second)| pair(dataset, first, second))
         .collect();
-    Comparison {
+    Ok(Comparison {
         schema_version: SCHEMA_VERSION,
         blind: truth.is_none(),
         rows: scored.iter().map(|(c, s)| row(&c.name, s)).collect(),
         pairs,
-    }
+    })
 }
 
 fn row(name: &str, score: &Score) -> Row {
@@ -228,7 +235,7 @@ mod tests {
             named("truth", perfect(&s.truth)),
             named("fine", noisy(&s.truth, 1e-3, 2)),
         ];
-        let found = compare(&s.dataset, &given, Some(&s.truth));
+        let found = compare(&s.dataset, &given, Some(&s.truth)).expect("in memory");
         let names: Vec<&str> = found.rows.iter().map(|r| r.name.as_str()).collect();
         assert_eq!(names, ["truth", "fine", "coarse", "nothing"]);
         assert_eq!(found.rows[0].point_4m_mm, 0.0);
@@ -236,7 +243,7 @@ mod tests {
         assert_eq!(found.pairs.len(), 6);
         let json = serde_json::to_value(&found).expect("it is JSON");
         assert!(json["rows"][3]["point_4m_mm"].is_null() && json["rows"][0]["false"] == 0);
-        let blind = compare(&s.dataset, &given, None);
+        let blind = compare(&s.dataset, &given, None).expect("in memory");
         assert!(blind.blind && blind.rows[0].name == "truth");
         assert!(blind.rows[0].walls_rms_mm < blind.rows[1].walls_rms_mm);
     }
@@ -252,14 +259,15 @@ mod tests {
                 named("turned", turned(perfect(&s.truth), angle)),
             ],
             Some(&s.truth),
-        );
+        )
+        .expect("in memory");
         let pair = &found.pairs[0];
         assert_eq!(pair.beams, found.rows[0].solved);
         assert!(pair.direction_max_deg <= 0.3 + 1e-12 && pair.direction_max_deg > 0.25);
         assert!(pair.direction_rms_deg < pair.direction_max_deg);
         // Independent errors as stated by both: 1, within six standard deviations of a χ² of 2·beams over as many.
         let of = |seed| noisy(&s.truth, 1e-3, seed);
-        let found = compare(&s.dataset, &[named("a", of(1)), named("b", of(2))], None);
+        let found = compare(&s.dataset, &[named("a", of(1)), named("b", of(2))], None).expect("in memory");
         let pair = &found.pairs[0];
         let six = 6.0 / (pair.beams as f64).sqrt();
         assert!((pair.normalized_square - 1.0).abs() < six, "{pair:?}");
@@ -277,7 +285,8 @@ mod tests {
             &s.dataset,
             &[named("truth", perfect(&s.truth)), named("around", around)],
             Some(&s.truth),
-        );
+        )
+        .expect("in memory");
         assert!(found.pairs[0].normalized_square < 1e-12, "{:?}", found.pairs[0]);
     }
 }

@@ -14,7 +14,8 @@ use catoptric_model::{Calibration, Dataset, Stop, calibration};
 /// mounting as estimated, with its covariance.
 ///
 /// # Errors
-/// [`CalibError`] if the dataset's parts do not fit together or its session holds impossible numbers.
+/// [`CalibError`] if the dataset's parts do not fit together, its session holds impossible numbers or its recording can no
+/// longer be read.
 ///
 /// ```
 /// use catoptric_calib::{CalibError, Method, Options, calibrate};
@@ -53,7 +54,7 @@ pub fn calibrate_until(
         method: Method::Beam,
         ..work
     };
-    let first = element::estimates(&by_batch, &candidates, drawn);
+    let first = element::estimates(&by_batch, &candidates, drawn)?;
     stop.check()?;
     let built = facet_plane::as_built(&dataset.session, drawn, &first);
     let mut calibration = Calibration {
@@ -78,13 +79,13 @@ pub fn calibrate_until(
                 method: Method::BeamGls,
                 ..work
             };
-            calibration.beams = element::estimates(&alone, &candidates, &built);
+            calibration.beams = element::estimates(&alone, &candidates, &built)?;
             stop.check()?;
             let assigned = joint::assigned(&alone, &candidates, &built, &calibration.beams);
             joint::together(&work, mount, &built, &assigned, &mut calibration);
         }
         Method::Beam | Method::Recursive | Method::BeamGls | Method::ClosedForm => {
-            calibration.beams = element::estimates(&work, &candidates, &built);
+            calibration.beams = element::estimates(&work, &candidates, &built)?;
         }
     }
     stop.check()?;

@@ -1,6 +1,6 @@
 //! What can keep a calibration from starting. An element that cannot be solved is data, not an error.
 
-use catoptric_model::{ModelError, Stopped};
+use catoptric_model::{ModelError, Stopped, Unreadable};
 
 /// A dataset or a request that no calibration can be made from.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -56,6 +56,9 @@ pub enum CalibError {
         /// What happened.
         what: String,
     },
+    /// Readings that the dataset's recording gives no more.
+    #[error(transparent)]
+    Unreadable(#[from] Unreadable),
     /// The work was stopped on request.
     #[error(transparent)]
     Stopped(#[from] Stopped),

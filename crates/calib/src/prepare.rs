@@ -37,7 +37,7 @@ pub(crate) fn prepare(dataset: &Dataset) -> Result<Prepared, CalibError> {
         .iter()
         .map(plane_as_drawn)
         .collect::<Result<_, _>>()?;
-    let summaries = locate::summaries(dataset);
+    let summaries = locate::summaries(dataset)?;
     let mount = pose::estimate(dataset, &summaries);
     let boards = dataset
         .poses
@@ -69,6 +69,7 @@ impl Prepared {
             mount: &self.mount.uncertainty,
             method,
             options,
+            columns: None,
         }
     }
 }

@@ -5,7 +5,7 @@ use catoptric_assess::study::StudyError;
 use catoptric_calib::CalibError;
 use catoptric_files::IoError;
 use catoptric_files::scene::SceneErrors;
-use catoptric_model::Stopped;
+use catoptric_model::{Stopped, Unreadable};
 use catoptric_sim::SimError;
 
 /// Why a verb has no result.
@@ -29,7 +29,10 @@ pub enum Error {
     Calibration(CalibError),
     /// A dataset that cannot be turned into the cloud asked for.
     #[error(transparent)]
-    Apply(#[from] ApplyError),
+    Apply(ApplyError),
+    /// Readings that a dataset's recording gives no more.
+    #[error(transparent)]
+    Unreadable(#[from] Unreadable),
     /// A study that cannot be begun, gone on with or merged.
     #[error(transparent)]
     Study(StudyError),
@@ -80,6 +83,7 @@ impl Error {
             | Self::File(_)
             | Self::Calibration(_)
             | Self::Apply(_)
+            | Self::Unreadable(_)
             | Self::Study(_)
             | Self::Stopped(_)
             | Self::Threads(_) => None,
@@ -93,7 +97,7 @@ impl Error {
             Self::Stopped(_) => 130,
             Self::File(error) => error.exit_code(),
             Self::Scene(SceneErrors::Mesh { source, .. }) => source.exit_code(),
-            Self::Scene(SceneErrors::Read { .. }) | Self::Threads(_) => 3,
+            Self::Scene(SceneErrors::Read { .. }) | Self::Unreadable(_) | Self::Threads(_) => 3,
             Self::Study(error) => error.exit_code(),
             #[cfg(feature = "design")]
             Self::Optimize(catoptric_design::optimize::OptimizeError::Search(_)) => 3,
@@ -112,7 +116,17 @@ impl From<CalibError> for Error {
     fn from(error: CalibError) -> Self {
         match error {
             CalibError::Stopped(stopped) => Self::Stopped(stopped),
+            CalibError::Unreadable(error) => Self::Unreadable(error),
             other => Self::Calibration(other),
+        }
+    }
+}
+
+impl From<ApplyError> for Error {
+    fn from(error: ApplyError) -> Self {
+        match error {
+            ApplyError::Unreadable(error) => Self::Unreadable(error),
+            other => Self::Apply(other),
         }
     }
 }

@@ -11,7 +11,7 @@
 //! let scene = catoptric::Scene::load("mine.toml")?;
 //! let (dataset, truth) = catoptric::simulate(&scene)?;
 //! let calibration = catoptric::calibrate(&dataset)?;
-//! let score = catoptric::score(&dataset, &calibration, &truth);
+//! let score = catoptric::score(&dataset, &calibration, &truth)?;
 //! println!("{}: {:.4}° per axis, at best {:.4}°",
 //!     score.verdict.word(), score.per_axis_rms_deg, score.crlb_per_axis_deg);
 //! # assert!(score.per_axis_rms_deg < 0.1);
@@ -37,7 +37,7 @@
 //! | [`Scene`], rays | [`trace`](fn@trace) | paths |
 //! | [`Dataset`] | [`characterize`] | [`Characterization`] |
 //! | [`Dataset`] | [`calibrate`], [`calibrate_with`] | [`Calibration`] |
-//! | [`Dataset`], [`Calibration`] | [`apply`](fn@apply) | [`PointCloud`] |
+//! | [`Dataset`], [`Calibration`] | [`apply`](fn@apply), [`apply_into`] | [`PointCloud`] |
 //! | [`Dataset`], [`Calibration`], [`Truth`] | [`score`](fn@score), [`compare`](fn@compare), [`validate`](fn@validate) | [`Score`], [`Comparison`] |
 //! | [`Scene`] | [`study`](fn@study), [`study_into`], [`merge_studies`] | [`Summary`](study::Summary) |
 //! | [`Scene`] or [`Dataset`] | [`plan`](fn@plan) | [`Plan`](calib::plan::Plan) |

@@ -32,7 +32,7 @@ pub enum CloudError {
 }
 
 /// Bytes of one point: three floats, a beam, a scan.
-const POINT_BYTES: usize = 3 * 4 + 2 + 4;
+pub const POINT_BYTES: usize = 3 * 4 + 2 + 4;
 
 impl CloudFormat {
     /// The format that a file's extension asks for, in upper or lower case.
@@ -62,9 +62,9 @@ impl CloudFormat {
 /// # Errors
 /// Whatever the writer reports; [`io::ErrorKind::InvalidData`] for a beam above 65,535 or a scan above 2³² − 1.
 pub fn write_cloud(format: CloudFormat, cloud: &PointCloud, to: &mut impl Write) -> io::Result<()> {
-    to.write_all(header(format, cloud.frame, cloud.points.len()).as_bytes())?;
+    to.write_all(cloud_header(format, cloud.frame, cloud.points.len()).as_bytes())?;
     for point in &cloud.points {
-        to.write_all(&encode(point)?)?;
+        to.write_all(&point_bytes(point)?)?;
     }
     Ok(())
 }
@@ -98,7 +98,7 @@ pub fn read_cloud(format: CloudFormat, bytes: &[u8]) -> Result<(CloudFrame, Vec<
     let count = body.len() / POINT_BYTES;
     let frame = CloudFrame::ALL
         .into_iter()
-        .find(|&frame| header(format, frame, count).as_bytes() == given)
+        .find(|&frame| cloud_header(format, frame, count).as_bytes() == given)
         .ok_or_else(|| malformed("header and length do not fit"))?;
     if count * POINT_BYTES != body.len() {
         return Err(malformed("the last point is cut short"));
@@ -106,7 +106,8 @@ pub fn read_cloud(format: CloudFormat, bytes: &[u8]) -> Result<(CloudFrame, Vec<
     Ok((frame, body.chunks_exact(POINT_BYTES).map(decode).collect()))
 }
 
-fn header(format: CloudFormat, frame: CloudFrame, count: usize) -> String {
+/// What stands before the points of a cloud.
+pub fn cloud_header(format: CloudFormat, frame: CloudFrame, count: usize) -> String {
     let frame = frame.word();
     match format {
         CloudFormat::Ply => format!(
@@ -122,7 +123,11 @@ fn header(format: CloudFormat, frame: CloudFrame, count: usize) -> String {
     }
 }
 
-fn encode(point: &CloudPoint) -> io::Result<[u8; POINT_BYTES]> {
+/// A point as it stands in either file.
+///
+/// # Errors
+/// [`io::ErrorKind::InvalidData`] for a beam above 65,535 or a scan above 2³² − 1.
+pub fn point_bytes(point: &CloudPoint) -> io::Result<[u8; POINT_BYTES]> {
     let too_large = |what: &str, value: usize| {
         io::Error::new(
             io::ErrorKind::InvalidData,

@@ -10,19 +10,20 @@
 //!
 //! Reading never opens `truth/`.
 
+use super::blocks::Place;
 use super::error::IoError;
 use super::file::{sha256, sha256_file};
 use super::folder::{Occupant, StagedFile, StagedFolder, list};
 use super::json::to_json;
 use super::manifest::{Manifest, Provenance};
-use super::playback::parse_recording;
+use super::playback::{read_recording, survey};
 use super::recording::{Encoded, RecordingEncoder, RecordingWriter};
-use catoptric_model::{Dataset, Session, Stretch, session};
+use catoptric_model::{Dataset, ModelError, PoseRecord, Session, Stretch, session};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Name of the manifest in a dataset.
@@ -188,38 +189,72 @@ pub fn read_session(dataset: &Path) -> Result<Session, IoError> {
     parse_session(dataset, &read_checked(dataset, SESSION, hashes.as_ref())?)
 }
 
-/// Reads the session and the observations, frame by frame.
+/// Reads the session and the observations, frame by frame; all of it is held.
 ///
 /// # Errors
 /// [`IoError`] as [`read_dataset`].
 pub fn read_stretches(dataset: &Path) -> Result<(Session, Vec<Stretch>), IoError> {
-    let hashes = read_hashes(dataset)?;
-    let session = parse_session(dataset, &read_checked(dataset, SESSION, hashes.as_ref())?)?;
-    let path = dataset.join(OBSERVATIONS);
-    let recording = fs::read(&path).map_err(|e| IoError::read(&path, e))?;
-    // What was changed is not worth an error of its own: the one about the change comes first.
-    let (known, stretches) = rayon::join(
-        || check(dataset, OBSERVATIONS, &recording, hashes.as_ref()),
-        || parse_recording(&recording, &path, &session),
-    );
-    known?;
-    Ok((session, stretches?))
+    let (session, stretches, _) = read(dataset, |place, session| read_recording(place.path(), session))?;
+    Ok((session, stretches))
 }
 
 /// Reads a dataset and checks that its parts fit together. The truth is not looked at.
+///
+/// Single readings are not held: they are read again, from the same file, where a verb wants them.
 ///
 /// # Errors
 /// [`IoError`] names the file that is missing, changed since the manifest was written, not what it should be, or
 /// does not fit the others. A dataset without a manifest, somebody else's, is taken as it is.
 pub fn read_dataset(dataset: &Path) -> Result<Dataset, IoError> {
-    let (session, stretches) = read_stretches(dataset)?;
+    let (session, poses, id) = read(dataset, survey)?;
+    assembled(dataset, session, poses, id)
+}
+
+/// As [`read_dataset`], from what the experimenter knows and the bytes of a recording.
+///
+/// # Errors
+/// [`IoError`] if the recording is not what it should be, or does not fit the session.
+pub fn parse_dataset(session: Session, recording: impl Into<Arc<[u8]>>) -> Result<Dataset, IoError> {
+    let (path, bytes) = (PathBuf::from(OBSERVATIONS), recording.into());
+    let id = sha256(&bytes);
+    let poses = survey(Place::Memory(path.clone(), bytes), &session)?;
+    assembled(&path, session, poses, id)
+}
+
+/// Reads the session, and with it what is wanted of the observations; and what they hash to.
+fn read<T: Send>(
+    dataset: &Path,
+    observations: impl FnOnce(Place, &Session) -> Result<T, IoError> + Send,
+) -> Result<(Session, T, String), IoError> {
+    let hashes = read_hashes(dataset)?;
+    let session = parse_session(dataset, &read_checked(dataset, SESSION, hashes.as_ref())?)?;
+    let path = dataset.join(OBSERVATIONS);
+    let (id, found) = rayon::join(
+        || sha256_file(&path),
+        || observations(Place::File(path.clone()), &session),
+    );
+    // What was changed is not worth an error of its own: the one about the change comes first.
+    let id = id.map_err(|e| IoError::read(&path, e))?;
+    check(dataset, OBSERVATIONS, &id, hashes.as_ref())?;
+    Ok((session, found?, id))
+}
+
+/// A dataset whose parts fit together.
+fn assembled(
+    path: &Path,
+    session: Session,
+    poses: Result<Vec<PoseRecord>, ModelError>,
+    id: String,
+) -> Result<Dataset, IoError> {
     let fail = |source| IoError::Inconsistent {
-        path: dataset.to_owned(),
+        path: path.to_owned(),
         source,
     };
-    let records = stretches.into_iter().map(Stretch::into_record);
-    let poses = records.collect::<Result<_, _>>().map_err(fail)?;
-    let dataset = Dataset { session, poses };
+    let dataset = Dataset {
+        session,
+        poses: poses.map_err(fail)?,
+        id: Some(id),
+    };
     dataset.check().map_err(fail)?;
     Ok(dataset)
 }
@@ -253,19 +288,19 @@ fn read_checked(
 ) -> Result<Vec<u8>, IoError> {
     let path = dataset.join(name);
     let bytes = fs::read(&path).map_err(|e| IoError::read(&path, e))?;
-    check(dataset, name, &bytes, hashes)?;
+    check(dataset, name, &sha256(&bytes), hashes)?;
     Ok(bytes)
 }
 
-/// Whether the bytes of a file are those that the manifest knows.
+/// Whether the SHA-256 of a file is the one that the manifest knows.
 fn check(
     dataset: &Path,
     name: &str,
-    bytes: &[u8],
+    found: &String,
     hashes: Option<&BTreeMap<String, String>>,
 ) -> Result<(), IoError> {
     match hashes {
-        Some(hashes) if hashes.get(name) != Some(&sha256(bytes)) => Err(IoError::Changed {
+        Some(hashes) if hashes.get(name) != Some(found) => Err(IoError::Changed {
             path: dataset.join(name),
             manifest: dataset.join(MANIFEST),
         }),

@@ -1,49 +1,80 @@
 //! A stretch in the making: the messages between one label and the next.
 
 use super::bodies::Bodies;
-use super::messages::{self, LabelledMarker, NS_PER_S, Scan};
+use super::capture::{Capture, seconds_between};
+use super::messages::{self, LabelledMarker, Scan};
 use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::frame::Pose;
 use catoptric_model::session::ScannerSheet;
-use catoptric_model::{PoseLabel, Stretch, Track, TrackedFrame};
-use std::collections::BTreeMap;
+use catoptric_model::{PoseLabel, Stretch, Track};
 
 /// How far a period may be from the scanner's to be taken for it, in seconds: stamps are whole nanoseconds.
 const PERIOD_TOLERANCE_S: f64 = 1e-9;
 
+/// What every stretch of a recording shares.
+#[derive(Clone, Copy)]
+pub(super) struct Known<'a> {
+    pub(super) scanner: &'a ScannerSheet,
+    pub(super) bodies: &'a Bodies,
+    /// Time of the first message, in nanoseconds.
+    pub(super) epoch: u64,
+}
+
+/// What is kept of a stretch while it passes: all of it, or what a calibration needs.
+pub(super) trait Keep: Sized {
+    /// What it becomes.
+    type Kept;
+    /// Nothing yet of a stretch of so many beams.
+    fn begin(label: &PoseLabel, beams: usize) -> Self;
+    /// Takes a scan in.
+    fn scan(&mut self, ranges: Vec<f64>);
+    /// Takes the echoes of a scan in.
+    fn echoes(&mut self, echoes: Vec<Vec<f64>>);
+    /// Looks at what motion capture has seen so far.
+    fn look(&mut self, capture: &mut Capture, known: Known<'_>);
+    /// The end of a stretch that is whole.
+    fn end(stretch: Gathering<Self>, known: Known<'_>) -> Self::Kept;
+}
+
 /// A stretch being read; times are nanoseconds.
-pub(super) struct Gathering {
-    label: PoseLabel,
+pub(super) struct Gathering<R> {
+    pub(super) label: PoseLabel,
     label_time: u64,
     first_scan: Option<u64>,
     last_scan: u64,
     scan_time: f64,
     scans: usize,
-    ranges: Vec<f64>,
-    echoes: Vec<Vec<f64>>,
-    poses: BTreeMap<(u64, usize), Pose>,
-    markers: BTreeMap<u64, Vec<LabelledMarker>>,
+    /// Scans of which the echoes were recorded too.
+    echoes: usize,
+    pub(super) kept: R,
+    pub(super) capture: Capture,
 }
 
-impl Gathering {
+/// All of a stretch.
+#[derive(Default)]
+pub(super) struct Whole {
+    ranges: Vec<f64>,
+    echoes: Vec<Vec<f64>>,
+}
+
+impl<R: Keep> Gathering<R> {
     /// Begins with a label.
-    pub(super) fn new(label: PoseLabel, label_time: u64) -> Self {
+    pub(super) fn new(label: PoseLabel, label_time: u64, scanner: &ScannerSheet) -> Self {
         Self {
+            kept: R::begin(&label, scanner.beams),
             label,
             label_time,
             first_scan: None,
             last_scan: label_time,
             scan_time: 0.0,
             scans: 0,
-            ranges: Vec::new(),
-            echoes: Vec::new(),
-            poses: BTreeMap::new(),
-            markers: BTreeMap::new(),
+            echoes: 0,
+            capture: Capture::default(),
         }
     }
 
     /// Takes a scan in; its beams must be those of the session.
-    pub(super) fn scan(&mut self, scan: &Scan, scanner: &ScannerSheet) -> Result<(), String> {
+    pub(super) fn scan(&mut self, scan: Scan, scanner: &ScannerSheet) -> Result<(), String> {
         let beams = scanner.beams;
         if scan.ranges.len() != beams {
             return Err(format!("{} beams, session.toml has {beams}", scan.ranges.len()));
@@ -62,7 +93,7 @@ impl Gathering {
         self.last_scan = scan.stamp;
         self.scan_time = scan.scan_time;
         self.scans += 1;
-        self.ranges.extend_from_slice(&scan.ranges);
+        self.kept.scan(scan.ranges);
         Ok(())
     }
 
@@ -72,18 +103,34 @@ impl Gathering {
         if echoes.len() != beams {
             return Err(format!("{} beams, session.toml has {beams}", echoes.len()));
         }
-        self.echoes.extend(echoes);
+        self.echoes += 1;
+        self.kept.echoes(echoes);
         Ok(())
     }
 
     /// Takes a solved pose of a body in.
-    pub(super) fn pose(&mut self, time: u64, body: usize, pose: Pose) {
-        self.poses.insert((time, body), pose);
+    pub(super) fn pose(
+        &mut self,
+        time: u64,
+        body: usize,
+        pose: Pose,
+        known: Known<'_>,
+    ) -> Result<(), String> {
+        self.capture.pose(time, body, pose)?;
+        self.kept.look(&mut self.capture, known);
+        Ok(())
     }
 
     /// Takes the markers of a frame in.
-    pub(super) fn markers(&mut self, time: u64, markers: Vec<LabelledMarker>) {
-        self.markers.entry(time).or_default().extend(markers);
+    pub(super) fn markers(
+        &mut self,
+        time: u64,
+        markers: &[LabelledMarker],
+        known: Known<'_>,
+    ) -> Result<(), String> {
+        self.capture.markers(time, markers, known.bodies)?;
+        self.kept.look(&mut self.capture, known);
+        Ok(())
     }
 
     /// Number of the pose.
@@ -91,31 +138,31 @@ impl Gathering {
         self.label.pose
     }
 
-    /// The stretch, with times counted from the epoch; an error if its scans are not as many as its label says.
-    pub(super) fn into_stretch(
-        self,
-        scanner: &ScannerSheet,
-        bodies: &Bodies,
-        epoch: u64,
-    ) -> Result<Stretch, String> {
-        if self.scans != self.label.scans {
-            let (pose, expected, found) = (self.label.pose, self.label.scans, self.scans);
+    /// The end of the stretch; an error if its scans are not as many as its label says.
+    pub(super) fn end(self, known: Known<'_>) -> Result<R::Kept, String> {
+        let (pose, expected, found) = (self.label.pose, self.label.scans, self.scans);
+        if found != expected {
             return Err(format!("pose {pose}: {found} scans, its label says {expected}"));
         }
-        if !self.echoes.is_empty() && self.echoes.len() != self.ranges.len() {
-            let (pose, found) = (self.label.pose, self.echoes.len() / scanner.beams.max(1));
-            return Err(format!("pose {pose}: echoes of {found} scans of {}", self.scans));
+        if self.echoes > 0 && self.echoes != found {
+            return Err(format!("pose {pose}: echoes of {} scans of {found}", self.echoes));
         }
+        Ok(R::end(self, known))
+    }
+
+    /// The stretch without its readings, with times counted from the epoch, and what was kept of them.
+    pub(super) fn into_stretch(mut self, known: Known<'_>) -> (Stretch, R) {
         let start = self.first_scan.unwrap_or(self.label_time);
-        Ok(Stretch {
-            start_s: seconds_between(epoch, start),
-            scan_period_s: self.period(scanner, start),
-            beams: scanner.beams,
-            tracks: self.tracks(bodies, epoch),
-            ranges: self.ranges,
-            echoes: (!self.echoes.is_empty()).then_some(self.echoes),
+        let stretch = Stretch {
+            start_s: seconds_between(known.epoch, start),
+            scan_period_s: self.period(known.scanner, start),
+            beams: known.scanner.beams,
+            tracks: self.tracks(known),
+            ranges: Vec::new(),
+            echoes: None,
             label: self.label,
-        })
+        };
+        (stretch, self.kept)
     }
 
     /// Time from scan to scan: the scanner's where the stamps agree with it to their resolution.
@@ -136,66 +183,63 @@ impl Gathering {
         }
     }
 
-    /// The rig, the board of the label and whatever else was seen.
-    fn tracks(&self, bodies: &Bodies, epoch: u64) -> Vec<Track> {
-        if self.poses.is_empty() && self.markers.is_empty() {
+    /// The rig, the board of the label and whatever else was seen, with the frames that are there still.
+    fn tracks(&mut self, known: Known<'_>) -> Vec<Track> {
+        if self.capture.waiting() == 0 {
             return Vec::new();
         }
-        let mut seen: BTreeMap<(u64, usize), TrackedFrame> = BTreeMap::new();
-        let board = self.label.board.as_deref();
-        let expected: Vec<_> = [Some(RIG_SUBJECT), board]
-            .into_iter()
-            .flatten()
-            .filter_map(|subject| bodies.position(subject))
+        let order = followed(&self.label, known.bodies, self.capture.seen());
+        let subject = |body: &usize| known.bodies.all[*body].subject.clone();
+        let mut tracks: Vec<Track> = order
+            .iter()
+            .map(|body| Track {
+                subject: subject(body),
+                frames: Vec::new(),
+            })
             .collect();
-        let found = self.poses.keys().map(|(_, body)| *body);
-        let marked = self
-            .markers
-            .values()
-            .flatten()
-            .filter_map(|m| Some(bodies.find(&m.name)?.0));
-        let mut others: Vec<_> = found.chain(marked).filter(|b| !expected.contains(b)).collect();
-        others.sort_unstable();
-        others.dedup();
-        let order: Vec<_> = expected.into_iter().chain(others).collect();
-
-        let frame = |time: u64, markers| TrackedFrame {
-            time_s: seconds_between(epoch, time),
-            pose: None,
-            markers,
-        };
-        for (time, markers) in &self.markers {
-            for body in &order {
-                let unseen = vec![None; bodies.all[*body].labels.len()];
-                seen.insert((*time, *body), frame(*time, unseen));
-            }
-            for marker in markers {
-                if let Some((body, i)) = bodies.find(&marker.name) {
-                    let place = seen.get_mut(&(*time, body)).and_then(|f| f.markers.get_mut(i));
-                    if let Some(place) = place {
-                        *place = Some(marker.point);
-                    }
-                }
-            }
-        }
-        for ((time, body), pose) in &self.poses {
-            let entry = seen.entry((*time, *body));
-            entry.or_insert_with(|| frame(*time, Vec::new())).pose = Some(*pose);
-        }
-        let of = |body: usize| {
-            let frames = seen.iter().filter(move |((_, b), _)| *b == body);
-            frames.map(|(_, f)| f.clone()).collect()
-        };
-        let track = |body: usize| Track {
-            subject: bodies.all[body].subject.clone(),
-            frames: of(body),
-        };
-        order.into_iter().map(track).collect()
+        self.capture
+            .take(0, known.bodies, &order, known.epoch, |body, frame| {
+                let place = order.iter().position(|b| *b == body);
+                tracks[place.expect("it is one of them")].frames.push(frame);
+            });
+        tracks
     }
 }
 
-/// Seconds from one time to another, both in nanoseconds.
-fn seconds_between(from: u64, to: u64) -> f64 {
-    let ns = i128::from(to) - i128::from(from);
-    ns as f64 / NS_PER_S as f64
+/// The bodies that have tracks: the rig, the board of the label, and others that were seen.
+pub(super) fn followed(label: &PoseLabel, bodies: &Bodies, seen: impl Iterator<Item = usize>) -> Vec<usize> {
+    let expected = [Some(RIG_SUBJECT), label.board.as_deref()];
+    let expected = expected.into_iter().flatten();
+    let expected: Vec<usize> = expected.filter_map(|subject| bodies.position(subject)).collect();
+    let mut others: Vec<_> = seen.filter(|b| !expected.contains(b)).collect();
+    others.sort_unstable();
+    others.dedup();
+    expected.into_iter().chain(others).collect()
+}
+
+impl Keep for Whole {
+    type Kept = Stretch;
+
+    fn begin(_: &PoseLabel, _: usize) -> Self {
+        Self::default()
+    }
+
+    fn scan(&mut self, ranges: Vec<f64>) {
+        self.ranges.extend(ranges);
+    }
+
+    fn echoes(&mut self, echoes: Vec<Vec<f64>>) {
+        self.echoes.extend(echoes);
+    }
+
+    fn look(&mut self, _: &mut Capture, _: Known<'_>) {}
+
+    fn end(stretch: Gathering<Self>, known: Known<'_>) -> Stretch {
+        let (stretch, kept) = stretch.into_stretch(known);
+        Stretch {
+            ranges: kept.ranges,
+            echoes: (!kept.echoes.is_empty()).then_some(kept.echoes),
+            ..stretch
+        }
+    }
 }

@@ -5,7 +5,11 @@
 //! at all ([`file`](mod@file), [`folder`]); whatever goes wrong names the file ([`error`]).
 
 #[cfg(feature = "recording")]
+mod blocks;
+#[cfg(feature = "recording")]
 mod bodies;
+#[cfg(feature = "recording")]
+mod capture;
 #[cfg(feature = "recording")]
 mod container;
 pub mod error;
@@ -30,6 +34,10 @@ pub mod playback;
 pub mod recording;
 #[cfg(feature = "recording")]
 mod schedule;
+#[cfg(feature = "recording")]
+mod source;
+#[cfg(feature = "recording")]
+mod survey;
 
 #[cfg(feature = "scene")]
 pub mod diagnostic;

@@ -5,24 +5,25 @@
 //! [`recording`](super::recording) are passed over, and so are bodies and markers that the session does not know and
 //! motion capture before the first label. Where `/mocap/markers` has no message, the list of markers is empty.
 
+use super::blocks::{Place, words};
 use super::bodies::{Bodies, MARKERS_TOPIC};
 use super::definitions::{self, Definition};
 use super::error::IoError;
-use super::gathering::Gathering;
+use super::gathering::{Gathering, Keep, Known, Whole};
 use super::messages;
+use super::source::{Source, Start};
+use super::survey::{Survey, Surveyed, watch};
 use catoptric_model::session::ScannerSheet;
-use catoptric_model::{PoseLabel, Session, Stretch};
+use catoptric_model::{ModelError, PoseLabel, PoseRecord, Readings, ScanSource, Session, Stretch};
 use mcap::records::{Record, op};
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
-
-/// Longest record or chunk that is believed, in bytes; a longer one is a corrupt length, not a reason to allocate.
-const LONGEST_RECORD: usize = 1 << 28;
+use std::sync::{Arc, Mutex};
 
 /// What a channel carries.
 #[derive(Debug, Clone, PartialEq)]
-enum Topic {
+pub(super) enum Topic {
     Label,
     Scan,
     Echoes,
@@ -32,26 +33,27 @@ enum Topic {
 }
 
 /// The recording so far.
-struct Playback<'a> {
+struct Playback<'a, R: Keep> {
     scanner: &'a ScannerSheet,
     bodies: Bodies,
     schemas: BTreeMap<u16, String>,
     topics: BTreeMap<u16, Topic>,
     /// Time of the first message, in nanoseconds.
     epoch: Option<u64>,
-    current: Option<Gathering>,
-    finished: Vec<Stretch>,
+    current: Option<Gathering<R>>,
+    /// Where the stretches begin.
+    starts: Vec<Start>,
+    finished: Vec<R::Kept>,
 }
 
-/// Reads a recording.
+/// Reads a recording, frame by frame; every stretch of it is held.
 ///
 /// Ranges come back as the 32-bit numbers they were stored as, poses and markers bit by bit.
 ///
 /// # Errors
 /// [`IoError`] with the file and the place if it cannot be read, is cut off or corrupt, or does not fit the session.
 pub fn read_recording(path: &Path, session: &Session) -> Result<Vec<Stretch>, IoError> {
-    let bytes = std::fs::read(path).map_err(|e| IoError::read(path, e))?;
-    parse_recording(&bytes, path, session)
+    Ok(play::<Whole>(&Place::File(path.to_owned()), session)?.0)
 }
 
 /// Reads a recording from memory; `path` names it in errors.
@@ -59,62 +61,73 @@ pub fn read_recording(path: &Path, session: &Session) -> Result<Vec<Stretch>, Io
 /// # Errors
 /// [`IoError`] as [`read_recording`].
 pub fn parse_recording(bytes: &[u8], path: &Path, session: &Session) -> Result<Vec<Stretch>, IoError> {
-    let mut playback = Playback {
+    let place = Place::Memory(path.to_owned(), Arc::from(bytes));
+    Ok(play::<Whole>(&place, session)?.0)
+}
+
+/// What a calibration needs of every stretch of a recording; readings stay in it.
+///
+/// The outer error is one of the recording, the inner one of a stretch that no calibration can use.
+pub(super) fn survey(
+    place: Place,
+    session: &Session,
+) -> Result<Result<Vec<PoseRecord>, ModelError>, IoError> {
+    let (surveyed, source) = play::<Survey>(&place, session)?;
+    let source = Arc::new(source);
+    let complete = |(stretch, surveyed): (usize, Surveyed)| {
+        let mut record = match surveyed.record {
+            Ok(record) => record,
+            Err(error) => return Ok(Err(error)),
+        };
+        if !surveyed.unwatched.is_empty() {
+            record.watched = watch(&source, stretch, &surveyed.unwatched)?;
+        }
+        let recording: Arc<dyn ScanSource> = Arc::<Source>::clone(&source);
+        record.readings = Readings::recorded(recording, stretch, record.label.scans, surveyed.statistics);
+        Ok(Ok(record))
+    };
+    let records: Vec<Result<PoseRecord, ModelError>> = surveyed
+        .into_par_iter()
+        .enumerate()
+        .map(complete)
+        .collect::<Result<_, IoError>>()?;
+    Ok(records.into_iter().collect())
+}
+
+/// Goes through a recording once: what was kept of every stretch, and where everything is.
+fn play<R: Keep>(place: &Place, session: &Session) -> Result<(Vec<R::Kept>, Source), IoError> {
+    let mut playback = Playback::<R> {
         scanner: &session.scanner,
-        bodies: Bodies::of(session, path)?,
+        bodies: Bodies::of(session, place.path())?,
         schemas: BTreeMap::new(),
         topics: BTreeMap::new(),
         epoch: None,
         current: None,
+        starts: Vec::new(),
         finished: Vec::new(),
     };
-    let at = |offset: usize, what: String| IoError::Recording {
-        path: path.to_owned(),
-        what,
-        offset: offset as u64,
+    let (blocks, length) = place.visit(|opcode, data, at| playback.record(opcode, data, at))?;
+    let ended = playback.end_stretch();
+    ended.map_err(|what| place.corrupt(what, length))?;
+    let source = Source {
+        place: place.clone(),
+        blocks,
+        stretches: playback.starts,
+        topics: playback.topics,
+        epoch: playback.epoch.unwrap_or_default(),
+        bodies: playback.bodies,
+        kept: Mutex::default(),
     };
-    // Every checksum is checked: readings that were damaged must not look like readings.
-    let options = LinearReaderOptions::default()
-        .with_record_length_limit(LONGEST_RECORD)
-        .with_prevalidate_chunk_crcs(true)
-        .with_validate_data_section_crc(true)
-        .with_validate_summary_section_crc(true)
-        .with_check_finishes_after_end_magic(true);
-    let mut reader = LinearReader::new_with_options(options);
-    let mut offset = 0;
-    while let Some(event) = reader.next_event() {
-        match event.map_err(|e| at(offset, corrupt(&e)))? {
-            LinearReadEvent::ReadRequest(need) => {
-                let next = &bytes[offset..bytes.len().min(offset.saturating_add(need))];
-                reader.insert(next.len()).copy_from_slice(next);
-                reader.notify_read(next.len());
-                offset += next.len();
-            }
-            LinearReadEvent::Record { data, opcode } => {
-                playback.record(opcode, data).map_err(|what| at(offset, what))?;
-            }
-        }
-    }
-    playback.end_stretch().map_err(|what| at(offset, what))?;
-    Ok(playback.finished)
+    Ok((playback.finished, source))
 }
 
-/// The reader's error in one line, with what lies beneath it.
-fn corrupt(error: &mcap::McapError) -> String {
-    match error {
-        mcap::McapError::Parse(e) => format!("not a whole recording: {error}: {e}"),
-        mcap::McapError::Io(e) => format!("not a whole recording: {e}"),
-        _ => format!("not a whole recording: {error}"),
-    }
-}
-
-impl Playback<'_> {
-    /// Takes a record in.
-    fn record(&mut self, opcode: u8, data: &[u8]) -> Result<(), String> {
+impl<R: Keep> Playback<'_, R> {
+    /// Takes a record in, by its block and its number there.
+    fn record(&mut self, opcode: u8, data: &[u8], at: (usize, usize)) -> Result<(), String> {
         if !matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
             return Ok(());
         }
-        match mcap::parse_record(opcode, data).map_err(|e| corrupt(&e))? {
+        match mcap::parse_record(opcode, data).map_err(|e| words(&e))? {
             Record::Schema { header, .. } => {
                 self.schemas.insert(header.id, header.name);
             }
@@ -132,7 +145,7 @@ impl Playback<'_> {
                 let topic = topic.ok_or_else(|| {
                     format!("a message on channel {}, which does not exist", header.channel_id)
                 })?;
-                self.message(&topic.clone(), header.log_time, &data)?;
+                self.message(&topic.clone(), header.log_time, &data, at)?;
             }
             _ => {}
         }
@@ -167,20 +180,35 @@ impl Playback<'_> {
     }
 
     /// Takes a message in.
-    fn message(&mut self, topic: &Topic, log_time: u64, data: &[u8]) -> Result<(), String> {
+    fn message(
+        &mut self,
+        topic: &Topic,
+        log_time: u64,
+        data: &[u8],
+        at: (usize, usize),
+    ) -> Result<(), String> {
+        let known = Known {
+            scanner: self.scanner,
+            bodies: &self.bodies,
+            epoch: self.epoch.unwrap_or_default(),
+        };
         match topic {
             Topic::Label => {
                 let label: PoseLabel =
                     serde_json::from_slice(data).map_err(|e| format!("/session/pose: {e}"))?;
                 self.end_stretch()?;
-                self.current = Some(Gathering::new(label, log_time));
+                self.starts.push(Start {
+                    label: at,
+                    scans: label.scans,
+                });
+                self.current = Some(Gathering::new(label, log_time, self.scanner));
             }
             Topic::Scan => {
                 let scan = messages::decode_scan(data).map_err(|e| format!("/scan: {e}"))?;
                 let current = self.current.as_mut();
                 let current = current.ok_or("/scan: a scan before the first /session/pose")?;
                 current
-                    .scan(&scan, self.scanner)
+                    .scan(scan, self.scanner)
                     .map_err(|what| format!("/scan: pose {}: {what}", current.number()))?;
             }
             Topic::Echoes => {
@@ -196,14 +224,18 @@ impl Playback<'_> {
                 let (time, pose) =
                     messages::decode_pose(data).map_err(|e| format!("/mocap/{subject}: {e}"))?;
                 if let Some(current) = &mut self.current {
-                    current.pose(time, *body, pose);
+                    let taken = current.pose(time, *body, pose, known);
+                    taken.map_err(|what| format!("/mocap/{subject}: pose {}: {what}", current.number()))?;
                 }
             }
             Topic::Markers => {
                 let (time, markers) =
                     messages::decode_markers(data).map_err(|e| format!("/mocap/{MARKERS_TOPIC}: {e}"))?;
                 if let Some(current) = &mut self.current {
-                    current.markers(time, markers);
+                    let taken = current.markers(time, &markers, known);
+                    taken.map_err(|what| {
+                        format!("/mocap/{MARKERS_TOPIC}: pose {}: {what}", current.number())
+                    })?;
                 }
             }
             Topic::Other => {}
@@ -216,9 +248,12 @@ impl Playback<'_> {
         let Some(gathering) = self.current.take() else {
             return Ok(());
         };
-        let epoch = self.epoch.unwrap_or_default();
-        let stretch = gathering.into_stretch(self.scanner, &self.bodies, epoch)?;
-        self.finished.push(stretch);
+        let known = Known {
+            scanner: self.scanner,
+            bodies: &self.bodies,
+            epoch: self.epoch.unwrap_or_default(),
+        };
+        self.finished.push(gathering.end(known)?);
         Ok(())
     }
 }

@@ -6,6 +6,7 @@ use crate::error::ModelError;
 use crate::frame::Pose;
 use crate::label::{PoseKind, PoseLabel};
 use crate::motion::Motion;
+use crate::readings::{BeamStatistics, Readings, Scans};
 use crate::session::Session;
 use crate::summary::Summary;
 use crate::tracking::{Track, Watched};
@@ -70,19 +71,22 @@ pub struct PoseRecord {
     pub motion: Option<Motion>,
     /// The markers of rig and board over the stretch; none of a flight, nor where only poses were recorded.
     pub watched: Vec<Watched>,
-    /// Beams of a scan.
-    pub beams: usize,
-    /// Readings in metres, scan after scan; −∞ too close, +∞ no return, NaN invalid (REP-117).
-    pub ranges: Vec<f64>,
+    /// What every beam read, scan after scan.
+    pub readings: Readings,
 }
 
 /// A recorded experiment: what a calibration is made from.
+///
+/// It is small however many scans there are: readings stay in the recording, which is read again where a statistic needs
+/// them, unless the dataset was made in memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dataset {
     /// What the experimenter knows.
     pub session: Session,
     /// The stretches, in the order they were recorded.
     pub poses: Vec<PoseRecord>,
+    /// SHA-256 of the recording, as hexadecimal digits; `None` of a dataset that was made in memory.
+    pub id: Option<String>,
 }
 
 impl Stretch {
@@ -104,27 +108,12 @@ impl Stretch {
                 .and_then(Track::mean_pose)
         };
         let motion = (self.label.kind == PoseKind::Flight).then(|| self.motion());
-        let room_from_rig = match &motion {
-            Some(motion) => motion.frames.first().map(|(_, pose)| *pose),
-            None => mean(RIG_SUBJECT),
-        };
-        let room_from_rig = room_from_rig.ok_or_else(|| {
-            ModelError::Inconsistent(format!("pose {}: the rig was never tracked", self.label.pose))
-        })?;
-        let room_from_board = self.label.board.as_deref().and_then(mean);
         let watched = match motion {
             Some(_) => Vec::new(),
             None => self.tracks.iter().filter_map(Watched::of).collect(),
         };
-        Ok(PoseRecord {
-            room_from_rig,
-            room_from_board,
-            motion,
-            watched,
-            beams: self.beams,
-            ranges: self.ranges,
-            label: self.label,
-        })
+        let readings = Readings::in_memory(self.beams, self.ranges);
+        PoseRecord::new(self.label, motion, mean, watched, readings)
     }
 
     /// Where the rig was seen, frame by frame.
@@ -140,25 +129,60 @@ impl Stretch {
 }
 
 impl PoseRecord {
-    /// The readings of one beam, scan after scan.
-    pub fn readings(&self, beam: usize) -> impl Iterator<Item = f64> + Clone + '_ {
-        self.ranges.iter().skip(beam).step_by(self.beams).copied()
+    /// What was recorded of a stretch; `mean` says where a body was, on average.
+    ///
+    /// # Errors
+    /// [`ModelError::Inconsistent`] if motion capture never saw the rig.
+    pub fn new(
+        label: PoseLabel,
+        motion: Option<Motion>,
+        mean: impl Fn(&str) -> Option<Pose>,
+        watched: Vec<Watched>,
+        readings: Readings,
+    ) -> Result<Self, ModelError> {
+        let room_from_rig = match &motion {
+            Some(motion) => motion.frames.first().map(|(_, pose)| *pose),
+            None => mean(RIG_SUBJECT),
+        };
+        let room_from_rig = room_from_rig.ok_or_else(|| {
+            ModelError::Inconsistent(format!("pose {}: the rig was never tracked", label.pose))
+        })?;
+        Ok(Self {
+            room_from_rig,
+            room_from_board: label.board.as_deref().and_then(mean),
+            motion,
+            watched,
+            readings,
+            label,
+        })
+    }
+
+    /// Beams of a scan.
+    pub fn beams(&self) -> usize {
+        self.readings.beams()
+    }
+
+    /// The scans, one after the other.
+    ///
+    /// ```
+    /// use catoptric_model::{PoseRecord, Unreadable};
+    ///
+    /// fn longest(record: &PoseRecord) -> Result<f64, Unreadable> {
+    ///     let mut longest = 0.0_f64;
+    ///     for scan in record.scans() {
+    ///         longest = scan?.iter().filter(|r| r.is_finite()).fold(longest, |l, r| l.max(*r));
+    ///     }
+    ///     Ok(longest)
+    /// }
+    /// ```
+    pub fn scans(&self) -> Scans<'_> {
+        self.readings.scans()
     }
 
     /// Mean and spread of every beam.
     pub fn summarize(&self) -> Vec<Summary> {
-        // Scan after scan, as the readings lie in memory.
-        let mut summaries = vec![Summary::default(); self.beams];
-        for scan in self.ranges.chunks(self.beams.max(1)) {
-            for (s, r) in summaries.iter_mut().zip(scan) {
-                if r.is_finite() {
-                    s.add(*r);
-                } else {
-                    s.missing += 1;
-                }
-            }
-        }
-        summaries.into_iter().map(Summary::finished).collect()
+        let beams = self.readings.statistics().iter();
+        beams.map(BeamStatistics::summary).collect()
     }
 }
 
@@ -176,21 +200,14 @@ impl Dataset {
             )))
         };
         for pose in &self.poses {
-            if pose.beams != self.session.scanner.beams {
-                return fail(
-                    pose,
-                    format!(
-                        "{} beams, the scanner has {}",
-                        pose.beams, self.session.scanner.beams
-                    ),
-                );
+            let (beams, found) = (pose.beams(), pose.readings.len());
+            if beams != self.session.scanner.beams {
+                let scanner = self.session.scanner.beams;
+                return fail(pose, format!("{beams} beams, the scanner has {scanner}"));
             }
-            let expected = pose.label.scans * pose.beams;
-            if pose.ranges.len() != expected {
-                return fail(
-                    pose,
-                    format!("{} readings, {expected} expected", pose.ranges.len()),
-                );
+            let expected = pose.label.scans * beams;
+            if found != expected {
+                return fail(pose, format!("{found} readings, {expected} expected"));
             }
             let needs_board = matches!(pose.label.kind, PoseKind::Direct | PoseKind::Facet);
             match &pose.label.board {
@@ -230,8 +247,7 @@ mod tests {
             room_from_board: None,
             motion: None,
             watched: Vec::new(),
-            beams: 2,
-            ranges: vec![1.0, f64::INFINITY, 2.0, f64::NAN, 3.0, 5.0],
+            readings: Readings::in_memory(2, vec![1.0, f64::INFINITY, 2.0, f64::NAN, 3.0, 5.0]),
         };
         let s = pose.summarize();
         assert_eq!(

@@ -27,6 +27,17 @@ pub struct Summary {
     pub sd: f64,
 }
 
+/// Number, mean and squares of ranges that are taken in one by one.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Moments {
+    /// Ranges taken in.
+    pub count: usize,
+    /// Their mean, in metres; 0 without any.
+    pub mean: f64,
+    /// The sum of their squared deviations from it, in m².
+    pub squares: f64,
+}
+
 /// The limits of the main body of some ranges, in metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
@@ -64,26 +75,32 @@ impl Window {
     }
 }
 
-impl Summary {
-    /// Takes a range in, by Welford's recurrence, in which `sd` holds the sum of squares until [`Summary::finished`]: the
-    /// naive sum loses the noise under the range.
+impl Moments {
+    /// Takes a range in, by Welford's recurrence: the naive sum of squares loses the noise under the range.
     pub fn add(&mut self, range: f64) {
         self.count += 1;
         let step = range - self.mean;
         self.mean += step / self.count as f64;
-        self.sd += step * (range - self.mean);
+        self.squares += step * (range - self.mean);
     }
 
-    /// The summary of all ranges that were taken in.
-    pub fn finished(mut self) -> Self {
-        self.sd = if self.count > 1 {
-            (self.sd / (self.count - 1) as f64).sqrt()
+    /// The summary of the ranges that were taken in.
+    pub fn summary(&self) -> Summary {
+        let sd = if self.count > 1 {
+            (self.squares / (self.count - 1) as f64).sqrt()
         } else {
             0.0
         };
-        self
+        Summary {
+            count: self.count,
+            mean: self.mean,
+            sd,
+            ..Summary::default()
+        }
     }
+}
 
+impl Summary {
     /// Statistics of the main body of readings, all other ranges counted as outliers; `None` where no range is, or no
     /// majority of them is together.
     ///
@@ -97,18 +114,22 @@ impl Summary {
     /// ```
     pub fn of_main_body(readings: impl Iterator<Item = f64> + Clone, noise_sd: f64) -> Option<Self> {
         let window = Window::around(readings.clone(), noise_sd)?;
-        let mut found = Self::default();
+        let (mut body, mut missing, mut outliers) = (Moments::default(), 0, 0);
         for r in readings {
             if !r.is_finite() {
-                found.missing += 1;
+                missing += 1;
             } else if window.holds(r) {
-                found.add(r);
+                body.add(r);
             } else {
-                found.outliers += 1;
+                outliers += 1;
             }
         }
-        let all = (found.count + found.outliers) as f64;
-        (found.count as f64 >= MAJORITY * all).then(|| found.finished())
+        let all = (body.count + outliers) as f64;
+        (body.count as f64 >= MAJORITY * all).then(|| Self {
+            missing,
+            outliers,
+            ..body.summary()
+        })
     }
 }
 

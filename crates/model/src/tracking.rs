@@ -59,20 +59,43 @@ impl Track {
     /// Positions are averaged, and quaternions after bringing them to one sign: exact to second order in the spread,
     /// which is far below a milliradian here.
     pub fn mean_pose(&self) -> Option<Pose> {
-        let mut poses = self.frames.iter().filter_map(|f| f.pose);
-        let first = poses.next()?;
-        let (mut translation, mut rotation) = (first.translation.vector, first.rotation.into_inner());
-        let mut count = 1.0;
-        for pose in poses {
-            translation += pose.translation.vector;
-            let q = pose.rotation.into_inner();
-            rotation += if q.dot(&first.rotation) < 0.0 { -q } else { q };
-            count += 1.0;
+        let mut mean = MeanPose::default();
+        self.frames
+            .iter()
+            .filter_map(|f| f.pose)
+            .for_each(|pose| mean.add(&pose));
+        mean.finish()
+    }
+}
+
+/// The mean of poses that are taken in one by one, as [`Track::mean_pose`] forms it.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct MeanPose {
+    /// The first pose's rotation, and the sums.
+    sums: Option<(UnitQuaternion<f64>, Vector3<f64>, Quaternion<f64>)>,
+    count: f64,
+}
+
+impl MeanPose {
+    /// Takes a pose in.
+    pub fn add(&mut self, pose: &Pose) {
+        self.count += 1.0;
+        let q = pose.rotation.into_inner();
+        match &mut self.sums {
+            None => self.sums = Some((pose.rotation, pose.translation.vector, q)),
+            Some((first, translation, rotation)) => {
+                *translation += pose.translation.vector;
+                *rotation += if q.dot(first) < 0.0 { -q } else { q };
+            }
         }
-        let rotation: Quaternion<f64> = rotation / count;
+    }
+
+    /// The mean; `None` if there was no pose.
+    pub fn finish(self) -> Option<Pose> {
+        let (_, translation, rotation) = self.sums?;
         Some(Pose::from_parts(
-            Translation3::from(Vector3::from(translation / count)),
-            UnitQuaternion::new_normalize(rotation),
+            Translation3::from(translation / self.count),
+            UnitQuaternion::new_normalize(rotation / self.count),
         ))
     }
 }
@@ -118,26 +141,14 @@ impl Watched {
         if markers == 0 {
             return None;
         }
-        let frames = track.frames.len();
-        let parts = (frames / LEAST_FRAMES).clamp(1, MOST_PARTS);
-        let part = |k: usize| {
-            let frames = &track.frames[k * frames / parts..(k + 1) * frames / parts];
-            let mean = |marker: usize| {
-                let seen = frames.iter().filter_map(|f| *f.markers.get(marker)?);
-                let start = (Vector3::zeros(), 0_usize);
-                let (sum, count) = seen.fold(start, |(sum, n), p| (sum + p.coords, n + 1));
-                MeanMarker {
-                    place: Point3::from(sum / count.max(1) as f64),
-                    count,
-                }
-            };
-            (0..markers).map(mean).collect()
-        };
-        Some(Self {
-            subject: track.subject.clone(),
-            parts: (0..parts).map(part).collect(),
-            jitter: jitter(track, markers),
-        })
+        let mut watching = Watching::new(track.frames.len(), markers);
+        let mut jumps = Vec::new();
+        for frame in &track.frames {
+            watching.add(&frame.markers, |square| jumps.push(square));
+        }
+        let middle = jumps.len() / 2;
+        let median = (!jumps.is_empty()).then(|| *jumps.select_nth_unstable_by(middle, f64::total_cmp).1);
+        Some(watching.finish(track.subject.clone(), median))
     }
 
     /// The markers averaged over the parts `first` to `last − 1`.
@@ -162,23 +173,64 @@ impl Watched {
     }
 }
 
-/// Jumps between successive frames have twice the variance of a frame; their median does not see a few large ones.
-fn jitter(track: &Track, markers: usize) -> f64 {
-    let pairs = track.frames.iter().zip(track.frames.iter().skip(1));
-    let mut squares: Vec<f64> = pairs
-        .flat_map(|(a, b)| {
-            (0..markers).filter_map(move |m| {
-                let (from, to) = ((*a.markers.get(m)?)?, (*b.markers.get(m)?)?);
-                Some((to - from).norm_squared())
-            })
-        })
-        .collect();
-    if squares.is_empty() {
-        return 0.0;
+/// The markers of a body, frame by frame, while they are averaged over parts of a stretch.
+#[derive(Debug, Clone)]
+pub struct Watching {
+    /// Frames of the stretch, and those that have passed.
+    frames: usize,
+    passed: usize,
+    /// In every part and of every marker: the sum of its places, and the frames in which it was seen.
+    parts: Vec<Vec<(Vector3<f64>, usize)>>,
+    before: Vec<Option<Point3<f64>>>,
+}
+
+impl Watching {
+    /// Begins a stretch of so many frames of so many markers.
+    pub fn new(frames: usize, markers: usize) -> Self {
+        let parts = (frames / LEAST_FRAMES).clamp(1, MOST_PARTS);
+        Self {
+            frames,
+            passed: 0,
+            parts: vec![vec![(Vector3::zeros(), 0); markers]; parts],
+            before: Vec::new(),
+        }
     }
-    let middle = squares.len() / 2;
-    let (_, median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
-    (0.5 * *median / MEDIAN_SQUARE).sqrt()
+
+    /// Takes the markers of a frame in; `jump` is given the square of how far each went since the frame before, in m².
+    pub fn add(&mut self, markers: &[Option<Point3<f64>>], mut jump: impl FnMut(f64)) {
+        let parts = self.parts.len();
+        let ends = |part: usize| (part + 1) * self.frames / parts;
+        let part = (0..parts).find(|part| self.passed < ends(*part));
+        self.passed += 1;
+        for ((sum, count), place) in self.parts[part.unwrap_or(parts - 1)].iter_mut().zip(markers) {
+            if let Some(place) = place {
+                *sum += place.coords;
+                *count += 1;
+            }
+        }
+        for (from, to) in self.before.iter().zip(markers) {
+            if let (Some(from), Some(to)) = (from, to) {
+                jump((to - from).norm_squared());
+            }
+        }
+        self.before.clear();
+        self.before.extend_from_slice(markers);
+    }
+
+    /// What was watched; jumps between successive frames have twice the variance of a frame, and the median of their
+    /// squares, `None` without any, does not see a few large ones.
+    pub fn finish(self, subject: String, median_jump: Option<f64>) -> Watched {
+        let mean = |(sum, count): (Vector3<f64>, usize)| MeanMarker {
+            place: Point3::from(sum / count.max(1) as f64),
+            count,
+        };
+        let parts = self.parts.into_iter();
+        Watched {
+            subject,
+            parts: parts.map(|p| p.into_iter().map(mean).collect()).collect(),
+            jitter: median_jump.map_or(0.0, |square| (0.5 * square / MEDIAN_SQUARE).sqrt()),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -30,12 +30,13 @@ pub use layout::{Drawn, layout, layout_pictures};
 pub use optimum::{front_picture, goal_value, optimum};
 #[cfg(feature = "design")]
 pub use plan::plan;
+pub use plots::MOST_POINTS;
 pub use study::study;
 #[cfg(feature = "design")]
 pub use tolerance::{tolerance, tolerance_plot};
 
+use catoptric_assess::apply::CloudSketch;
 use catoptric_assess::score::Score;
-use catoptric_model::PointCloud;
 use catoptric_model::{Calibration, Dataset};
 use catoptric_sim::Truth;
 use page::escape;
@@ -43,13 +44,13 @@ use scores::scores;
 
 /// The report of an experiment and the calibrations made from it, as HTML.
 ///
-/// The first calibration is the one whose fans are drawn. `cloud` is what [`apply`](fn@catoptric_assess::apply) made of the
-/// empty room.
+/// The first calibration is the one whose fans are drawn. `cloud` is a sketch, of [`MOST_POINTS`], of
+/// what [`apply`](fn@catoptric_assess::apply) makes of the empty room.
 pub fn report(
     dataset: &Dataset,
     truth: Option<&Truth>,
     results: &[(Calibration, Score)],
-    cloud: Option<&PointCloud>,
+    cloud: Option<&CloudSketch>,
 ) -> String {
     let name = &dataset.session.name;
     let mut html = format!(

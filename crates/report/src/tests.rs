@@ -1,7 +1,7 @@
 //! The page as a whole: its tags close, its plots have tables, and it says what the scores say.
 
 use super::*;
-use catoptric_assess::apply;
+use catoptric_assess::apply::Lift;
 use catoptric_assess::score::score;
 use catoptric_fixtures::{noisy, sample, turned};
 use catoptric_model::CloudFrame;
@@ -11,9 +11,11 @@ fn html(with_truth: bool) -> String {
     let truth = with_truth.then_some(&s.truth);
     let first = turned(noisy(&s.truth, 1e-3, 1), 2e-3);
     let second = noisy(&s.truth, 3e-3, 2);
-    let cloud = apply(&s.dataset, &first, None, CloudFrame::Room).expect("there is a room");
+    let lift = Lift::new(&s.dataset, &first, None, CloudFrame::Room).expect("there is a room");
+    let cloud = CloudSketch::of(&lift, MOST_POINTS).expect("in memory");
+    drop(lift);
     let results = [first, second].map(|c| {
-        let score = score(&s.dataset, &c, truth);
+        let score = score(&s.dataset, &c, truth).expect("in memory");
         (c, score)
     });
     report(&s.dataset, truth, &results, Some(&cloud))

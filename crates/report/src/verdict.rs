@@ -70,7 +70,7 @@ mod tests {
             second.method = "a < b".to_owned();
             change(&mut second);
             verdicts(&[first.clone(), second].map(|c| {
-                let score = score(&s.dataset, &c, Some(&s.truth));
+                let score = score(&s.dataset, &c, Some(&s.truth)).expect("in memory");
                 (c, score)
             }))
         };

@@ -237,7 +237,9 @@ mod tests {
     #[test]
     fn each_kind_of_error_is_named() {
         let s = sample();
-        let said = |calibration: &Calibration| dominance(&score(&s.dataset, calibration, Some(&s.truth)));
+        let said = |calibration: &Calibration| {
+            dominance(&score(&s.dataset, calibration, Some(&s.truth)).expect("in memory"))
+        };
         assert!(
             said(&turned(noisy(&s.truth, 1e-4, 1), 5e-3)).starts_with("What all elements have in common")
         );
@@ -253,6 +255,9 @@ mod tests {
             of.for_each(|b| b.elevation_rad = b.elevation_rad.map(|e| e + lift));
         }
         assert!(said(&by_mirror).starts_with("What the elements of one mirror have in common"));
-        assert!(accuracy(&score(&s.dataset, &perfect(&s.truth), Some(&s.truth))).contains("within 0.000°"));
+        assert!(
+            accuracy(&score(&s.dataset, &perfect(&s.truth), Some(&s.truth)).expect("in memory"))
+                .contains("within 0.000°")
+        );
     }
 }

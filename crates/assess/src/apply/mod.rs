@@ -1,10 +1,14 @@
 //! From the readings of a stretch to points in space: Cooper, Eqs. (9) and (10), with a calibration.
 
+mod sketch;
+
 use crate::score::residual;
 #[cfg(doc)]
 use catoptric_model::Motion;
 use catoptric_model::cloud::{self, CloudFrame, CloudPoint, PointCloud};
-use catoptric_model::{Calibration, Dataset, Deflection, Pose, PoseKind, PoseRecord, Status, beam};
+use catoptric_model::{Calibration, Dataset, Deflection, Pose, PoseKind, PoseRecord, RangeBias, Status};
+use catoptric_model::{Unreadable, beam};
+pub use sketch::{CloudSketch, Extent};
 
 /// Why no cloud can be made.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -22,6 +26,9 @@ pub enum ApplyError {
     /// No stretch was asked for, and there is none of the room.
     #[error("the dataset has no stretch of the empty room; say which pose to apply the calibration to")]
     NoRoom,
+    /// Readings that the dataset's recording gives no more.
+    #[error(transparent)]
+    Unreadable(#[from] Unreadable),
 }
 
 /// Lifts every range of a stretch into space: of pose number `pose`, or else of the first stretch of the empty room.
@@ -33,66 +40,158 @@ pub enum ApplyError {
 /// In a flight the rig is where motion capture saw it at each reading's own time (see [`Motion::room_from_rig`]); sensor
 /// and rig frame are those of that time, too.
 ///
+/// The cloud is in memory; [`Lift`] hands on point by point.
+///
 /// # Errors
-/// [`ApplyError`] if there is no such stretch.
+/// [`ApplyError`] if there is no such stretch, or its readings are there no more.
 pub fn apply(
     dataset: &Dataset,
     calibration: &Calibration,
     pose: Option<usize>,
     frame: CloudFrame,
 ) -> Result<PointCloud, ApplyError> {
-    let record = find(dataset, pose)?;
-    let rig_from_sensor = residual::mount(dataset, calibration);
-    let step_period_s = dataset.session.scanner.step_period_s();
-    let room_from_rig = |scan, beam| {
-        let motion = record.motion.as_ref();
-        motion
-            .and_then(|m| m.room_from_rig(m.time_s(scan, beam, step_period_s)))
-            .unwrap_or(record.room_from_rig)
-    };
-    let frame_from_sensor = |scan, beam| match frame {
-        CloudFrame::Sensor => Pose::identity(),
-        CloudFrame::Rig => rig_from_sensor,
-        CloudFrame::Room => room_from_rig(scan, beam) * rig_from_sensor,
-    };
-    let bias = residual::bias(dataset, calibration);
-    // Nothing is believed about a color without a name.
-    let room_color = dataset.session.room.as_ref().map_or("", |room| &room.color);
-    let color = record.label.color.as_deref().unwrap_or(room_color);
-    let deflections: Vec<Option<Deflection>> =
-        (0..record.beams).map(|b| deflection(calibration, b)).collect();
-
-    let mut result = PointCloud {
+    let lift = Lift::new(dataset, calibration, pose, frame)?;
+    let mut points = Vec::with_capacity(lift.sheet.points);
+    lift.each(|point| {
+        points.push(point);
+        Ok::<_, ApplyError>(())
+    })?;
+    let CloudSheet {
         frame,
-        pose: record.label.pose,
-        mount_is_nominal: frame != CloudFrame::Sensor && calibration.rig_from_sensor.is_none(),
-        points: Vec::new(),
-        without_range: 0,
-        without_direction: 0,
-        unsolved_elements: deflections.iter().filter(|d| d.is_none()).count(),
-    };
-    for (scan, ranges) in record.ranges.chunks(record.beams.max(1)).enumerate() {
-        for (beam, (&range, deflection)) in ranges.iter().zip(&deflections).enumerate() {
-            if !range.is_finite() {
-                result.without_range += 1;
-                continue;
+        pose,
+        mount_is_nominal,
+        points: _,
+        without_range,
+        without_direction,
+        unsolved_elements,
+    } = lift.sheet;
+    Ok(PointCloud {
+        frame,
+        pose,
+        mount_is_nominal,
+        points,
+        without_range,
+        without_direction,
+        unsolved_elements,
+    })
+}
+
+/// What is known of a cloud before a point of it is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CloudSheet {
+    /// Its frame.
+    pub frame: CloudFrame,
+    /// Stretch it is made from.
+    pub pose: usize,
+    /// Whether the mounting is taken from the drawing because the calibration has none.
+    pub mount_is_nominal: bool,
+    /// Number of its points.
+    pub points: usize,
+    /// Readings that are no ranges: no return, too close, invalid.
+    pub without_range: usize,
+    /// Ranges of elements that the calibration gives no direction.
+    pub without_direction: usize,
+    /// Elements that the calibration gives no direction.
+    pub unsolved_elements: usize,
+}
+
+/// A stretch as [`apply`] lifts it, point by point and in memory that does not grow with its scans.
+#[derive(Debug)]
+pub struct Lift<'a> {
+    /// What is known of the cloud.
+    pub sheet: CloudSheet,
+    record: &'a PoseRecord,
+    deflections: Vec<Option<Deflection>>,
+    rig_from_sensor: Pose,
+    step_period_s: f64,
+    bias: &'a RangeBias,
+    color: &'a str,
+}
+
+impl<'a> Lift<'a> {
+    /// Prepares a stretch.
+    ///
+    /// # Errors
+    /// [`ApplyError`] if there is no such stretch.
+    pub fn new(
+        dataset: &'a Dataset,
+        calibration: &'a Calibration,
+        pose: Option<usize>,
+        frame: CloudFrame,
+    ) -> Result<Self, ApplyError> {
+        let record = find(dataset, pose)?;
+        // Nothing is believed about a color without a name.
+        let room_color = dataset.session.room.as_ref().map_or("", |room| &room.color);
+        let deflections: Vec<Option<Deflection>> =
+            (0..record.beams()).map(|b| deflection(calibration, b)).collect();
+        let mut sheet = CloudSheet {
+            frame,
+            pose: record.label.pose,
+            mount_is_nominal: frame != CloudFrame::Sensor && calibration.rig_from_sensor.is_none(),
+            points: 0,
+            without_range: 0,
+            without_direction: 0,
+            unsolved_elements: deflections.iter().filter(|d| d.is_none()).count(),
+        };
+        for (of, deflection) in record.readings.statistics().iter().zip(&deflections) {
+            sheet.without_range += of.missing;
+            match deflection {
+                Some(_) => sheet.points += of.all.count,
+                None => sheet.without_direction += of.all.count,
             }
-            let Some(deflection) = deflection else {
-                result.without_direction += 1;
-                continue;
-            };
-            // E_a of whatever incidence is not added, so any will do here.
-            let terms = bias.terms(range, 1.0, color);
-            let corrected = range - terms.distance - terms.color;
-            let in_sensor = cloud::lift(deflection, beam::azimuth(beam), corrected);
-            result.points.push(CloudPoint {
-                position: frame_from_sensor(scan, beam) * in_sensor,
-                beam,
-                scan,
-            });
+        }
+        Ok(Self {
+            sheet,
+            record,
+            deflections,
+            rig_from_sensor: residual::mount(dataset, calibration),
+            step_period_s: dataset.session.scanner.step_period_s(),
+            bias: residual::bias(dataset, calibration),
+            color: record.label.color.as_deref().unwrap_or(room_color),
+        })
+    }
+
+    /// Makes the points, scan after scan, and hands each on.
+    ///
+    /// # Errors
+    /// [`Unreadable`] if the readings are there no more, or what `take` says.
+    pub fn each<E: From<Unreadable>>(
+        &self,
+        mut take: impl FnMut(CloudPoint) -> Result<(), E>,
+    ) -> Result<(), E> {
+        for (scan, ranges) in self.record.scans().enumerate() {
+            for (beam, (&range, deflection)) in ranges?.iter().zip(&self.deflections).enumerate() {
+                let Some(deflection) = deflection.as_ref().filter(|_| range.is_finite()) else {
+                    continue;
+                };
+                // E_a of whatever incidence is not added, so any will do here.
+                let terms = self.bias.terms(range, 1.0, self.color);
+                let corrected = range - terms.distance - terms.color;
+                let in_sensor = cloud::lift(deflection, beam::azimuth(beam), corrected);
+                take(CloudPoint {
+                    position: self.frame_from_sensor(scan, beam) * in_sensor,
+                    beam,
+                    scan,
+                })?;
+            }
+        }
+        Ok(())
+    }
+
+    fn frame_from_sensor(&self, scan: usize, beam: usize) -> Pose {
+        match self.sheet.frame {
+            CloudFrame::Sensor => Pose::identity(),
+            CloudFrame::Rig => self.rig_from_sensor,
+            CloudFrame::Room => self.room_from_rig(scan, beam) * self.rig_from_sensor,
         }
     }
-    Ok(result)
+
+    fn room_from_rig(&self, scan: usize, beam: usize) -> Pose {
+        let motion = self.record.motion.as_ref();
+        motion
+            .and_then(|m| m.room_from_rig(m.time_s(scan, beam, self.step_period_s)))
+            .unwrap_or(self.record.room_from_rig)
+    }
 }
 
 fn find(dataset: &Dataset, pose: Option<usize>) -> Result<&PoseRecord, ApplyError> {

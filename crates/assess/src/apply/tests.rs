@@ -5,6 +5,11 @@ use catoptric_fixtures::{perfect, sample};
 use catoptric_model::{ColorBias, DistanceBias, RangeBias};
 use nalgebra::Point3;
 
+/// The first scan.
+fn scan(dataset: &Dataset) -> &[f64] {
+    dataset.poses[0].readings.held().expect("in memory")
+}
+
 /// Distance of a point from the nearest wall, in metres.
 fn off_wall(dataset: &Dataset, p: &Point3<f64>) -> f64 {
     let room = dataset.session.room.as_ref().expect("the sample has walls");
@@ -25,7 +30,7 @@ fn the_cloud_of_the_empty_room_is_the_room() {
             .iter()
             .all(|p| off_wall(&s.dataset, &p.position) < 1e-9)
     );
-    let all: usize = s.dataset.poses[0].ranges.len();
+    let all: usize = s.dataset.poses[0].readings.len();
     assert_eq!(
         cloud.points.len() + cloud.without_range + cloud.without_direction,
         all
@@ -64,7 +69,7 @@ fn direct_elements_stay_in_the_plane() {
         .find(|p| p.beam == beam::FORWARD)
         .expect("it is direct");
     assert_eq!((forward.position.y, forward.position.z), (0.0, 0.0));
-    assert_eq!(forward.position.x, s.dataset.poses[0].ranges[beam::FORWARD]);
+    assert_eq!(forward.position.x, scan(&s.dataset)[beam::FORWARD]);
     assert!(cloud.points.iter().any(|p| p.position.z > 1.0));
 }
 
@@ -94,7 +99,7 @@ fn ranges_lose_what_depends_on_distance_and_color_but_not_on_incidence() {
         .iter()
         .find(|p| p.beam == beam::FORWARD)
         .expect("it is direct");
-    let range = s.dataset.poses[0].ranges[beam::FORWARD];
+    let range = scan(&s.dataset)[beam::FORWARD];
     assert!((forward.position.x - (range - 0.010)).abs() < 1e-12);
 }
 
@@ -102,7 +107,8 @@ fn ranges_lose_what_depends_on_distance_and_color_but_not_on_incidence() {
 fn codes_are_no_points() {
     let mut s = sample();
     for (place, code) in [(540, f64::NAN), (541, f64::INFINITY), (542, f64::NEG_INFINITY)] {
-        s.dataset.poses[0].ranges[place] = code;
+        let ranges = s.dataset.poses[0].readings.held_mut().expect("in memory");
+        ranges[place] = code;
     }
     let cloud = apply(&s.dataset, &perfect(&s.truth), None, CloudFrame::Room).expect("there is a room");
     assert_eq!(cloud.without_range, 3);

@@ -4,9 +4,9 @@
 use catoptric_calib::covariance::{MountUncertainty, budget};
 use catoptric_calib::observability::weakness;
 use catoptric_calib::observations::BoardInSensor;
-use catoptric_calib::{TrueDirection, limit};
+use catoptric_calib::{CalibError, TrueDirection, limit};
 use catoptric_calib::{locate, observations, pose};
-use catoptric_model::{Dataset, Pose, PoseKind};
+use catoptric_model::{Dataset, Pose, PoseKind, Unreadable};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
 use nalgebra::{Matrix2, Point3};
@@ -40,26 +40,32 @@ pub fn true_directions(truth: &Truth) -> Vec<TrueDirection> {
 
 /// The least covariance of (θ_a, φ), in rad², that any estimate from this dataset can have, for every beam that is
 /// deflected once and unsplit: facets, boards, mounting and biases are common to all of them.
-fn of_experiment(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize, Matrix2<f64>> {
+fn of_experiment(dataset: &Dataset, truth: &Truth) -> Result<BTreeMap<usize, Matrix2<f64>>, Unreadable> {
     let believed = &dataset.session.believed;
     if believed.range_noise_sd_mm == 0.0 {
         // Nothing is believed to be in the way.
-        return BTreeMap::new();
+        return Ok(BTreeMap::new());
     }
-    let limits = limit(dataset, &true_directions(truth)).unwrap_or_default();
-    limits
-        .into_iter()
-        .filter_map(|(beam, c)| Some((beam, c?)))
-        .collect()
+    let limits = match limit(dataset, &true_directions(truth)) {
+        Ok(limits) => limits,
+        Err(CalibError::Unreadable(error)) => return Err(error),
+        // What cannot be calibrated has no limit.
+        Err(_) => BTreeMap::new(),
+    };
+    let known = limits.into_iter().filter_map(|(beam, c)| Some((beam, c?)));
+    Ok(known.collect())
 }
 
 /// What the boards of a dataset tell of every beam that is deflected once.
 ///
 /// The boards are those that the true ray meets farther from the edge than its spot; the mounting is as uncertain as
 /// this dataset leaves it. A method that ties elements together, by their facet, may do better.
-pub fn knowable(dataset: &Dataset, truth: &Truth) -> Knowable {
+///
+/// # Errors
+/// [`Unreadable`] if the recording of the dataset can no longer be read.
+pub fn knowable(dataset: &Dataset, truth: &Truth) -> Result<Knowable, Unreadable> {
     let session = &dataset.session;
-    let summaries = locate::summaries(dataset);
+    let summaries = locate::summaries(dataset)?;
     let mount = pose::estimate(dataset, &summaries).uncertainty;
     let rig_from_sensor = Pose::from(&truth.rig_from_sensor);
     let boards: Vec<_> = dataset
@@ -74,7 +80,7 @@ pub fn knowable(dataset: &Dataset, truth: &Truth) -> Knowable {
     let cone = observations::cone_half_angle(session);
     let noise_sd = session.believed.range_noise_sd_mm * 1e-3;
     let mut knowable = Knowable {
-        limits: of_experiment(dataset, truth),
+        limits: of_experiment(dataset, truth)?,
         ..Knowable::default()
     };
     for beam in &truth.beams {
@@ -104,5 +110,5 @@ pub fn knowable(dataset: &Dataset, truth: &Truth) -> Knowable {
             knowable.open.insert(beam.beam);
         }
     }
-    knowable
+    Ok(knowable)
 }

@@ -31,7 +31,7 @@ mod statistics;
 pub mod words;
 
 use catoptric_model::frame::Pose;
-use catoptric_model::{Calibration, Dataset, PoseRecord, Track, TrackedFrame};
+use catoptric_model::{Calibration, Dataset, PoseRecord, Track, TrackedFrame, Unreadable};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
 use counts::{apart, count, open, statuses};
@@ -73,22 +73,32 @@ pub const DISHONEST_NEES: f64 = 6.0;
 pub const POINT_RANGES_M: [f64; 3] = [1.0, 4.0, 10.0];
 
 /// Scores a calibration against the truth, `&truth`; without one, `None`, against boards and walls only.
-pub fn score<'t>(dataset: &Dataset, calibration: &Calibration, truth: impl Into<Option<&'t Truth>>) -> Score {
+///
+/// # Errors
+/// [`Unreadable`] if the recording of the dataset can no longer be read.
+pub fn score<'t>(
+    dataset: &Dataset,
+    calibration: &Calibration,
+    truth: impl Into<Option<&'t Truth>>,
+) -> Result<Score, Unreadable> {
     let truth = truth.into();
-    let knowable = truth.map(|truth| knowable(dataset, truth));
+    let knowable = truth.map(|truth| knowable(dataset, truth)).transpose()?;
     score_by(dataset, calibration, truth.zip(knowable.as_ref()))
 }
 
 /// Scores a calibration against the truth and what can be known of it, which several calibrations of a dataset share.
+///
+/// # Errors
+/// As [`score`].
 pub fn score_by(
     dataset: &Dataset,
     calibration: &Calibration,
     reference: Option<(&Truth, &Knowable)>,
-) -> Score {
+) -> Result<Score, Unreadable> {
     let truth = reference.map(|(truth, _)| truth);
     let knowable = reference.map(|(_, knowable)| knowable);
-    let boards_mm = residual::boards(dataset, calibration);
-    let walls_mm = residual::walls(dataset, calibration);
+    let boards_mm = residual::boards(dataset, calibration)?;
+    let walls_mm = residual::walls(dataset, calibration)?;
     let elements = reference.map_or_else(Vec::new, |(truth, knowable)| {
         compare(calibration, truth, knowable)
     });
@@ -160,7 +170,7 @@ pub fn score_by(
     };
     score.elements = elements;
     words::judge(&mut score, calibration, truth.is_some());
-    score
+    Ok(score)
 }
 
 /// Where the rig stood, as tracked: the mean over the stretches, through which it did not move.

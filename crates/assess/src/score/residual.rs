@@ -1,11 +1,13 @@
 //! What needs no truth: how far the points that a calibration makes lie from boards and walls that were surveyed.
 
-use super::statistics::{mean, rms};
 use catoptric_calib::observations::{self, BoardInSensor};
 use catoptric_calib::tracking;
-use catoptric_model::{Calibration, CorrectedRange, Dataset, Deflection, Pose, PoseKind, PoseRecord};
-use catoptric_model::{RangeBias, RawRange, beam};
+use catoptric_model::{
+    BeamEstimate, Calibration, CorrectedRange, Dataset, Deflection, Pose, PoseKind, PoseRecord,
+};
+use catoptric_model::{RangeBias, RawRange, Unreadable, beam};
 use nalgebra::Unit;
+use rayon::prelude::*;
 use serde::Serialize;
 
 /// Distances of lifted points from the surfaces they lie on, counted positive behind the surface, in millimetres.
@@ -30,13 +32,14 @@ struct Surface {
     color: String,
 }
 
-/// Mean and mean square of one element's residuals over one stretch.
+/// One element's residuals over one stretch.
 struct Visit {
     beam: usize,
     stretch: usize,
+    on: Surface,
     readings: usize,
-    mean: f64,
-    mean_square: f64,
+    sum: f64,
+    sum_of_squares: f64,
 }
 
 /// Point-to-board residual of every reading of the solved elements on the boards of their facets.
@@ -44,7 +47,10 @@ struct Visit {
 /// An element is on a board if its outgoing ray, as calibrated, meets the board's face farther from the edge than
 /// its spot. A reading there is corrected by all of Eq. 3, since board and incidence are known, and its residual is
 /// the distance of the lifted point from the board's plane, cos θ_N·(r − d − s).
-pub fn boards(dataset: &Dataset, calibration: &Calibration) -> SurfaceResidual {
+///
+/// # Errors
+/// [`Unreadable`] if the recording can no longer be read.
+pub fn boards(dataset: &Dataset, calibration: &Calibration) -> Result<SurfaceResidual, Unreadable> {
     // A label on the wrong marker puts a board where it was not.
     let (dataset, _) = tracking::put_right(dataset);
     let dataset = dataset.as_ref();
@@ -67,7 +73,10 @@ pub fn boards(dataset: &Dataset, calibration: &Calibration) -> SurfaceResidual {
 }
 
 /// Point-to-wall residual of every reading of the solved elements in the empty room: data no method fits angles to.
-pub fn walls(dataset: &Dataset, calibration: &Calibration) -> SurfaceResidual {
+///
+/// # Errors
+/// As [`boards`].
+pub fn walls(dataset: &Dataset, calibration: &Calibration) -> Result<SurfaceResidual, Unreadable> {
     let rig_from_sensor = mount(dataset, calibration);
     collect(dataset, calibration, PoseKind::Room, |pose| {
         let room_from_sensor = pose.room_from_rig * rig_from_sensor;
@@ -107,43 +116,64 @@ fn collect<E>(
     dataset: &Dataset,
     calibration: &Calibration,
     kind: PoseKind,
-    expect: impl Fn(&PoseRecord) -> E,
-) -> SurfaceResidual
+    expect: impl Fn(&PoseRecord) -> E + Sync,
+) -> Result<SurfaceResidual, Unreadable>
 where
     E: Fn(usize, &Deflection) -> Option<Surface>,
 {
     let bias = bias(dataset, calibration);
-    let mut visits = Vec::new();
-    for pose in dataset.of_kind(kind) {
-        let expect = expect(pose);
-        for estimate in calibration.beams.iter().filter(|b| b.beam < pose.beams) {
-            let Some(deflection) = estimate.deflection() else {
-                continue;
-            };
-            let Some(on) = expect(estimate.beam, &deflection) else {
-                continue;
-            };
-            let residuals: Vec<f64> = pose
-                .readings(estimate.beam)
-                .filter(|r| r.is_finite())
-                .map(|r| {
-                    let CorrectedRange(corrected) =
-                        bias.correct(RawRange(r), on.predicted, on.cos_incidence, &on.color);
-                    on.cos_incidence * (corrected - on.predicted) * 1e3
-                })
-                .collect();
-            if !residuals.is_empty() {
-                visits.push(Visit {
-                    beam: estimate.beam,
-                    stretch: pose.label.pose,
-                    readings: residuals.len(),
-                    mean: mean(residuals.iter().copied()),
-                    mean_square: rms(residuals.iter().copied()).powi(2),
-                });
+    let of_stretch = |record: &&PoseRecord| {
+        let expect = expect(record);
+        let visit = |estimate: &BeamEstimate| {
+            Some(Visit {
+                beam: estimate.beam,
+                stretch: record.label.pose,
+                on: expect(estimate.beam, &estimate.deflection()?)?,
+                readings: 0,
+                sum: 0.0,
+                sum_of_squares: 0.0,
+            })
+        };
+        let on_it = calibration.beams.iter().filter(|b| b.beam < record.beams());
+        let mut visits: Vec<Visit> = on_it.filter_map(visit).collect();
+        if visits.is_empty() {
+            return Ok(visits);
+        }
+        for scan in record.scans() {
+            let scan = scan?;
+            for visit in &mut visits {
+                visit.add(RawRange(scan[visit.beam]), bias);
             }
         }
+        visits.retain(|v| v.readings > 0);
+        Ok(visits)
+    };
+    let stretches: Vec<&PoseRecord> = dataset.of_kind(kind).collect();
+    let visits: Vec<Vec<Visit>> = stretches.par_iter().map(of_stretch).collect::<Result<_, _>>()?;
+    Ok(summarize(&visits.into_iter().flatten().collect::<Vec<_>>()))
+}
+
+impl Visit {
+    fn add(&mut self, raw: RawRange, bias: &RangeBias) {
+        if !raw.0.is_finite() {
+            return;
+        }
+        let on = &self.on;
+        let CorrectedRange(corrected) = bias.correct(raw, on.predicted, on.cos_incidence, &on.color);
+        let residual = on.cos_incidence * (corrected - on.predicted) * 1e3;
+        self.readings += 1;
+        self.sum += residual;
+        self.sum_of_squares += residual * residual;
     }
-    summarize(&visits)
+
+    fn mean(&self) -> f64 {
+        self.sum / self.readings as f64
+    }
+
+    fn mean_square(&self) -> f64 {
+        // By way of the root mean square, to its last digit.
+        (self.sum_of_squares / self.readings as f64).sqrt().powi(2)
+    }
 }
 
 fn summarize(visits: &[Visit]) -> SurfaceResidual {
@@ -159,7 +189,7 @@ fn summarize(visits: &[Visit]) -> SurfaceResidual {
         stretches: count(|v| v.stretch),
         elements: count(|v| v.beam),
         readings,
-        mean: weighted(|v| v.mean),
-        rms: weighted(|v| v.mean_square).sqrt(),
+        mean: weighted(Visit::mean),
+        rms: weighted(Visit::mean_square).sqrt(),
     }
 }

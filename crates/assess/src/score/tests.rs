@@ -19,7 +19,7 @@ fn deflected(truth: &Truth) -> Vec<usize> {
 #[test]
 fn the_truth_itself_has_no_error_and_passes() {
     let s = sample();
-    let score = score(&s.dataset, &perfect(&s.truth), Some(&s.truth));
+    let score = score(&s.dataset, &perfect(&s.truth), Some(&s.truth)).expect("in memory");
     assert_eq!(score.verdict, Verdict::Pass, "{:?}", score.warnings);
     let deflected = deflected(&s.truth).len();
     assert!(deflected > 300);
@@ -51,7 +51,7 @@ fn the_truth_itself_has_no_error_and_passes() {
 fn a_common_rotation_shows_as_nothing_else() {
     let s = sample();
     let angle = 0.5_f64.to_radians();
-    let score = score(&s.dataset, &turned(perfect(&s.truth), angle), Some(&s.truth));
+    let score = score(&s.dataset, &turned(perfect(&s.truth), angle), Some(&s.truth)).expect("in memory");
     assert!((score.common_mode_deg - 0.5).abs() < 1e-12);
     assert!(score.differential_per_axis_rms_deg < 1e-12);
     assert!(score.per_axis_rms_deg > 0.1);
@@ -77,13 +77,13 @@ fn a_mounting_that_is_off_shows_in_the_room_only() {
     let data = catoptric_model::PoseData::from(&off);
     mount.translation_m = data.translation_m;
     mount.rotation_xyzw = data.rotation_xyzw;
-    let with = score(&s.dataset, &calibration, Some(&s.truth));
+    let with = score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory");
     assert_eq!(with.per_axis_rms_deg, 0.0);
     assert!((with.common_mode_room_deg - 0.01_f64.to_degrees()).abs() < 1e-10);
     assert!(with.point_room_mm.at_1m > 3.0);
 
     calibration.rig_from_sensor = None;
-    let without = score(&s.dataset, &calibration, Some(&s.truth));
+    let without = score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory");
     assert!(without.per_axis_rms_room_deg.is_nan());
     assert_eq!(
         without.nulls["per_axis_rms_room_deg"],
@@ -114,7 +114,7 @@ fn errors_are_counted_as_the_formulas_say() {
     }
     estimate(&mut calibration, a).distance_m = s.truth.beams[a].distance_m.map(|d| d + 3e-3);
     estimate(&mut calibration, b).distance_m = s.truth.beams[b].distance_m.map(|d| d - 4e-3);
-    let score = score(&s.dataset, &calibration, Some(&s.truth));
+    let score = score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory");
     let per_axis = (squares / 4.0).sqrt().to_degrees();
     assert!((score.per_axis_rms_deg - per_axis).abs() < 1e-12);
     assert!((score.direction_deg.rms - per_axis * 2.0_f64.sqrt()).abs() < 1e-7);
@@ -132,7 +132,7 @@ fn errors_are_counted_as_the_formulas_say() {
         let expected = 12.5 + s * cross + s * s * chord;
         assert!((found.powi(2) - expected).abs() < 1e-3 * expected, "{s} m");
     }
-    let bounds = bound::knowable(&s.dataset, &s.truth).limits;
+    let bounds = bound::knowable(&s.dataset, &s.truth).expect("in memory").limits;
     let trace = mean([a, b].iter().map(|beam| {
         let c = s.truth.beams[*beam].elevation_rad.expect("deflected").cos();
         bounds[beam][(0, 0)] * c * c + bounds[beam][(1, 1)]
@@ -143,7 +143,7 @@ fn errors_are_counted_as_the_formulas_say() {
 #[test]
 fn an_honest_covariance_is_found_honest() {
     let s = sample();
-    let score = score(&s.dataset, &noisy(&s.truth, 1e-3, 3), Some(&s.truth));
+    let score = score(&s.dataset, &noisy(&s.truth, 1e-3, 3), Some(&s.truth)).expect("in memory");
     // About 450 independent elements: the mean of χ²₂/2 scatters by 1/√450 = 0.05; four of those.
     assert!((score.nees_mean - 1.0).abs() < 0.2, "{}", score.nees_mean);
     assert!((score.coverage_95 - 0.95).abs() < 0.05, "{}", score.coverage_95);
@@ -160,7 +160,7 @@ fn a_covariance_a_tenth_too_small_per_axis_fails() {
     for b in &mut calibration.beams {
         b.covariance_rad2 = b.covariance_rad2.map(|c| c.map(|row| row.map(|x| x / 100.0)));
     }
-    let score = score(&s.dataset, &calibration, Some(&s.truth));
+    let score = score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory");
     assert_eq!(score.verdict, Verdict::Fail);
     assert!(score.warnings[0].starts_with("fails: over-confident: errors are "));
     assert!((score.nees_mean - 100.0).abs() < 20.0);
@@ -178,7 +178,7 @@ fn stated(truth: &Truth, factor: f64) -> Calibration {
 #[test]
 fn honesty_is_called_by_its_name_and_size() {
     let s = sample();
-    let of = |calibration: &Calibration, truth| score(&s.dataset, calibration, truth);
+    let of = |calibration: &Calibration, truth| score(&s.dataset, calibration, truth).expect("in memory");
     let honest = of(&stated(&s.truth, 1.0), Some(&s.truth));
     assert_eq!(honest.honesty, Some(Honesty::Honest));
     assert!(!honest.warnings.iter().any(|w| w.contains("-confident")));
@@ -238,7 +238,9 @@ fn what_the_boards_leave_open_is_rightly_not_solved() {
     for b in abstaining.beams.iter_mut().filter(|b| b.status == Status::Solved) {
         *b = BeamEstimate::without_angles(b.beam, Status::TooFewPoses, Some("no board".to_owned()));
     }
-    let right = score(&dataset, &abstaining, Some(&s.truth)).with_limit(0.1);
+    let right = score(&dataset, &abstaining, Some(&s.truth))
+        .expect("in memory")
+        .with_limit(0.1);
     let counts = |abstained, solved, wrong| {
         Some(OpenCounts {
             elements: all,
@@ -255,16 +257,18 @@ fn what_the_boards_leave_open_is_rightly_not_solved() {
             .any(|w| w.starts_with("the limit of 0.1° was not tested"))
     );
     // Where nothing is open the same abstentions do not reach the limit.
-    let needless = score(&s.dataset, &abstaining, Some(&s.truth)).with_limit(0.1);
+    let needless = score(&s.dataset, &abstaining, Some(&s.truth))
+        .expect("in memory")
+        .with_limit(0.1);
     assert_eq!(
         (needless.verdict, needless.open.map(|o| o.elements)),
         (Verdict::Fail, Some(0))
     );
     // Who knows more than the boards may solve; who claims more than he knows is wrong.
-    let knows = score(&dataset, &noisy(&s.truth, 1e-3, 3), Some(&s.truth));
+    let knows = score(&dataset, &noisy(&s.truth, 1e-3, 3), Some(&s.truth)).expect("in memory");
     assert_eq!(knows.verdict, Verdict::Pass, "{:?}", knows.warnings);
     assert!(knows.open.is_some_and(|o| o.solved == all && o.wrong <= 3));
-    let claims = score(&dataset, &stated(&s.truth, 1e-4), Some(&s.truth));
+    let claims = score(&dataset, &stated(&s.truth, 1e-4), Some(&s.truth)).expect("in memory");
     assert!(claims.open.is_some_and(|o| 2 * o.wrong > o.solved));
     assert!(
         claims
@@ -287,7 +291,8 @@ fn without_a_mirror_there_is_nothing_to_judge() {
         beams: Vec::new(),
         ..perfect(&s.truth)
     };
-    let score_of = |calibration: &Calibration| score(&s.dataset, calibration, Some(&truth));
+    let score_of =
+        |calibration: &Calibration| score(&s.dataset, calibration, Some(&truth)).expect("in memory");
     let nothing = score_of(&nothing_solved);
     assert_eq!(
         (nothing.verdict, nothing.beams.deflected),
@@ -305,7 +310,7 @@ fn a_covariance_of_zero_is_infinitely_dishonest() {
     let mut calibration = noisy(&s.truth, 1e-3, 3);
     let beam = deflected(&s.truth)[0];
     estimate(&mut calibration, beam).covariance_rad2 = Some([[0.0; 2]; 2]);
-    let score = score(&s.dataset, &calibration, Some(&s.truth));
+    let score = score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory");
     assert_eq!(score.verdict, Verdict::Fail);
     let json = serde_json::to_value(&score).expect("it is JSON");
     assert!(json["nees_mean"].is_null());
@@ -330,7 +335,7 @@ fn every_deflected_element_is_solved_abstained_or_missed() {
     // Turned into another beam's entry, this one is absent and the direct beam 540 is called solved.
     estimate(&mut calibration, beams[4]).beam = 540;
     calibration.beams.remove(540);
-    let score = score(&s.dataset, &calibration, Some(&s.truth));
+    let score = score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory");
     let counts = score.beams;
     assert_eq!(counts.deflected, Some(beams.len()));
     assert_eq!(
@@ -359,7 +364,7 @@ fn split_elements_are_reported_apart() {
         elevation_rad: split.elevation_rad.map(|e| e + 0.1),
         ..BeamEstimate::without_angles(split.beam, Status::Solved, None)
     };
-    let score = score(&s.dataset, &calibration, Some(&s.truth));
+    let score = score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory");
     assert_eq!(score.per_axis_rms_deg, 0.0);
     assert_eq!((score.verdict, score.split.solved), (Verdict::Pass, 1));
     assert!((score.split.per_axis_rms_deg - (0.1_f64 / 2.0_f64.sqrt()).to_degrees()).abs() < 1e-9);
@@ -368,7 +373,9 @@ fn split_elements_are_reported_apart() {
 #[test]
 fn without_truth_the_score_is_blind() {
     let s = sample();
-    let score = score(&s.dataset, &noisy(&s.truth, 1e-3, 5), None).with_limit(0.1);
+    let score = score(&s.dataset, &noisy(&s.truth, 1e-3, 5), None)
+        .expect("in memory")
+        .with_limit(0.1);
     assert_eq!(score.verdict, Verdict::Blind);
     assert!(score.boards_mm.rms > 0.1);
     let json = serde_json::to_value(&score).expect("it is JSON");
@@ -383,6 +390,7 @@ fn the_limit_decides() {
     let calibration = noisy(&s.truth, 1e-3, 3);
     let verdict = |limit| {
         score(&s.dataset, &calibration, Some(&s.truth))
+            .expect("in memory")
             .with_limit(limit)
             .verdict
     };
@@ -393,7 +401,7 @@ fn the_limit_decides() {
 #[test]
 fn json_has_the_keys_of_the_interface() {
     let s = sample();
-    let score = score(&s.dataset, &noisy(&s.truth, 1e-3, 3), Some(&s.truth));
+    let score = score(&s.dataset, &noisy(&s.truth, 1e-3, 3), Some(&s.truth)).expect("in memory");
     let json = serde_json::to_value(&score).expect("it is JSON");
     for (key, inner) in [
         ("schema_version", &[][..]),

@@ -76,6 +76,9 @@ pub fn run_with_elements(study: &Study, job: Job) -> Result<(Vec<Run>, Vec<Eleme
     Ok((runs, elements))
 }
 
+/// Why no recording can fail to be read.
+const IN_MEMORY: &str = "a simulated dataset is in memory";
+
 struct Experiment {
     /// What a program is given its dataset by.
     #[cfg(feature = "recording")]
@@ -90,7 +93,7 @@ impl Experiment {
         let laboratory = Laboratory::new(&study.cells[job.cell].scene, job.seed)?;
         let (dataset, truth) = (laboratory.dataset()?, laboratory.truth()?);
         Ok(Self {
-            knowable: knowable(&dataset, &truth),
+            knowable: knowable(&dataset, &truth).expect(IN_MEMORY),
             #[cfg(feature = "recording")]
             laboratory,
             dataset,
@@ -164,7 +167,8 @@ impl Experiment {
                 return (run, Vec::new());
             }
         };
-        let score = score_by(&self.dataset, &calibration, Some((&self.truth, &self.knowable)));
+        let known = Some((&self.truth, &self.knowable));
+        let score = score_by(&self.dataset, &calibration, known).expect(IN_MEMORY);
         run.solved = score.beams.solved;
         run.abstained = score.beams.abstained;
         run.missed = score.beams.missed.unwrap_or_default();

@@ -1,10 +1,10 @@
 //! Independent trials: an experiment, a calibration of it, and one element drawn from it.
 
 use super::Failure;
-use crate::score::{Knowable, knowable, mahalanobis_squared, score_by};
+use crate::score::{mahalanobis_squared, score};
 use crate::study::drawn;
 use catoptric_calib::Calibrator;
-use catoptric_model::{Calibration, Dataset};
+use catoptric_model::{Calibration, Dataset, Unreadable};
 use catoptric_sim::truth::BeamClass;
 use catoptric_sim::{Laboratory, Scene, Truth};
 use nalgebra::Vector2;
@@ -71,17 +71,16 @@ impl Trial {
     /// let dataset = io::read_dataset(Path::new("data"))?;
     /// let truth: sim::Truth = io::read_json("data/truth/truth.json")?;
     /// let calibration: model::Calibration = io::read_json("calibration.json")?;
-    /// let trial = Trial::of(&dataset, &truth, &calibration);
+    /// let trial = Trial::of(&dataset, &truth, &calibration)?;
     /// # let _ = trial;
     /// # Ok(())
     /// # }
     /// ```
-    pub fn of(dataset: &Dataset, truth: &Truth, calibration: &Calibration) -> Self {
-        Self::judged(dataset, truth, &knowable(dataset, truth), calibration)
-    }
-
-    fn judged(dataset: &Dataset, truth: &Truth, knowable: &Knowable, calibration: &Calibration) -> Self {
-        let score = score_by(dataset, calibration, Some((truth, knowable)));
+    ///
+    /// # Errors
+    /// [`Unreadable`] if the recording of the dataset can no longer be read.
+    pub fn of(dataset: &Dataset, truth: &Truth, calibration: &Calibration) -> Result<Self, Unreadable> {
+        let score = score(dataset, calibration, truth)?;
         let scored: Vec<_> = score
             .elements
             .iter()
@@ -94,10 +93,10 @@ impl Trial {
                 .bound
                 .map(|c| mahalanobis_squared(&Vector2::new(e.across, e.up), &c)),
         });
-        Self {
+        Ok(Self {
             seed: truth.seed,
             drawn,
-        }
+        })
     }
 }
 
@@ -114,7 +113,8 @@ pub fn trials<C: Calibrator + Sync + ?Sized>(
     let of_one = |seed: &u64| {
         let experiment = Experiment::of(scene, *seed)?;
         let calibration = experiment.calibrate(calibrator)?;
-        Ok(Trial::of(&experiment.dataset, &experiment.truth, &calibration))
+        let trial = Trial::of(&experiment.dataset, &experiment.truth, &calibration);
+        Ok(trial.expect("a simulated dataset is in memory"))
     };
     let all: Vec<Result<Trial, Failure>> = seeds.par_iter().map(of_one).collect();
     all.into_iter().collect()

@@ -48,7 +48,8 @@ const MAX_ROUNDS: usize = 12;
 /// part in the fit.
 ///
 /// # Errors
-/// [`CalibError`] if the dataset's parts do not fit together or no board was read by a beam that nothing deflects.
+/// [`CalibError`] if the dataset's parts do not fit together, no board was read by a beam that nothing deflects, or the
+/// recording can no longer be read.
 ///
 /// ```
 /// use catoptric_calib::{CalibError, characterize};
@@ -63,7 +64,7 @@ pub fn characterize(dataset: &Dataset) -> Result<Characterization, CalibError> {
     dataset.check()?;
     let session = &dataset.session;
     check_session(session)?;
-    let summaries = locate::summaries(dataset);
+    let summaries = locate::summaries(dataset)?;
     let none = RangeBias::default();
     let selector = Selector::new(dataset, &summaries).with_bias(&none, LARGEST_BIAS);
     let prior = Prior::of(session);

@@ -5,6 +5,8 @@ use crate::judge::covariance::{self, Budget, MountUncertainty};
 use crate::judge::observability::{self, Weakness};
 use crate::options::{Method, Options};
 use crate::readings::bare::Bare;
+use crate::readings::columns::Columns;
+use crate::readings::locate;
 use crate::readings::observations::{BoardInSensor, BoardView, Observation, azimuth};
 use crate::readings::spread;
 use catoptric_model::session::NominalFacet;
@@ -24,6 +26,8 @@ pub(crate) struct Workspace<'a> {
     pub(crate) mount: &'a MountUncertainty,
     pub(crate) method: Method,
     pub(crate) options: &'a Options,
+    /// Single readings, for the method that goes through them one by one.
+    pub(crate) columns: Option<&'a Columns>,
 }
 
 /// An element on its way.
@@ -106,6 +110,12 @@ impl<'a> Attempt<'a> {
                 )
             })
             .collect()
+    }
+
+    /// The readings of a stretch without outliers, one by one.
+    pub(crate) fn single_readings(&self, pose: usize) -> Vec<f64> {
+        let columns = self.work.columns.map(|c| c.of(pose, self.beam));
+        locate::kept(columns.unwrap_or_default(), self.summary(pose), self.noise)
     }
 
     pub(crate) fn element<'o>(&self, observations: &'o [Observation<'o>]) -> Element<'o>

@@ -5,10 +5,12 @@ use crate::element::choose::choose;
 use crate::element::gls::generalized;
 use crate::element::initial::{self, FARTHEST_START};
 use crate::element::recursive::recursive;
+use crate::element::single::blocks;
 use crate::element::solve::{self, Element, Solution};
 use crate::element::verdict::{judge, residuals_agree};
+use crate::error::CalibError;
 use crate::options::Method;
-use crate::readings::locate;
+use crate::readings::columns::{Columns, MOST_BYTES};
 use crate::readings::observations::azimuth;
 use crate::screen::Candidate;
 use catoptric_model::session::NominalFacet;
@@ -28,13 +30,36 @@ const FARTHEST_END: f64 = 0.007;
 const LARGEST_EXCESS: f64 = 0.2;
 
 /// The estimate of every element, with facets at the given planes.
+///
+/// # Errors
+/// [`CalibError::Unreadable`].
 pub(crate) fn estimates(
     work: &Workspace,
     candidates: &[Candidate],
     mirrors: &[MirrorPlane],
-) -> Vec<BeamEstimate> {
+) -> Result<Vec<BeamEstimate>, CalibError> {
+    let mut found = Vec::with_capacity(candidates.len());
+    for block in blocks(work, candidates, MOST_BYTES) {
+        let columns = Columns::read(work.dataset, &block.wanted)?;
+        let work = Workspace {
+            columns: Some(&columns),
+            ..*work
+        };
+        let beams = block.beams.into_par_iter();
+        found.par_extend(beams.map(|beam| of_candidate(&work, beam, &candidates[beam], mirrors)));
+    }
+    Ok(found)
+}
+
+/// The estimate of one element with all facets that it may belong to.
+fn of_candidate(
+    work: &Workspace,
+    beam: usize,
+    candidate: &Candidate,
+    mirrors: &[MirrorPlane],
+) -> BeamEstimate {
     let facets = &work.dataset.session.facets;
-    let of_one = |(beam, candidate): (usize, &Candidate)| match candidate {
+    match candidate {
         Candidate::Direct(reason) => BeamEstimate::without_angles(beam, Status::Direct, Some(reason.clone())),
         Candidate::Rejected(reason) => {
             BeamEstimate::without_angles(beam, Status::Rejected, Some(reason.clone()))
@@ -56,8 +81,7 @@ pub(crate) fn estimates(
                     }),
             }
         }
-    };
-    candidates.par_iter().enumerate().map(of_one).collect()
+    }
 }
 
 /// The estimate of one element on a facet whose plane is believed to be `mirror`.
@@ -139,13 +163,7 @@ fn by_method(
         Method::BeamGls => generalized(attempt, &element, from),
         Method::ClosedForm => without_iteration(attempt, &element, at),
         Method::Recursive => {
-            let readings: Vec<Vec<f64>> = poses
-                .iter()
-                .map(|p| {
-                    let record = &attempt.work.dataset.poses[*p];
-                    locate::kept(record, attempt.beam, attempt.summary(*p), attempt.noise)
-                })
-                .collect();
+            let readings: Vec<Vec<f64>> = poses.iter().map(|p| attempt.single_readings(*p)).collect();
             // Where the readings leave a direction open there is nothing to recurse on; the batch says which.
             recursive(&element, &readings, from, options).or_else(|| solve::batch(&element, from, options))
         }

@@ -10,6 +10,7 @@ pub(crate) mod facet_plane;
 mod gls;
 pub mod initial;
 pub mod recursive;
+mod single;
 pub mod solve;
 mod verdict;
 

@@ -200,7 +200,7 @@ impl<'a> Selector<'a> {
             .filter(|(_, record)| record.label.kind == PoseKind::Direct)
             .filter_map(|(pose, record)| {
                 let board = BoardInSensor::of(record, &self.dataset.session, rig_from_sensor)?;
-                let rays: Vec<Ray> = (0..record.beams)
+                let rays: Vec<Ray> = (0..record.beams())
                     .filter(|b| self.clear[*b] && is_within(record, *b))
                     .filter_map(|b| self.ray(&board, b, &self.summaries[pose][b], stage))
                     .collect();

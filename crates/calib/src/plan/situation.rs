@@ -12,8 +12,8 @@ use crate::readings::observations::{BoardInSensor, azimuth, cone_half_angle};
 use crate::readings::spread;
 use catoptric_model::session::{BoardSheet, NominalFacet};
 use catoptric_model::{
-    BoardPlane, Dataset, Deflection, MirrorPlane, Pose, PoseKind, PoseLabel, PoseRecord, Session, Status,
-    Summary, beam,
+    BoardPlane, Dataset, Deflection, MirrorPlane, Pose, PoseKind, PoseLabel, PoseRecord, Readings, Session,
+    Status, Summary, beam,
 };
 use nalgebra::Point3;
 
@@ -336,13 +336,13 @@ fn expected_mount(session: &Session, room_from_rig: &Pose, placed: &[Placed]) ->
             room_from_board: Some(place.room_from_board),
             motion: None,
             watched: Vec::new(),
-            beams: session.scanner.beams,
-            ranges: Vec::new(),
+            readings: Readings::in_memory(session.scanner.beams, Vec::new()),
         });
     }
     let dataset = Dataset {
         session: session.clone(),
         poses,
+        id: None,
     };
     pose::estimate(&dataset, &summaries).uncertainty
 }

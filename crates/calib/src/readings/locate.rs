@@ -5,8 +5,9 @@
 //! it stands for the beam as long as no more readings lie outside than happens to other beams. A beam that reads two
 //! surfaces by turns has more, keeps its wide spread and is judged by that (step 4).
 
+use crate::readings::columns::{self, MOST_BYTES, Wanted};
 use crate::readings::spread;
-use catoptric_model::{Dataset, PoseRecord, Summary, Window};
+use catoptric_model::{BeamStatistics, Dataset, PoseRecord, Summary, Unreadable, Window};
 use rayon::prelude::*;
 
 /// One beam in so many, those with most readings outside, does not count when it is asked how often that happens.
@@ -20,23 +21,22 @@ const FREE: f64 = 3.0;
 const FREE_PART: f64 = 0.05;
 
 /// Statistics of every beam in every stretch: of its main body, where it has one beside outliers.
-pub fn summaries(dataset: &Dataset) -> Vec<Vec<Summary>> {
+///
+/// # Errors
+/// [`Unreadable`] if the recording can no longer be read: beams with outliers are looked at once more.
+pub fn summaries(dataset: &Dataset) -> Result<Vec<Vec<Summary>>, Unreadable> {
     let noise = dataset.session.believed.range_noise_sd_mm * 1e-3;
     let plain: Vec<Vec<Summary>> = dataset.poses.par_iter().map(PoseRecord::summarize).collect();
-    let robust: Vec<Vec<Option<Summary>>> = dataset
-        .poses
-        .par_iter()
-        .zip(&plain)
-        .map(|(record, plain)| {
-            let strays = strays(record, plain, noise);
-            let one = |beam: usize| {
-                strays[beam]
-                    .then(|| Summary::of_main_body(record.readings(beam), noise))
-                    .flatten()
-            };
-            (0..record.beams).map(one).collect()
-        })
-        .collect();
+    let wanted = dataset.poses.iter().enumerate().map(|(pose, record)| Wanted {
+        pose,
+        beams: strays(record, noise),
+    });
+    let wanted = wanted.filter(|w| !w.beams.is_empty()).collect();
+    let main_body = |readings: &[f64]| Summary::of_main_body(readings.iter().copied(), noise);
+    let mut robust: Vec<Vec<Option<Summary>>> = plain.iter().map(|p| vec![None; p.len()]).collect();
+    for (pose, beam, found) in columns::of_each(dataset, wanted, MOST_BYTES, main_body)? {
+        robust[pose][beam] = found;
+    }
     let usual = usual_share(&plain, &robust);
     let choose = |(plain, robust): (Vec<Summary>, Vec<Option<Summary>>)| {
         let of_one = |(plain, robust): (Summary, Option<Summary>)| match robust {
@@ -45,32 +45,30 @@ pub fn summaries(dataset: &Dataset) -> Vec<Vec<Summary>> {
         };
         plain.into_iter().zip(robust).map(of_one).collect()
     };
-    plain.into_iter().zip(robust).map(choose).collect()
+    Ok(plain.into_iter().zip(robust).map(choose).collect())
 }
 
 /// The readings of a beam without its outliers, where its summary leaves some out.
-pub(crate) fn kept(record: &PoseRecord, beam: usize, summary: &Summary, noise: f64) -> Vec<f64> {
+pub(crate) fn kept(readings: &[f64], summary: &Summary, noise: f64) -> Vec<f64> {
     let window = (summary.outliers > 0)
-        .then(|| Window::around(record.readings(beam), noise))
+        .then(|| Window::around(readings.iter().copied(), noise))
         .flatten();
-    let inside = |r: &f64| window.is_none_or(|w| w.holds(*r));
-    record
-        .readings(beam)
-        .filter(|r| r.is_finite())
-        .filter(inside)
-        .collect()
+    let ranges = readings.iter().copied().filter(|r| r.is_finite());
+    ranges.filter(|r| window.is_none_or(|w| w.holds(*r))).collect()
 }
 
-/// Whether some reading lies farther out than noise throws any, or all of them too far apart; of every beam.
-fn strays(record: &PoseRecord, plain: &[Summary], noise: f64) -> Vec<bool> {
-    let mut strays: Vec<bool> = plain.iter().map(|s| spread::is_abnormal(s, noise)).collect();
+/// The beams of which some reading lies farther out than noise throws any, or all of them too far apart.
+fn strays(record: &PoseRecord, noise: f64) -> Vec<usize> {
     let far = Window::half_width(spread::largest_spread(noise, usize::MAX));
-    for scan in record.ranges.chunks(record.beams.max(1)) {
-        for ((stray, r), of) in strays.iter_mut().zip(scan).zip(plain) {
-            *stray |= r.is_finite() && (r - of.mean).abs() > far;
-        }
-    }
-    strays
+    let is_stray = |of: &BeamStatistics| {
+        let off = (of.largest - of.all.mean).max(of.all.mean - of.least);
+        spread::is_abnormal(&of.summary(), noise) || of.all.count > 0 && off > far
+    };
+    let beams = record.readings.statistics().iter().enumerate();
+    beams
+        .filter(|(_, of)| is_stray(of))
+        .map(|(beam, _)| beam)
+        .collect()
 }
 
 /// How large a part of a beam's readings is usually outside.
@@ -95,7 +93,7 @@ fn is_chance(found: &Summary, usual: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use catoptric_model::{Pose, PoseKind, PoseLabel};
+    use catoptric_model::{Pose, PoseKind, PoseLabel, Readings};
 
     /// One stretch of some beams, each with its readings.
     fn record(beams: &[Vec<f64>]) -> PoseRecord {
@@ -106,8 +104,10 @@ mod tests {
             room_from_board: None,
             motion: None,
             watched: Vec::new(),
-            beams: beams.len(),
-            ranges: (0..scans).flat_map(|s| beams.iter().map(move |b| b[s])).collect(),
+            readings: Readings::in_memory(
+                beams.len(),
+                (0..scans).flat_map(|s| beams.iter().map(move |b| b[s])).collect(),
+            ),
         }
     }
 
@@ -122,16 +122,16 @@ mod tests {
 
     #[test]
     fn the_main_body_of_readings_is_found() {
-        let record = record(&[readings(15), readings(0), readings(45)]);
-        let found = Summary::of_main_body(record.readings(0), 0.004).expect("most readings are together");
+        let of = |outliers: usize| Summary::of_main_body(readings(outliers).into_iter(), 0.004);
+        let found = of(15).expect("most readings are together");
         assert_eq!((found.count, found.outliers, found.missing), (85, 15, 0));
         // What is left is the mean of the same 85 readings without any outlier among them.
         let exact: f64 = readings(0)[15..].iter().sum::<f64>() / 85.0;
         assert!((found.mean - exact).abs() < 1e-12);
-        assert_eq!(kept(&record, 0, &found, 0.004), readings(0)[15..].to_vec());
-        let plain = record.summarize();
-        assert_eq!(strays(&record, &plain, 0.004), [true, false, true]);
-        assert_eq!(Summary::of_main_body(record.readings(2), 0.004), None);
+        assert_eq!(kept(&readings(15), &found, 0.004), readings(0)[15..].to_vec());
+        let record = record(&[readings(15), readings(0), readings(45)]);
+        assert_eq!(strays(&record, 0.004), [0, 2]);
+        assert_eq!(of(45), None);
     }
 
     #[test]

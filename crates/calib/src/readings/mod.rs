@@ -6,6 +6,7 @@
 
 pub(crate) mod ahead;
 pub(crate) mod bare;
+pub(crate) mod columns;
 pub mod jacobian;
 pub mod locate;
 pub mod observations;

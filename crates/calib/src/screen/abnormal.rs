@@ -25,7 +25,7 @@ impl Screen<'_> {
             count += summary.count;
             missing += summary.missing;
             if summary.missing > 0 {
-                close += record.readings(beam).filter(|r| *r == f64::NEG_INFINITY).count();
+                close += record.readings.statistics()[beam].too_close;
             }
             if summary.count > summary.missing {
                 seen.push(summary);

@@ -14,6 +14,7 @@ use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::{Dataset, PoseKind, PoseRecord, Watched};
 use constellation::Misfit;
 use nalgebra::Point3;
+use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
@@ -37,6 +38,10 @@ enum What {
 /// and the poses stay.
 pub fn put_right(dataset: &Dataset) -> (Cow<'_, Dataset>, Vec<String>) {
     let session = &dataset.session;
+    // Of readings in memory they are gathered now, side by side.
+    dataset.poses.par_iter().for_each(|record| {
+        record.readings.statistics();
+    });
     let mut findings = Vec::new();
     let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
     for (pose, record) in dataset.poses.iter().enumerate() {
@@ -90,7 +95,7 @@ pub fn put_right(dataset: &Dataset) -> (Cow<'_, Dataset>, Vec<String>) {
                 "its pose was solved anew with the labels put right"
             }
             None => {
-                record.ranges.fill(f64::NAN);
+                record.readings = record.readings.left_out();
                 "the pose is left out"
             }
         };

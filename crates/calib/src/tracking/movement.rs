@@ -2,7 +2,7 @@
 
 use super::body::{limit, solved};
 use catoptric_model::tracking::MeanMarker;
-use catoptric_model::{PoseRecord, Session, Watched};
+use catoptric_model::{Moments, PoseRecord, Session, Watched};
 use nalgebra::{Point3, Vector3};
 
 /// A mean place of a marker may wander by this much along one axis without the body having moved, in metres.
@@ -93,13 +93,10 @@ pub(super) fn of_readings(record: &PoseRecord, session: &Session) -> Option<Stri
     let drawn = facet.and_then(|name| session.facets.iter().find(|f| f.name == name));
     let [first, last] = label.beams.or(drawn.map(|f| f.beams))?;
     label.board.as_ref()?;
-    let half = label.scans / 2;
     let unsteady = LEVEL_FLOOR + LEVEL_SIGMAS * session.believed.drift_sd_mm * 1e-3;
     let (mut beams, mut changes) = (0, Vec::new());
-    for beam in first..(last + 1).min(record.beams) {
-        let before = level(record.readings(beam).take(half));
-        let after = level(record.readings(beam).skip(half));
-        let (Some((m1, v1)), Some((m2, v2))) = (before, after) else {
+    for beam in record.readings.statistics().iter().take(last + 1).skip(first) {
+        let [Some((m1, v1)), Some((m2, v2))] = beam.halves.map(level) else {
             continue;
         };
         beams += 1;
@@ -120,13 +117,7 @@ pub(super) fn of_readings(record: &PoseRecord, session: &Session) -> Option<Stri
 }
 
 /// Mean of readings, and its variance.
-fn level(readings: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
-    let (mut count, mut mean, mut squares) = (0_usize, 0.0, 0.0);
-    for r in readings.filter(|r| r.is_finite()) {
-        count += 1;
-        let step = r - mean;
-        mean += step / count as f64;
-        squares += step * (r - mean);
-    }
-    (count >= LEAST_READINGS).then(|| (mean, squares / ((count - 1) * count) as f64))
+fn level(of: Moments) -> Option<(f64, f64)> {
+    let count = of.count;
+    (count >= LEAST_READINGS).then(|| (of.mean, of.squares / ((count - 1) * count) as f64))
 }

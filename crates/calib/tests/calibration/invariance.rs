@@ -63,7 +63,8 @@ fn twice_the_readings_halve_the_noise_covariance_and_not_the_whole() {
     made.dataset.session.believed.range_noise_sd_mm = 8.0;
     let once = solve(&made.dataset);
     for pose in &mut made.dataset.poses {
-        pose.ranges.extend_from_within(..);
+        let ranges = pose.readings.held_mut().expect("in memory");
+        ranges.extend_from_within(..);
         pose.label.scans *= 2;
     }
     let twice = solve(&made.dataset);
@@ -107,7 +108,8 @@ fn with_noise_alone_twice_the_readings_halve_the_whole_covariance() {
     session.mount_tolerance.translation_sd_mm = [1e6; 3];
     let once = solve(&made.dataset);
     for pose in &mut made.dataset.poses {
-        pose.ranges.extend_from_within(..);
+        let ranges = pose.readings.held_mut().expect("in memory");
+        ranges.extend_from_within(..);
         pose.label.scans *= 2;
     }
     let twice = solve(&made.dataset);

@@ -12,8 +12,9 @@ fn solve(dataset: &Dataset) -> Calibration {
 /// Rewrites every reading of a beam in every stretch.
 fn rewrite(dataset: &mut Dataset, beam: usize, with: impl Fn(PoseKind, usize, f64) -> f64) {
     for pose in &mut dataset.poses {
-        let (kind, beams) = (pose.label.kind, pose.beams);
-        for (scan, r) in pose.ranges.iter_mut().skip(beam).step_by(beams).enumerate() {
+        let (kind, beams) = (pose.label.kind, pose.beams());
+        let ranges = pose.readings.held_mut().expect("in memory");
+        for (scan, r) in ranges.iter_mut().skip(beam).step_by(beams).enumerate() {
             *r = with(kind, scan, *r);
         }
     }
@@ -62,7 +63,8 @@ fn one_reading_of_the_wall_does_not_lose_the_element() {
         .iter_mut()
         .find(|p| p.label.kind == PoseKind::Facet)
         .expect("there are boards for facets");
-    for r in pose.ranges.iter_mut().skip(66).step_by(beams) {
+    let ranges = pose.readings.held_mut().expect("in memory");
+    for r in ranges.iter_mut().skip(66).step_by(beams) {
         *r += 0.12;
     }
     let found = &solve(&made.dataset).beams[66];
@@ -154,7 +156,8 @@ fn a_dataset_that_cannot_be_is_refused() {
     made.dataset.session.believed.drift_sd_mm = -1.0;
     let refused = calibrate(&made.dataset, Method::Beam, &Options::default());
     assert!(matches!(refused, Err(CalibError::Session { found, .. }) if found == -1.0));
-    made.dataset.poses[0].ranges.pop();
+    let ranges = made.dataset.poses[0].readings.held_mut().expect("in memory");
+    ranges.pop();
     let refused = calibrate(&made.dataset, Method::Beam, &Options::default());
     assert!(matches!(refused, Err(CalibError::Dataset(_))));
 }

@@ -275,7 +275,11 @@ impl World {
             pose.label.pose = i;
         }
         Made {
-            dataset: Dataset { session, poses },
+            dataset: Dataset {
+                session,
+                poses,
+                id: None,
+            },
             deflections,
             rig_from_sensor,
         }
@@ -411,8 +415,7 @@ impl Lab<'_> {
             room_from_board: board.map(|b| self.tracked(&(self.room_from_sensor * b), draw)),
             motion: None,
             watched: Vec::new(),
-            beams: world.beams,
-            ranges,
+            readings: Readings::in_memory(world.beams, ranges),
         }
     }
 

@@ -1,5 +1,7 @@
 //! The verbs, a file each: what they need, what they make, what can keep them from it.
 
+#[cfg(feature = "recording")]
+mod apply;
 mod calibrate;
 #[cfg(feature = "design")]
 mod export;
@@ -16,6 +18,8 @@ mod tolerance;
 #[cfg(feature = "recording")]
 mod trace;
 
+#[cfg(feature = "recording")]
+pub use apply::apply_into;
 pub use calibrate::{calibrate, calibrate_with, characterize};
 #[cfg(feature = "design")]
 pub use export::{Exported, Format as ExportFormat, export, export_boards};

@@ -7,7 +7,7 @@
 
 use catoptric_assess::score::true_directions;
 use catoptric_calib::{TrueDirection, limit};
-use catoptric_model::{Dataset, PoseKind, PoseRecord, beam};
+use catoptric_model::{Dataset, PoseKind, PoseRecord, Readings, beam};
 use catoptric_sim::laboratory::Returns;
 use catoptric_sim::{Laboratory, Scene, SimError};
 use nalgebra::Matrix2;
@@ -96,6 +96,7 @@ fn find(scene: &Scene, seed: u64, accuracy: &mut Accuracy) -> Result<(), String>
     let mut dataset = Dataset {
         session,
         poses: poses.map_err(words)?.into_iter().flatten().collect(),
+        id: None,
     };
     // Poses that are left out leave no gap in the numbers.
     for (number, pose) in dataset.poses.iter_mut().enumerate() {
@@ -169,7 +170,7 @@ fn record(laboratory: &Laboratory, number: usize, readings: usize) -> Result<Opt
         return Ok(None);
     };
     record.label.scans = readings;
-    record.ranges = spread(&returns, readings);
+    record.readings = Readings::in_memory(beam::COUNT, spread(&returns, readings));
     Ok(Some(record))
 }
 

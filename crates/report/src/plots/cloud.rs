@@ -3,25 +3,23 @@
 use super::super::figure::{self, Axes, GRID, Stroke};
 use super::super::page::{figure as block, number};
 use super::elements::{color_of, facet_of, legend};
+use catoptric_assess::apply::{CloudSketch, Extent};
+use catoptric_model::CloudFrame;
 use catoptric_model::{Calibration, Dataset, Pose, Status};
-use catoptric_model::{CloudFrame, PointCloud};
-use nalgebra::Point3;
 use plotters::style::{BLACK, RGBColor};
 
 /// Points of a cloud that are drawn at most.
-const MOST_POINTS: usize = 6000;
+pub const MOST_POINTS: usize = 6000;
 
 /// The cloud from above.
-pub(crate) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud: &PointCloud) -> String {
+pub(crate) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud: &CloudSketch) -> String {
+    let sheet = &cloud.sheet;
     let facets: Vec<Option<usize>> = (0..dataset.session.scanner.beams)
         .map(|b| facet_of(dataset, calibration?.beam(b)?))
         .collect();
-    // Whole scans are left out: every n-th point would favour some beams.
-    let step = cloud.points.len().div_ceil(MOST_POINTS).max(1);
     let points: Vec<(f64, f64, RGBColor)> = cloud
-        .points
+        .drawn
         .iter()
-        .filter(|p| p.scan % step == 0)
         .map(|p| {
             let facet = facets.get(p.beam).copied().flatten();
             let is_direct = calibration
@@ -38,7 +36,7 @@ pub(crate) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud:
     let mut strokes = Vec::new();
     let mut corners = Vec::new();
     let surveyed = dataset.session.room.as_ref();
-    if let Some(room) = surveyed.filter(|_| cloud.frame == CloudFrame::Room) {
+    if let Some(room) = surveyed.filter(|_| sheet.frame == CloudFrame::Room) {
         let [[x0, y0, _], [x1, y1, _]] = [room.min_m, room.max_m];
         corners = vec![(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)];
         strokes.push(Stroke {
@@ -69,13 +67,13 @@ pub(crate) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud:
     let axes = Axes {
         x: limits(|p| p.0),
         y: limits(|p| p.1),
-        x_label: format!("x of the {} (m)", cloud.frame.word()),
-        y_label: format!("y of the {} (m)", cloud.frame.word()),
+        x_label: format!("x of the {} (m)", sheet.frame.word()),
+        y_label: format!("y of the {} (m)", sheet.frame.word()),
     };
     let title = "The cloud from above";
     let svg = figure::scatter(level_size(&axes), &axes, title, &points, &strokes);
     let rows = cloud_rows(dataset, calibration, cloud, &facets);
-    let outline = if cloud.frame == CloudFrame::Room && surveyed.is_some() {
+    let outline = if sheet.frame == CloudFrame::Room && surveyed.is_some() {
         "The outline is the surveyed room: points belong on its walls, or inside on floor and ceiling; a wall of points that \
          leaves the outline is a mirror whose directions are off. The cross is the scanner. "
     } else {
@@ -83,10 +81,10 @@ pub(crate) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud:
     };
     let caption = format!(
         "Points of pose {} in the {} frame, colored by mirror; grey points were seen past the mirrors. {outline}{}",
-        cloud.pose,
-        cloud.frame.word(),
-        if step > 1 {
-            format!("One scan in {step} is drawn.")
+        sheet.pose,
+        sheet.frame.word(),
+        if cloud.step > 1 {
+            format!("One scan in {} is drawn.", cloud.step)
         } else {
             String::new()
         },
@@ -130,25 +128,17 @@ fn level_size(axes: &Axes) -> (u32, u32) {
 fn cloud_rows(
     dataset: &Dataset,
     calibration: Option<&Calibration>,
-    cloud: &PointCloud,
+    cloud: &CloudSketch,
     facets: &[Option<usize>],
 ) -> Vec<Vec<String>> {
     let status = |b: usize| calibration.and_then(|c| c.beam(b)).map(|b| b.status);
     let row = |name: &str, keep: &dyn Fn(usize) -> bool| {
-        let points: Vec<Point3<f64>> = cloud
-            .points
-            .iter()
-            .filter(|p| keep(p.beam))
-            .map(|p| p.position)
-            .collect();
-        let extent = |axis: usize| {
-            let low = points.iter().map(|p| p[axis]).fold(f64::NAN, f64::min);
-            let high = points.iter().map(|p| p[axis]).fold(f64::NAN, f64::max);
-            format!("{} … {}", number(low, 2), number(high, 2))
-        };
+        let beams = cloud.beams.iter().enumerate().filter(|(b, _)| keep(*b));
+        let of = beams.fold(Extent::NONE, |all, (_, beam)| all.with(beam));
+        let extent = |axis: usize| format!("{} … {}", number(of.low[axis], 2), number(of.high[axis], 2));
         vec![
             name.to_owned(),
-            points.len().to_string(),
+            of.points.to_string(),
             extent(0),
             extent(1),
             extent(2),
@@ -167,7 +157,7 @@ fn cloud_rows(
         row[1] = count.to_string();
         row
     };
-    rows.push(count("Left out: no direction", cloud.without_direction));
-    rows.push(count("Left out: no range", cloud.without_range));
+    rows.push(count("Left out: no direction", cloud.sheet.without_direction));
+    rows.push(count("Left out: no range", cloud.sheet.without_range));
     rows
 }

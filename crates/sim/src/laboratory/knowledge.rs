@@ -127,7 +127,9 @@ impl Laboratory {
         // The experimenter looks at his readings before he averages them.
         let noise_sd = self.beliefs().range_noise_sd_mm * 1e-3;
         let looked_at = |record: &PoseRecord, beam: usize, plain: Summary| {
-            let found = Summary::of_main_body(record.readings(beam), noise_sd);
+            let ranges = record.readings.held().unwrap_or_default().iter();
+            let readings = ranges.skip(beam).step_by(record.beams()).copied();
+            let found = Summary::of_main_body(readings, noise_sd);
             found.filter(|s| s.outliers > 0).unwrap_or(plain)
         };
         let summaries: Vec<Summary> = record.map_or_else(Vec::new, |r| {

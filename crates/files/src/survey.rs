@@ -1,0 +1,172 @@
+//! What a calibration needs of a stretch, gathered while its messages pass by, in memory that does not grow with them.
+//!
+//! Of a stretch that is long for motion capture, the markers are averaged when their frames have been counted: by further
+//! passes over its messages.
+
+use super::capture::Capture;
+use super::error::IoError;
+use super::gathering::{Gathering, Keep, Known, followed};
+use super::source::Source;
+use catoptric_model::dataset::RIG_SUBJECT;
+use catoptric_model::selection::Median;
+use catoptric_model::tracking::{MeanPose, Watching};
+use catoptric_model::{BeamStatistics, Gathered, ModelError, Motion, Pose, PoseKind, PoseLabel, PoseRecord};
+use catoptric_model::{TrackedFrame, Watched};
+
+/// Messages of motion capture that wait to be frames, at most: of a stretch without more, they may come in any order.
+pub(super) const MOST_WAITING: usize = 1 << 13;
+
+/// A stretch while it passes.
+pub(super) struct Survey {
+    gathered: Gathered,
+    /// Body by body, once frames had to be let go.
+    followed: Option<Vec<Followed>>,
+    is_flight: bool,
+}
+
+/// A body whose frames are let go one by one.
+#[derive(Debug, Clone, Default)]
+struct Followed {
+    mean: MeanPose,
+    frames: usize,
+    markers: usize,
+    is_seen: bool,
+    /// Of the rig in a flight: where it was.
+    path: Vec<(f64, Pose)>,
+}
+
+/// What was gathered of a stretch; its readings are not in its record yet.
+pub(super) struct Surveyed {
+    pub(super) record: Result<PoseRecord, ModelError>,
+    pub(super) statistics: Vec<BeamStatistics>,
+    /// Bodies whose markers are to be averaged still.
+    pub(super) unwatched: Vec<Unwatched>,
+}
+
+/// A body whose frames are known in number only.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Unwatched {
+    body: usize,
+    subject: String,
+    frames: usize,
+    markers: usize,
+}
+
+impl Followed {
+    fn add(&mut self, frame: &TrackedFrame, keeps_path: bool) {
+        self.frames += 1;
+        self.markers = self.markers.max(frame.markers.len());
+        self.is_seen |= frame.pose.is_some() || frame.markers.iter().any(Option::is_some);
+        if let Some(pose) = frame.pose {
+            self.mean.add(&pose);
+            if keeps_path {
+                self.path.push((frame.time_s, pose));
+            }
+        }
+    }
+}
+
+impl Survey {
+    /// Lets the oldest frames go, until so many messages wait.
+    fn follow(&mut self, capture: &mut Capture, left: usize, known: Known<'_>) {
+        let bodies = known.bodies;
+        let all: Vec<usize> = (0..bodies.all.len()).collect();
+        let rig = bodies.position(RIG_SUBJECT).filter(|_| self.is_flight);
+        let none = || vec![Followed::default(); all.len()];
+        let followed = self.followed.get_or_insert_with(none);
+        capture.take(left, bodies, &all, known.epoch, |body, frame| {
+            followed[body].add(&frame, rig == Some(body));
+        });
+    }
+}
+
+impl Keep for Survey {
+    type Kept = Surveyed;
+
+    fn begin(label: &PoseLabel, beams: usize) -> Self {
+        Self {
+            gathered: Gathered::new(beams, label.scans),
+            followed: None,
+            is_flight: label.kind == PoseKind::Flight,
+        }
+    }
+
+    fn scan(&mut self, ranges: Vec<f64>) {
+        self.gathered.add(&ranges);
+    }
+
+    fn echoes(&mut self, _: Vec<Vec<f64>>) {}
+
+    fn look(&mut self, capture: &mut Capture, known: Known<'_>) {
+        if capture.waiting() > MOST_WAITING {
+            self.follow(capture, MOST_WAITING / 2, known);
+        }
+    }
+
+    fn end(mut stretch: Gathering<Self>, known: Known<'_>) -> Surveyed {
+        if stretch.kept.followed.is_some() {
+            stretch.kept.follow(&mut stretch.capture, 0, known);
+        }
+        let (stretch, kept) = stretch.into_stretch(known);
+        let statistics = kept.gathered.finish();
+        let Some(mut all) = kept.followed else {
+            return Surveyed {
+                record: stretch.into_record(),
+                statistics,
+                unwatched: Vec::new(),
+            };
+        };
+        let position = |subject: &str| known.bodies.position(subject);
+        let motion = kept.is_flight.then(|| Motion {
+            start_s: stretch.start_s,
+            scan_period_s: stretch.scan_period_s,
+            frames: position(RIG_SUBJECT).map_or_else(Vec::new, |rig| std::mem::take(&mut all[rig].path)),
+        });
+        let mut unwatched = Vec::new();
+        if motion.is_none() {
+            let seen = (0..all.len()).filter(|body| all[*body].is_seen);
+            let bodies = followed(&stretch.label, known.bodies, seen).into_iter();
+            unwatched = bodies
+                .filter(|body| all[*body].markers > 0)
+                .map(|body| Unwatched {
+                    body,
+                    subject: known.bodies.all[body].subject.clone(),
+                    frames: all[body].frames,
+                    markers: all[body].markers,
+                })
+                .collect();
+        }
+        let mean = |subject: &str| all[position(subject)?].mean.finish();
+        let readings = catoptric_model::Readings::in_memory(stretch.beams, Vec::new());
+        Surveyed {
+            record: PoseRecord::new(stretch.label, motion, mean, Vec::new(), readings),
+            statistics,
+            unwatched,
+        }
+    }
+}
+
+/// The markers of bodies over a stretch whose frames were let go.
+pub(super) fn watch(
+    source: &Source,
+    stretch: usize,
+    unwatched: &[Unwatched],
+) -> Result<Vec<Watched>, IoError> {
+    let bodies: Vec<usize> = unwatched.iter().map(|u| u.body).collect();
+    let mut medians = vec![Median::default(); unwatched.len()];
+    let begin = || unwatched.iter().map(|u| Watching::new(u.frames, u.markers));
+    let mut watching: Vec<Watching> = begin().collect();
+    while medians.iter().any(|m| !m.is_found()) {
+        watching = begin().collect();
+        source.frames(stretch, &bodies, |body, frame| {
+            let place = bodies.iter().position(|b| *b == body);
+            let place = place.expect("only these were asked for");
+            watching[place].add(&frame.markers, |square| medians[place].add(square));
+        })?;
+        medians.iter_mut().for_each(Median::end_pass);
+    }
+    let all = watching.into_iter().zip(unwatched).zip(&medians);
+    Ok(all
+        .map(|((watching, u), median)| watching.finish(u.subject.clone(), median.value()))
+        .collect())
+}
