@@ -83,6 +83,8 @@ pub struct Dataset {
     pub session: Session,
     /// The stretches, in the order they were recorded.
     pub poses: Vec<PoseRecord>,
+    /// SHA-256 of the recording that it was read from, `observations.mcap`; `None` for one that never was a file.
+    pub id: Option<String>,
 }
 
 impl Stretch {
@@ -176,14 +178,9 @@ impl Dataset {
             )))
         };
         for pose in &self.poses {
-            if pose.beams != self.session.scanner.beams {
-                return fail(
-                    pose,
-                    format!(
-                        "{} beams, the scanner has {}",
-                        pose.beams, self.session.scanner.beams
-                    ),
-                );
+            let beams = self.session.scanner.scan.beams();
+            if pose.beams != beams {
+                return fail(pose, format!("{} beams, the scanner has {beams}", pose.beams));
             }
             let expected = pose.label.scans * pose.beams;
             if pose.ranges.len() != expected {
