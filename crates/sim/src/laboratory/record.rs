@@ -66,6 +66,7 @@ impl Laboratory {
         Ok(Dataset {
             session: self.session()?,
             poses,
+            id: None,
         })
     }
 }
