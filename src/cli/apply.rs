@@ -6,7 +6,7 @@ use super::output::{counted, print};
 use catoptric::files;
 use catoptric::files::IoError;
 use catoptric::files::cloud::{CloudFormat, cloud_bytes};
-use catoptric::{CloudFrame, Error, apply, read_calibration, read_dataset};
+use catoptric::{CloudFrame, Error, apply, read_calibration_for, read_dataset};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -42,7 +42,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let path = &arguments.out;
     let format = CloudFormat::of_path(path).map_err(|e| CliError::invalid(e.to_string(), None))?;
     let dataset = read_dataset(&arguments.dataset)?;
-    let calibration = read_calibration(&arguments.calibration)?;
+    let calibration = read_calibration_for(&arguments.calibration, &dataset.session)?;
     let frame = match arguments.frame {
         FrameName::Sensor => CloudFrame::Sensor,
         FrameName::Rig => CloudFrame::Rig,

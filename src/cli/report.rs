@@ -3,7 +3,7 @@
 use super::Context;
 use super::error::CliError;
 use super::output::print;
-use catoptric::{CloudFrame, apply, files, read_calibration, read_dataset, read_truth, report, score};
+use catoptric::{CloudFrame, apply, files, read_calibration_for, read_dataset, read_truth, report, score};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -26,7 +26,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let mut results = Vec::new();
     for path in &arguments.calibrations {
         context.check()?;
-        let calibration = read_calibration(path)?;
+        let calibration = read_calibration_for(path, &dataset.session)?;
         let result = score(&dataset, &calibration, truth.as_ref());
         results.push((calibration, result));
     }

@@ -62,6 +62,7 @@ fn exchanged_labels_are_named_and_put_back() {
             let dataset = Dataset {
                 session: laboratory.session().expect("known"),
                 poses: vec![laboratory.pose_record(pose as usize).expect("recorded")],
+                id: None,
             };
             let (right, warnings) = calib::tracking::put_right(&dataset);
             assert_eq!(warnings.len(), 1, "{warnings:?}");

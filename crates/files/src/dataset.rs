@@ -17,6 +17,7 @@ use super::json::to_json;
 use super::manifest::{Manifest, Provenance};
 use super::playback::parse_recording;
 use super::recording::{Encoded, RecordingEncoder, RecordingWriter};
+use super::results::require_version;
 use catoptric_model::{Dataset, Session, Stretch, session};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -193,17 +194,23 @@ pub fn read_session(dataset: &Path) -> Result<Session, IoError> {
 /// # Errors
 /// [`IoError`] as [`read_dataset`].
 pub fn read_stretches(dataset: &Path) -> Result<(Session, Vec<Stretch>), IoError> {
+    let (session, stretches, _) = read_recorded(dataset)?;
+    Ok((session, stretches))
+}
+
+/// The session, the observations and their SHA-256.
+fn read_recorded(dataset: &Path) -> Result<(Session, Vec<Stretch>, String), IoError> {
     let hashes = read_hashes(dataset)?;
     let session = parse_session(dataset, &read_checked(dataset, SESSION, hashes.as_ref())?)?;
     let path = dataset.join(OBSERVATIONS);
     let recording = fs::read(&path).map_err(|e| IoError::read(&path, e))?;
     // What was changed is not worth an error of its own: the one about the change comes first.
-    let (known, stretches) = rayon::join(
+    let (id, stretches) = rayon::join(
         || check(dataset, OBSERVATIONS, &recording, hashes.as_ref()),
         || parse_recording(&recording, &path, &session),
     );
-    known?;
-    Ok((session, stretches?))
+    let id = id?;
+    Ok((session, stretches?, id))
 }
 
 /// Reads a dataset and checks that its parts fit together. The truth is not looked at.
@@ -212,14 +219,18 @@ pub fn read_stretches(dataset: &Path) -> Result<(Session, Vec<Stretch>), IoError
 /// [`IoError`] names the file that is missing, changed since the manifest was written, not what it should be, or
 /// does not fit the others. A dataset without a manifest, somebody else's, is taken as it is.
 pub fn read_dataset(dataset: &Path) -> Result<Dataset, IoError> {
-    let (session, stretches) = read_stretches(dataset)?;
+    let (session, stretches, id) = read_recorded(dataset)?;
     let fail = |source| IoError::Inconsistent {
         path: dataset.to_owned(),
         source,
     };
     let records = stretches.into_iter().map(Stretch::into_record);
     let poses = records.collect::<Result<_, _>>().map_err(fail)?;
-    let dataset = Dataset { session, poses };
+    let dataset = Dataset {
+        session,
+        poses,
+        id: Some(id),
+    };
     dataset.check().map_err(fail)?;
     Ok(dataset)
 }
@@ -257,19 +268,20 @@ fn read_checked(
     Ok(bytes)
 }
 
-/// Whether the bytes of a file are those that the manifest knows.
+/// SHA-256 of the bytes of a file, which must be those that the manifest knows.
 fn check(
     dataset: &Path,
     name: &str,
     bytes: &[u8],
     hashes: Option<&BTreeMap<String, String>>,
-) -> Result<(), IoError> {
+) -> Result<String, IoError> {
+    let hash = sha256(bytes);
     match hashes {
-        Some(hashes) if hashes.get(name) != Some(&sha256(bytes)) => Err(IoError::Changed {
+        Some(hashes) if hashes.get(name) != Some(&hash) => Err(IoError::Changed {
             path: dataset.join(name),
             manifest: dataset.join(MANIFEST),
         }),
-        _ => Ok(()),
+        _ => Ok(hash),
     }
 }
 
@@ -278,12 +290,10 @@ fn parse_session(dataset: &Path, bytes: &[u8]) -> Result<Session, IoError> {
     let text = std::str::from_utf8(bytes)
         .map_err(|e| IoError::content(&path, format!("not UTF-8 from byte {}", e.valid_up_to())))?;
     let session: Session = toml::from_str(text).map_err(|e| IoError::toml(&path, text, &e))?;
-    if session.schema_version != session::SCHEMA_VERSION {
-        let (found, known) = (session.schema_version, session::SCHEMA_VERSION);
-        return Err(IoError::content(
-            path,
-            format!("schema_version is {found}, this program reads {known}"),
-        ));
-    }
-    Ok(session)
+    require_version(&path, session.schema_version, session::SCHEMA_VERSION)?;
+    // What version 1 lacks has its default now.
+    Ok(Session {
+        schema_version: session::SCHEMA_VERSION,
+        ..session
+    })
 }

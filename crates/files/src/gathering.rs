@@ -1,12 +1,13 @@
 //! A stretch in the making: the messages between one label and the next.
 
 use super::bodies::Bodies;
-use super::messages::{self, LabelledMarker, NS_PER_S, Scan};
+use super::messages::{LabelledMarker, NS_PER_S, Scan};
 use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::frame::Pose;
 use catoptric_model::session::ScannerSheet;
 use catoptric_model::{PoseLabel, Stretch, Track, TrackedFrame};
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 /// How far a period may be from the scanner's to be taken for it, in seconds: stamps are whole nanoseconds.
 const PERIOD_TOLERANCE_S: f64 = 1e-9;
@@ -44,15 +45,17 @@ impl Gathering {
 
     /// Takes a scan in; its beams must be those of the session.
     pub(super) fn scan(&mut self, scan: &Scan, scanner: &ScannerSheet) -> Result<(), String> {
-        let beams = scanner.beams;
+        let beams = scanner.scan.beams();
         if scan.ranges.len() != beams {
             return Err(format!("{} beams, session.toml has {beams}", scan.ranges.len()));
         }
-        let step = scanner.step_deg.to_radians();
-        let first = messages::azimuth(scanner, 0);
+        let (first, step) = (scanner.scan.azimuth(0), scanner.scan.increment());
         let drift = (scan.angle_increment - step).abs() * beams as f64;
+        let off = scan.angle_min - first;
+        // Azimuths a turn apart are one.
+        let off = off - TAU * (off / TAU).round();
         // A quarter of a step tells rounding to 32 bits from another beam.
-        if drift + (scan.angle_min - first).abs() > step / 4.0 {
+        if drift + off.abs() > step.abs() / 4.0 {
             return Err(format!(
                 "beams from {} rad in steps of {} rad, session.toml has {first} and {step}",
                 scan.angle_min, scan.angle_increment
@@ -68,7 +71,7 @@ impl Gathering {
 
     /// Takes the echoes of a scan in; its beams must be those of the session.
     pub(super) fn echoes(&mut self, echoes: Vec<Vec<f64>>, scanner: &ScannerSheet) -> Result<(), String> {
-        let beams = scanner.beams;
+        let beams = scanner.scan.beams();
         if echoes.len() != beams {
             return Err(format!("{} beams, session.toml has {beams}", echoes.len()));
         }
@@ -103,14 +106,14 @@ impl Gathering {
             return Err(format!("pose {pose}: {found} scans, its label says {expected}"));
         }
         if !self.echoes.is_empty() && self.echoes.len() != self.ranges.len() {
-            let (pose, found) = (self.label.pose, self.echoes.len() / scanner.beams.max(1));
+            let (pose, found) = (self.label.pose, self.echoes.len() / scanner.scan.beams());
             return Err(format!("pose {pose}: echoes of {found} scans of {}", self.scans));
         }
         let start = self.first_scan.unwrap_or(self.label_time);
         Ok(Stretch {
             start_s: seconds_between(epoch, start),
             scan_period_s: self.period(scanner, start),
-            beams: scanner.beams,
+            beams: scanner.scan.beams(),
             tracks: self.tracks(bodies, epoch),
             ranges: self.ranges,
             echoes: (!self.echoes.is_empty()).then_some(self.echoes),
@@ -120,7 +123,7 @@ impl Gathering {
 
     /// Time from scan to scan: the scanner's where the stamps agree with it to their resolution.
     fn period(&self, scanner: &ScannerSheet, start: u64) -> f64 {
-        let rated = 1.0 / scanner.scan_rate_hz;
+        let rated = scanner.scan.scan_period_s();
         let (measured, tolerance) = match self.scans {
             0 => return rated,
             1 => (self.scan_time, rated * f64::from(f32::EPSILON)),

@@ -215,10 +215,9 @@ impl Calibration {
     pub fn check_scanner(&self, session: &Session) -> Result<(), ModelError> {
         let dataset = *session.scanner.scan.angles();
         match self.scanner {
-            Some(calibration) if !calibration.same_as(&dataset) => Err(ModelError::OtherScanner {
-                calibration,
-                dataset,
-            }),
+            Some(calibration) if !calibration.same_as(&dataset) => {
+                Err(ModelError::OtherScanner { calibration, dataset })
+            }
             _ => Ok(()),
         }
     }

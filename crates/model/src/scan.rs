@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Most beams of a scan: far more than any scanner has, and few enough to be held in memory.
-const MOST_BEAMS: usize = 1 << 16;
+pub const MOST_BEAMS: usize = 1 << 16;
 
 /// Part of a step by which two lists of azimuths may differ and still be one: what writing them as decimals leaves.
 const SAME_PART_OF_STEP: f64 = 1e-3;
@@ -72,6 +72,16 @@ impl ScanDirection {
 }
 
 impl ScanAngles {
+    /// Beams on either side of the x axis alike, counter-clockwise.
+    pub fn centered(step_deg: f64, beams: usize) -> Self {
+        Self {
+            first_deg: -0.5 * (beams as f64 - 1.0) * step_deg,
+            step_deg,
+            beams,
+            direction: ScanDirection::Ccw,
+        }
+    }
+
     /// Whether a scan can have them.
     ///
     /// # Errors
@@ -79,19 +89,31 @@ impl ScanAngles {
     pub fn check(&self) -> Result<(), ScanError> {
         let fail = |key, problem: String| Err(ScanError { key, problem });
         if !(1..=MOST_BEAMS).contains(&self.beams) {
-            return fail("beams", format!("is {}; 1 to {MOST_BEAMS} is allowed", self.beams));
+            return fail(
+                "beams",
+                format!("is {}; 1 to {MOST_BEAMS} is allowed", self.beams),
+            );
         }
         if !(self.step_deg.is_finite() && self.step_deg > 0.0) {
-            return fail("step_deg", format!("is {}; a positive number is needed", self.step_deg));
+            return fail(
+                "step_deg",
+                format!("is {}; a positive number is needed", self.step_deg),
+            );
         }
         if !(-360.0..=360.0).contains(&self.first_deg) {
-            return fail("first_deg", format!("is {}; -360 to 360 is allowed", self.first_deg));
+            return fail(
+                "first_deg",
+                format!("is {}; -360 to 360 is allowed", self.first_deg),
+            );
         }
         let around = self.step_deg * self.beams as f64;
         if around > 360.0 + 0.5 * self.step_deg {
             return fail(
                 "step_deg",
-                format!("is {}; {} such steps are more than one turn", self.step_deg, self.beams),
+                format!(
+                    "is {}; {} such steps are more than one turn",
+                    self.step_deg, self.beams
+                ),
             );
         }
         Ok(())
@@ -139,11 +161,7 @@ impl ScanGeometry {
     ///
     /// # Errors
     /// [`ScanError`] names the first number that no scan can have.
-    pub fn new(
-        angles: ScanAngles,
-        scan_rate_hz: f64,
-        beam_time_us: Option<f64>,
-    ) -> Result<Self, ScanError> {
+    pub fn new(angles: ScanAngles, scan_rate_hz: f64, beam_time_us: Option<f64>) -> Result<Self, ScanError> {
         angles.check()?;
         let fail = |key, problem: String| Err(ScanError { key, problem });
         if !(scan_rate_hz.is_finite() && scan_rate_hz > 0.0) {
@@ -280,27 +298,66 @@ impl ScanGeometry {
         }
     }
 
-    /// The beams of a run, in the order of the scan; one with first > last goes over the seam.
-    pub fn run(&self, [first, last]: [usize; 2]) -> impl Iterator<Item = usize> + Clone + use<> {
-        let end = self.beams() - 1;
-        let (to_end, from_start) = match first <= last {
-            true => (first..(last + 1).min(end + 1), 0..0),
-            false => (first..end + 1, 0..last + 1),
+    /// Whether a run goes over the seam: where a scan does not close, there is none.
+    fn over_seam(&self, [first, last]: [usize; 2]) -> bool {
+        first > last && self.closes()
+    }
+
+    /// The beams of a run that the scan has, in its order; first > last goes over the seam.
+    pub fn run(&self, run: [usize; 2]) -> impl Iterator<Item = usize> + Clone + use<> {
+        let (beams, [first, last]) = (self.beams(), run);
+        let to_last = last.saturating_add(1).min(beams);
+        let (to_end, from_start) = match self.over_seam(run) {
+            true => (first..beams, 0..to_last),
+            false => (first..to_last, 0..0),
         };
         to_end.chain(from_start)
     }
 
     /// Whether a run holds a beam.
-    pub fn holds([first, last]: [usize; 2], beam: usize) -> bool {
-        match first <= last {
-            true => (first..=last).contains(&beam),
-            false => beam >= first || beam <= last,
+    pub fn holds(&self, run: [usize; 2], beam: usize) -> bool {
+        let [first, last] = run;
+        match self.over_seam(run) {
+            true => beam >= first || beam <= last,
+            false => (first..=last).contains(&beam),
         }
+    }
+
+    /// Steps from the first beam of a run to its last.
+    pub fn length(&self, run: [usize; 2]) -> usize {
+        let [first, last] = run;
+        match self.over_seam(run) {
+            true => (last + self.beams()).saturating_sub(first),
+            false => last.saturating_sub(first),
+        }
+    }
+
+    /// Steps from the first beam of a run to a beam: negative for one that is before it.
+    pub fn along(&self, run: [usize; 2], beam: usize) -> f64 {
+        let straight = beam as f64 - run[0] as f64;
+        if !self.closes() {
+            return straight;
+        }
+        let around = self.beams() as f64;
+        let on = straight.rem_euclid(around);
+        let beyond = on - self.length(run) as f64;
+        // What is outside belongs to the nearer end.
+        if beyond <= around - on { on } else { on - around }
+    }
+
+    /// Steps that an angle spans, rounded up.
+    pub fn steps_in(&self, angle_deg: f64) -> usize {
+        // Small and positive; what rounding adds to a whole number is no step.
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let steps = (angle_deg / self.angles.step_deg - SAME_PART_OF_STEP)
+            .ceil()
+            .max(0.0) as usize;
+        steps
     }
 
     /// How many beams one is away from a run; 0 inside.
     pub fn beside(&self, run: [usize; 2], beam: usize) -> usize {
-        match Self::holds(run, beam) {
+        match self.holds(run, beam) {
             true => 0,
             false => self.apart(run[0], beam).min(self.apart(run[1], beam)),
         }
@@ -312,7 +369,7 @@ impl ScanGeometry {
         if !self.closes() {
             return [first.saturating_sub(by), last.saturating_add(by).min(beams - 1)];
         }
-        if self.run([first, last]).count() + 2 * by >= beams {
+        if self.length([first, last]) + 1 + 2 * by >= beams {
             return [0, beams - 1];
         }
         [(first + beams - by) % beams, (last + by) % beams]
@@ -361,12 +418,7 @@ impl Default for ScanGeometry {
         let scan_rate_hz = 40.0;
         let step_deg = 0.25;
         Self {
-            angles: ScanAngles {
-                first_deg: -135.0,
-                step_deg,
-                beams: 1081,
-                direction: ScanDirection::Ccw,
-            },
+            angles: ScanAngles::centered(step_deg, 1081),
             scan_rate_hz,
             beam_time_s: step_deg / 360.0 / scan_rate_hz,
         }
@@ -396,11 +448,21 @@ mod tests {
         let ust = ScanGeometry::default();
         let step = 0.25 * std::f64::consts::PI / 180.0;
         for beam in 0..ust.beams() {
-            assert_eq!(ust.azimuth(beam).to_bits(), ((beam as f64 - 540.0) * step).to_bits());
+            assert_eq!(
+                ust.azimuth(beam).to_bits(),
+                ((beam as f64 - 540.0) * step).to_bits()
+            );
         }
+        assert_eq!(ust.angles().first_deg, -135.0);
         assert_eq!(ust.step().to_bits(), step.to_bits());
-        assert_eq!(ust.beam_time_s().to_bits(), (ust.scan_period_s() / 1440.0).to_bits());
-        assert_eq!((ust.beam_time_s() * 1e6 / 1e6).to_bits(), ust.beam_time_s().to_bits());
+        assert_eq!(
+            ust.beam_time_s().to_bits(),
+            (ust.scan_period_s() / 1440.0).to_bits()
+        );
+        assert_eq!(
+            (ust.beam_time_s() * 1e6 / 1e6).to_bits(),
+            ust.beam_time_s().to_bits()
+        );
     }
 
     #[test]
@@ -419,7 +481,12 @@ mod tests {
                 }
             }
             let outside = scan.azimuth(scan.beams() - 1) + scan.increment();
-            assert_eq!(scan.nearest(outside), scan.closes().then_some(0), "{}", scan.angles());
+            assert_eq!(
+                scan.nearest(outside),
+                scan.closes().then_some(0),
+                "{}",
+                scan.angles()
+            );
         }
         let ust = ScanGeometry::default();
         assert_eq!(ust.nearest(ust.azimuth(0) - ust.step()), None);
@@ -462,7 +529,8 @@ mod tests {
         let over: Vec<usize> = around.run([1438, 1]).collect();
         assert_eq!(over, [1438, 1439, 0, 1]);
         assert_eq!(around.run([3, 5]).collect::<Vec<_>>(), [3, 4, 5]);
-        assert!(ScanGeometry::holds([1438, 1], 1439) && !ScanGeometry::holds([1438, 1], 2));
+        assert!(around.holds([1438, 1], 1439) && !around.holds([1438, 1], 2));
+        assert_eq!((around.length([1438, 1]), around.length([3, 5])), (3, 2));
         assert_eq!(around.beside([1438, 1], 4), 3);
         assert_eq!(around.beside([1438, 1], 1430), 8);
         assert_eq!(around.widened([1438, 1], 3), [1435, 4]);
@@ -475,6 +543,21 @@ mod tests {
         assert_eq!(around.shortest_run(&[]), None);
         let ust = ScanGeometry::default();
         assert_eq!(ust.shortest_run(&[0, 1, 1080]), Some([0, 1080]));
+        // Where the scan does not close, nothing goes over its ends.
+        assert_eq!((ust.run([1070, 4]).count(), ust.length([1070, 4])), (0, 0));
+        assert!(!ust.holds([1070, 4], 2));
+        assert_eq!(ust.run([1070, 2000]).count(), 11);
+    }
+
+    #[test]
+    fn places_along_a_run_go_on_beyond_its_ends() {
+        let around = all_around();
+        for (beam, place) in [(1438, 0.0), (0, 2.0), (1, 3.0), (4, 6.0), (1430, -8.0)] {
+            assert_eq!(around.along([1438, 1], beam), place, "beam {beam}");
+        }
+        assert_eq!(ScanGeometry::default().along([100, 200], 90), -10.0);
+        assert_eq!(ScanGeometry::default().steps_in(2.5), 10);
+        assert_eq!((around.steps_in(0.1), around.steps_in(0.0)), (1, 0));
     }
 
     #[test]
@@ -482,7 +565,10 @@ mod tests {
         let good = *ScanGeometry::default().angles();
         let key = |angles, rate, time| ScanGeometry::new(angles, rate, time).map_err(|e| e.key);
         assert_eq!(key(ScanAngles { beams: 0, ..good }, 40.0, None), Err("beams"));
-        assert_eq!(key(ScanAngles { beams: 1441, ..good }, 40.0, None), Err("step_deg"));
+        assert_eq!(
+            key(ScanAngles { beams: 1441, ..good }, 40.0, None),
+            Err("step_deg")
+        );
         for step_deg in [0.0, -0.25, f64::NAN, f64::INFINITY] {
             assert_eq!(key(ScanAngles { step_deg, ..good }, 40.0, None), Err("step_deg"));
         }
@@ -512,7 +598,10 @@ mod tests {
             ..one
         };
         assert!(one.same_as(&rounded));
-        assert!(!one.same_as(&ScanAngles { step_deg: 0.352, ..one }));
+        assert!(!one.same_as(&ScanAngles {
+            step_deg: 0.352,
+            ..one
+        }));
         assert!(!one.same_as(&ScanAngles { beams: 683, ..one }));
         assert!(!one.same_as(&ScanAngles {
             direction: ScanDirection::Cw,

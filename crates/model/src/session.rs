@@ -231,12 +231,11 @@ impl TryFrom<FlatSheet> for ScannerSheet {
     type Error = ScanError;
 
     fn try_from(flat: FlatSheet) -> Result<Self, ScanError> {
-        let half = 0.5 * (flat.beams as f64 - 1.0);
+        let centered = ScanAngles::centered(flat.step_deg, flat.beams);
         let angles = ScanAngles {
-            first_deg: flat.first_deg.unwrap_or(-half * flat.step_deg),
-            step_deg: flat.step_deg,
-            beams: flat.beams,
+            first_deg: flat.first_deg.unwrap_or(centered.first_deg),
             direction: flat.direction,
+            ..centered
         };
         Ok(Self {
             preset: flat.preset,

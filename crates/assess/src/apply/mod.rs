@@ -4,10 +4,10 @@ use crate::score::residual;
 #[cfg(doc)]
 use catoptric_model::Motion;
 use catoptric_model::cloud::{self, CloudFrame, CloudPoint, PointCloud};
-use catoptric_model::{Calibration, Dataset, Deflection, Pose, PoseKind, PoseRecord, Status, beam};
+use catoptric_model::{Calibration, Dataset, Deflection, ModelError, Pose, PoseKind, PoseRecord, Status};
 
 /// Why no cloud can be made.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ApplyError {
     /// No stretch has the number asked for.
     #[error("the dataset has no pose {asked}; its poses are numbered {first} to {last}")]
@@ -22,6 +22,9 @@ pub enum ApplyError {
     /// No stretch was asked for, and there is none of the room.
     #[error("the dataset has no stretch of the empty room; say which pose to apply the calibration to")]
     NoRoom,
+    /// The calibration is of another scanner.
+    #[error(transparent)]
+    Scanner(#[from] ModelError),
 }
 
 /// Lifts every range of a stretch into space: of pose number `pose`, or else of the first stretch of the empty room.
@@ -34,26 +37,27 @@ pub enum ApplyError {
 /// and rig frame are those of that time, too.
 ///
 /// # Errors
-/// [`ApplyError`] if there is no such stretch.
+/// [`ApplyError`] if there is no such stretch, or the calibration is of another scanner.
 pub fn apply(
     dataset: &Dataset,
     calibration: &Calibration,
     pose: Option<usize>,
     frame: CloudFrame,
 ) -> Result<PointCloud, ApplyError> {
+    calibration.check_scanner(&dataset.session)?;
     let record = find(dataset, pose)?;
+    let scan = &dataset.session.scanner.scan;
     let rig_from_sensor = residual::mount(dataset, calibration);
-    let step_period_s = dataset.session.scanner.step_period_s();
-    let room_from_rig = |scan, beam| {
+    let room_from_rig = |number, beam| {
         let motion = record.motion.as_ref();
         motion
-            .and_then(|m| m.room_from_rig(m.time_s(scan, beam, step_period_s)))
+            .and_then(|m| m.room_from_rig(m.time_s(number, beam, scan.beam_time_s())))
             .unwrap_or(record.room_from_rig)
     };
-    let frame_from_sensor = |scan, beam| match frame {
+    let frame_from_sensor = |number, beam| match frame {
         CloudFrame::Sensor => Pose::identity(),
         CloudFrame::Rig => rig_from_sensor,
-        CloudFrame::Room => room_from_rig(scan, beam) * rig_from_sensor,
+        CloudFrame::Room => room_from_rig(number, beam) * rig_from_sensor,
     };
     let bias = residual::bias(dataset, calibration);
     // Nothing is believed about a color without a name.
@@ -71,7 +75,7 @@ pub fn apply(
         without_direction: 0,
         unsolved_elements: deflections.iter().filter(|d| d.is_none()).count(),
     };
-    for (scan, ranges) in record.ranges.chunks(record.beams.max(1)).enumerate() {
+    for (number, ranges) in record.ranges.chunks(record.beams.max(1)).enumerate() {
         for (beam, (&range, deflection)) in ranges.iter().zip(&deflections).enumerate() {
             if !range.is_finite() {
                 result.without_range += 1;
@@ -84,11 +88,11 @@ pub fn apply(
             // E_a of whatever incidence is not added, so any will do here.
             let terms = bias.terms(range, 1.0, color);
             let corrected = range - terms.distance - terms.color;
-            let in_sensor = cloud::lift(deflection, beam::azimuth(beam), corrected);
+            let in_sensor = cloud::lift(deflection, scan.azimuth(beam), corrected);
             result.points.push(CloudPoint {
-                position: frame_from_sensor(scan, beam) * in_sensor,
+                position: frame_from_sensor(number, beam) * in_sensor,
                 beam,
-                scan,
+                scan: number,
             });
         }
     }

@@ -4,7 +4,7 @@ use super::statistics::{mean, rms};
 use catoptric_calib::observations::{self, BoardInSensor};
 use catoptric_calib::tracking;
 use catoptric_model::{Calibration, CorrectedRange, Dataset, Deflection, Pose, PoseKind, PoseRecord};
-use catoptric_model::{RangeBias, RawRange, beam};
+use catoptric_model::{RangeBias, RawRange};
 use nalgebra::Unit;
 use serde::Serialize;
 
@@ -54,8 +54,9 @@ pub fn boards(dataset: &Dataset, calibration: &Calibration) -> SurfaceResidual {
         let board = BoardInSensor::of(pose, &dataset.session, &rig_from_sensor);
         move |beam: usize, deflection: &Deflection| {
             let board = board.as_ref()?;
-            let exit = deflection.exit_direction(beam::azimuth(beam));
-            let hit = board.hit(&deflection.deflection_point(beam::azimuth(beam)), &exit)?;
+            let azimuth = observations::azimuth(&dataset.session, beam);
+            let exit = deflection.exit_direction(azimuth);
+            let hit = board.hit(&deflection.deflection_point(azimuth), &exit)?;
             let predicted = deflection.distance + hit.distance;
             board.holds(&hit, cone * predicted, 0.0).then(|| Surface {
                 predicted,
@@ -73,8 +74,9 @@ pub fn walls(dataset: &Dataset, calibration: &Calibration) -> SurfaceResidual {
         let room_from_sensor = pose.room_from_rig * rig_from_sensor;
         move |beam: usize, deflection: &Deflection| {
             let room = dataset.session.room.as_ref()?;
-            let origin = room_from_sensor * deflection.deflection_point(beam::azimuth(beam));
-            let exit = deflection.exit_direction(beam::azimuth(beam));
+            let azimuth = observations::azimuth(&dataset.session, beam);
+            let origin = room_from_sensor * deflection.deflection_point(azimuth);
+            let exit = deflection.exit_direction(azimuth);
             let exit = Unit::new_unchecked(room_from_sensor * exit.into_inner());
             let (s, wall) = room.cast(&origin, &exit)?;
             Some(Surface {

@@ -7,7 +7,7 @@
 
 use catoptric_assess::score::true_directions;
 use catoptric_calib::{TrueDirection, limit};
-use catoptric_model::{Dataset, PoseKind, PoseRecord, beam};
+use catoptric_model::{Dataset, PoseKind, PoseRecord};
 use catoptric_sim::laboratory::Returns;
 use catoptric_sim::{Laboratory, Scene, SimError};
 use nalgebra::Matrix2;
@@ -96,6 +96,7 @@ fn find(scene: &Scene, seed: u64, accuracy: &mut Accuracy) -> Result<(), String>
     let mut dataset = Dataset {
         session,
         poses: poses.map_err(words)?.into_iter().flatten().collect(),
+        id: None,
     };
     // Poses that are left out leave no gap in the numbers.
     for (number, pose) in dataset.poses.iter_mut().enumerate() {
@@ -177,7 +178,7 @@ fn record(laboratory: &Laboratory, number: usize, readings: usize) -> Result<Opt
 fn spread(returns: &Returns, readings: usize) -> Vec<f64> {
     // An even number of ±a has the sample variance a²·n/(n − 1).
     let share = ((readings.max(2) - 1) as f64 / readings.max(2) as f64).sqrt();
-    let mut ranges = Vec::with_capacity(readings * beam::COUNT);
+    let mut ranges = Vec::with_capacity(readings * returns.len());
     for scan in 0..readings {
         let last_of_odd = readings % 2 == 1 && scan + 1 == readings;
         let sign = match (last_of_odd, scan % 2) {

@@ -13,7 +13,7 @@ const MOST_POINTS: usize = 6000;
 
 /// The cloud from above.
 pub(crate) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud: &PointCloud) -> String {
-    let facets: Vec<Option<usize>> = (0..dataset.session.scanner.beams)
+    let facets: Vec<Option<usize>> = (0..dataset.session.scanner.scan.beams())
         .map(|b| facet_of(dataset, calibration?.beam(b)?))
         .collect();
     // Whole scans are left out: every n-th point would favour some beams.

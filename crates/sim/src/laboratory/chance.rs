@@ -130,7 +130,12 @@ impl Luck<'_> {
     pub(super) fn innovations(&self, scan: usize, columns: &mut Columns, out: &mut Vec<f64>) {
         out.clear();
         if self.correlated().is_some() {
-            columns.draw(self.geometry.beams(), self.seed, Purpose::Correlated, self.row(scan));
+            columns.draw(
+                self.geometry.beams(),
+                self.seed,
+                Purpose::Correlated,
+                self.row(scan),
+            );
             columns.normals(0, out);
         }
     }
@@ -163,7 +168,8 @@ impl Luck<'_> {
             into.drift = self.drift;
             into.warm_up = warm_up(self.scene, time_s);
             into.elements = Arc::clone(&self.elements);
-            into.columns.draw(self.geometry.beams(), self.seed, Purpose::Reading, row);
+            into.columns
+                .draw(self.geometry.beams(), self.seed, Purpose::Reading, row);
             into.columns.normals(0, &mut into.noise);
             into.columns.uniforms(2, &mut into.dropout);
             if let Some(law) = self.correlated() {

@@ -128,7 +128,9 @@ impl Laboratory {
         let mut scan_luck = ScanLuck::default();
         self.luck(drawn.number)
             .draw(scan, drawn.states(scan), None, &mut scan_luck);
-        (0..self.sensor.scan().beams()).map(|beam| scan_luck.of(beam)).collect()
+        (0..self.sensor.scan().beams())
+            .map(|beam| scan_luck.of(beam))
+            .collect()
     }
 
     /// When and where each body of a stretch is solved for the first time.

@@ -53,6 +53,11 @@ pub fn simulate_with(scene: &Scene, control: &Control) -> Result<(Dataset, Truth
         }
         control.check()?;
         let session = laboratory.session()?;
-        Ok((Dataset { session, poses }, truth))
+        let dataset = Dataset {
+            session,
+            poses,
+            id: None,
+        };
+        Ok((dataset, truth))
     })
 }

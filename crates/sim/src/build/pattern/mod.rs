@@ -78,7 +78,12 @@ fn pattern_path(number: usize) -> Path {
     Path::of("superstructure").key("pattern").index(number)
 }
 
-fn copies(facets: &[Facet], pattern: &Pattern, scan: &ScanGeometry, path: &Path) -> Result<Vec<Facet>, Problem> {
+fn copies(
+    facets: &[Facet],
+    pattern: &Pattern,
+    scan: &ScanGeometry,
+    path: &Path,
+) -> Result<Vec<Facet>, Problem> {
     match pattern {
         Pattern::Ring(ring) => {
             let original = find(facets, &ring.of, &path.key("ring").key("of"))?;

@@ -80,7 +80,12 @@ fn a_mirror_image_has_the_reflected_corners() {
     ] {
         for shape in shapes() {
             let own = corners(&shape).expect("it is a mirror");
-            let image = mirrored(&facet("a", shape.clone()), "b".to_owned(), &[exchange], &ScanGeometry::default());
+            let image = mirrored(
+                &facet("a", shape.clone()),
+                "b".to_owned(),
+                &[exchange],
+                &ScanGeometry::default(),
+            );
             let found = corners(&image.shape).expect("so is its image");
             // Seen in a mirror, what went round counter-clockwise goes round clockwise.
             let reflected = own

@@ -53,7 +53,9 @@ fn procedure(scene: &Scene, sensor: &Sensor, seed: u64) -> Result<Vec<Planned>, 
     let structure = Structure::nominal(scene)?;
     let setting = Setting::new(scene, &structure, Mirrors::Attached, Vec::new())?;
     let room_from_sensor = room_from_rig(&scene.room) * structure::nominal_mount(scene);
-    let paths: Vec<Path> = (0..sensor.scan().beams()).map(|b| sensor.chief_path(&setting, b)).collect();
+    let paths: Vec<Path> = (0..sensor.scan().beams())
+        .map(|b| sensor.chief_path(&setting, b))
+        .collect();
     let experiment = &scene.experiment;
     let scans = experiment.scans_per_pose as usize;
     let without_board = |kind, scans: u32| Planned {
@@ -155,7 +157,13 @@ fn no_place(scene: &Scene, board: usize, group: &Group, reason: String) -> SimEr
 }
 
 /// A pose that the scene gives itself.
-fn given(scene: &Scene, scan: &ScanGeometry, paths: &[Path], pose: &BoardPose, index: usize) -> Result<Planned, SimError> {
+fn given(
+    scene: &Scene,
+    scan: &ScanGeometry,
+    paths: &[Path],
+    pose: &BoardPose,
+    index: usize,
+) -> Result<Planned, SimError> {
     let unknown = |what: String| SimError::UnknownName {
         by: format!("pose {index}"),
         what,
