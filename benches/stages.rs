@@ -9,7 +9,7 @@ use catoptric::calib::solve::{self, BareDistance, Element};
 use catoptric::calib::{self, Method, Options};
 use catoptric::files::RecordingWriter;
 use catoptric::layout::{Detail, Layout, analyze};
-use catoptric::model::{BoardPlane, Deflection, RawRange, beam, range};
+use catoptric::model::{BoardPlane, Deflection, RawRange, range};
 use catoptric::sim::build::Structure;
 use catoptric::sim::light::{Mirrors, Setting};
 use catoptric::sim::noise::{Columns, Purpose};
@@ -17,6 +17,7 @@ use catoptric::sim::receive::Sensor;
 use catoptric::sim::receive::detect::{self, Pulse};
 use catoptric::sim::scene::{FacetShape, PolygonShape};
 use catoptric::sim::{Laboratory, Scene};
+use catoptric_fixtures::ust20lx;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Unit, Vector3};
 use std::hint::black_box;
@@ -32,7 +33,7 @@ const FACET_STRETCH: usize = 11;
 fn simulate(c: &mut Criterion) {
     let laboratory = Laboratory::new(&prototype(), 1).unwrap();
     let mut group = c.benchmark_group("simulate");
-    let sub_rays = (beam::COUNT * laboratory.sub_rays()) as u64;
+    let sub_rays = (ust20lx::COUNT * laboratory.sub_rays()) as u64;
     group.throughput(Throughput::Elements(sub_rays));
     group.bench_function("trace one pose, sub-rays", |b| {
         b.iter(|| laboratory.returns(FACET_STRETCH).unwrap())
@@ -52,7 +53,7 @@ fn compile(c: &mut Criterion) {
     let structure = Structure::as_built(&scene, 1).unwrap();
     let bare = Setting::new(&scene, &structure, Mirrors::Attached, Vec::new()).unwrap();
     let mut group = c.benchmark_group("compile");
-    group.throughput(Throughput::Elements((beam::COUNT * sensor.sub_rays()) as u64));
+    group.throughput(Throughput::Elements((ust20lx::COUNT * sensor.sub_rays()) as u64));
     group.bench_function("rig of the prototype, sub-rays", |b| {
         b.iter(|| sensor.compile(&bare))
     });
@@ -64,7 +65,7 @@ fn layout(c: &mut Criterion) {
     let scene = prototype();
     let mut moved = scene.clone();
     let facet = &mut moved.superstructure.facet[3];
-    let corners = catoptric::sim::build::layout::corners(&facet.shape).unwrap();
+    let corners = catoptric::sim::build::layout::corners(&facet.shape, &Default::default()).unwrap();
     let corners_mm = corners
         .iter()
         .map(|c| [c.x * 1e3 + 0.3, c.y * 1e3 - 0.2, c.z * 1e3]);
@@ -97,7 +98,9 @@ fn fly(c: &mut Criterion) {
     let laboratory = Laboratory::new(&scene, 1).unwrap();
     let sight = laboratory.sight(laboratory.stretches() - 1).unwrap();
     let mut group = c.benchmark_group("fly");
-    group.throughput(Throughput::Elements((beam::COUNT * laboratory.sub_rays()) as u64));
+    group.throughput(Throughput::Elements(
+        (ust20lx::COUNT * laboratory.sub_rays()) as u64,
+    ));
     group.bench_function("trace and detect a scan, sub-rays", |b| {
         b.iter(|| sight.returns(20))
     });
@@ -142,10 +145,10 @@ fn noise(c: &mut Criterion) {
     let mut columns = Columns::default();
     let mut normals = Vec::new();
     let mut group = c.benchmark_group("noise");
-    group.throughput(Throughput::Elements(beam::COUNT as u64));
+    group.throughput(Throughput::Elements(ust20lx::COUNT as u64));
     group.bench_function("normal deviates of a scan", |b| {
         b.iter(|| {
-            columns.draw(beam::COUNT, 1, Purpose::Reading, black_box(7));
+            columns.draw(ust20lx::COUNT, 1, Purpose::Reading, black_box(7));
             columns.normals(0, &mut normals);
         });
     });
@@ -153,7 +156,7 @@ fn noise(c: &mut Criterion) {
     let returns = laboratory.returns(FACET_STRETCH).unwrap();
     let first_seen = laboratory.first_seen(FACET_STRETCH);
     let drawn = laboratory.draw(FACET_STRETCH, 0..64);
-    group.throughput(Throughput::Elements(64 * beam::COUNT as u64));
+    group.throughput(Throughput::Elements(64 * ust20lx::COUNT as u64));
     group.bench_function("readings of 64 scans", |b| {
         b.iter(|| {
             let mut recorder = laboratory.excerpt_recorder(&drawn);
@@ -188,7 +191,7 @@ fn calibrate(c: &mut Criterion) {
     let mut group = c.benchmark_group("calibrate");
     group
         .sample_size(10)
-        .throughput(Throughput::Elements(beam::COUNT as u64));
+        .throughput(Throughput::Elements(ust20lx::COUNT as u64));
     for method in Method::ALL {
         group.bench_function(method.name(), |b| {
             b.iter(|| calib::calibrate(&dataset, method, &Options::default()).unwrap());

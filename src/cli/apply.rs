@@ -4,7 +4,7 @@ use super::Context;
 use super::error::CliError;
 use super::output::{counted, print};
 use catoptric::files::cloud::CloudFormat;
-use catoptric::{CloudFrame, apply_into, read_calibration, read_dataset};
+use catoptric::{CloudFrame, apply_into, read_calibration_for, read_dataset};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -41,7 +41,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     // Said before anything is read.
     CloudFormat::of_path(path).map_err(|e| CliError::invalid(e.to_string(), None))?;
     let dataset = read_dataset(&arguments.dataset)?;
-    let calibration = read_calibration(&arguments.calibration)?;
+    let calibration = read_calibration_for(&arguments.calibration, &dataset.session)?;
     let frame = match arguments.frame {
         FrameName::Sensor => CloudFrame::Sensor,
         FrameName::Rig => CloudFrame::Rig,

@@ -3,7 +3,6 @@
 use super::Context;
 use super::error::CliError;
 use super::output::{counted, print, quoted};
-use catoptric::model::beam;
 use catoptric::sim::Laboratory;
 use catoptric::sim::check::{Outline, outline};
 use catoptric::sim::trace::Scenery;
@@ -42,7 +41,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         counted(scene.board.len(), "board"),
         counted(laboratory.board_poses(), "pose"),
         counted(laboratory.scans(), "scan"),
-        counted(laboratory.scans() * beam::COUNT, "reading"),
+        counted(laboratory.scans() * laboratory.sensor().scan().beams(), "reading"),
     );
     if context.global.verbose > 0 {
         for facet in &outline.facets {

@@ -5,7 +5,7 @@ use super::output::{counted, print};
 use super::score::figure;
 use catoptric::compare::{CONTRADICTION, Row};
 use catoptric::score::Honesty;
-use catoptric::{Comparison, Contestant, Error, compare, read_calibration, read_dataset, read_truth};
+use catoptric::{Comparison, Contestant, Error, compare, read_calibration_for, read_dataset, read_truth};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -22,7 +22,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Ends well whatever the verdicts are: `score` is what judges one of them.
+/// Ends well whatever the verdicts are, `score` is what judges one of them, unless one is of another dataset.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
     let dataset = read_dataset(&arguments.dataset)?;
     let truth = read_truth(&arguments.dataset)?;
@@ -32,16 +32,21 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
         .map(|path| {
             Ok(Contestant {
                 name: path.display().to_string(),
-                calibration: read_calibration(path)?,
+                calibration: read_calibration_for(path, &dataset.session)?,
             })
         })
         .collect::<Result<_, CliError>>()?;
     let found = compare(&dataset, &contestants, truth.as_ref()).map_err(Error::from)?;
     if arguments.json {
         let json = serde_json::to_string_pretty(&found).map_err(|e| CliError::Output(e.into()))?;
-        return print(&format!("{json}\n"));
+        print(&format!("{json}\n"))?;
+    } else {
+        print(&words(&found))?;
     }
-    print(&words(&found))
+    match found.failures.is_empty() {
+        true => Ok(()),
+        false => Err(CliError::Verdict(found.failures.join("\n"))),
+    }
 }
 
 /// A calibration as a row of a table.

@@ -5,7 +5,7 @@ use super::error::CliError;
 use super::output::print;
 use catoptric::apply::{CloudSketch, Lift};
 use catoptric::report::MOST_POINTS;
-use catoptric::{CloudFrame, Error, files, read_calibration, read_dataset, read_truth, report, score};
+use catoptric::{CloudFrame, Error, files, read_calibration_for, read_dataset, read_truth, report, score};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -28,7 +28,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let mut results = Vec::new();
     for path in &arguments.calibrations {
         context.check()?;
-        let calibration = read_calibration(path)?;
+        let calibration = read_calibration_for(path, &dataset.session)?;
         let result = score(&dataset, &calibration, truth.as_ref()).map_err(Error::from)?;
         results.push((calibration, result));
     }

@@ -6,9 +6,9 @@
 use crate::scenes::{PROTOTYPE, TWO_MIRROR, layouts, scene, without_errors};
 use catoptric::calib::{self, Method, Options};
 use catoptric::files::{DatasetWriter, Provenance, read_dataset};
-use catoptric::model::beam;
 use catoptric::sim::{Laboratory, Scene};
 use catoptric::testing::closure_of;
+use catoptric_fixtures::ust20lx;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -32,7 +32,7 @@ fn close(scene: &Scene, seed: u64) -> Result<(), TestCaseError> {
         let calibration = calib::calibrate(&dataset, method, &Options::default())
             .map_err(|e| TestCaseError::fail(e.to_string()))?;
         closure_of(&truth, &calibration, ALLOWED).map_err(|e| TestCaseError::fail(e.to_string()))?;
-        prop_assert_eq!(calibration.beams.len(), beam::COUNT);
+        prop_assert_eq!(calibration.beams.len(), ust20lx::COUNT);
     }
     Ok(())
 }

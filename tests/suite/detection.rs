@@ -10,7 +10,7 @@ use crate::common::{folder_with, run, stderr};
 use crate::scenes::{BARE, scene};
 use catoptric::cast::{Polygon, Shape};
 use catoptric::files::scene as scene_file;
-use catoptric::model::{Stretch, beam};
+use catoptric::model::Stretch;
 use catoptric::sim::build::Structure;
 use catoptric::sim::build::color;
 use catoptric::sim::light::{Mirrors, Role, Setting};
@@ -18,6 +18,7 @@ use catoptric::sim::receive::phase;
 use catoptric::sim::receive::{Return, Sensor};
 use catoptric::sim::scene::{BeamShape, Detector, ErrorModel, Preset};
 use catoptric::sim::{Laboratory, Scene};
+use catoptric_fixtures::ust20lx;
 use nalgebra::Point3;
 use std::collections::BTreeMap;
 use std::f64::consts::LN_2;
@@ -85,7 +86,7 @@ fn forward(scene: &Scene, boards: &[Target]) -> Option<Return> {
         Setting::new(scene, &structure, Mirrors::Attached, targets.collect()).expect("colors are built in");
     Sensor::new(scene)
         .expect("white is built in")
-        .observe(&setting, beam::FORWARD)
+        .observe(&setting, ust20lx::FORWARD)
 }
 
 /// Height of the echo of the whole spot, in thresholds: 0.1 at 8 m is one.
@@ -264,7 +265,7 @@ fn recorded(name: &str, text: &str) -> (Laboratory, Stretch) {
 
 /// The forward beam's first reading.
 fn reading(name: &str, text: &str) -> f64 {
-    recorded(name, text).1.ranges[beam::FORWARD]
+    recorded(name, text).1.ranges[ust20lx::FORWARD]
 }
 
 macro_rules! scene_text {
@@ -306,8 +307,8 @@ fn the_scenes_of_two_surfaces_give_their_answers() {
         (sheet.preset.as_str(), sheet.range_min_m, sheet.range_max_m),
         ("utm-30lx-ew", 0.1, 30.0)
     );
-    assert!((stretch.ranges[beam::FORWARD] - 2.0).abs() < 1e-9);
-    let echoes = &stretch.echoes.as_ref().expect("they are recorded")[beam::FORWARD];
+    assert!((stretch.ranges[ust20lx::FORWARD] - 2.0).abs() < 1e-9);
+    let echoes = &stretch.echoes.as_ref().expect("they are recorded")[ust20lx::FORWARD];
     assert!(
         echoes.len() == 2 && (echoes[0] - 2.0).abs() < 1e-9 && (echoes[1] - 5.0).abs() < 2e-4,
         "{echoes:?}"
@@ -343,7 +344,11 @@ fn the_scenes_of_two_surfaces_give_their_answers() {
 fn the_scenes_of_chance_and_limits_give_their_answers() {
     let (name, text) = scene_text!("faint-board");
     let (_, stretch) = recorded(name, text);
-    let readings = stretch.ranges.iter().skip(beam::FORWARD).step_by(beam::COUNT);
+    let readings = stretch
+        .ranges
+        .iter()
+        .skip(ust20lx::FORWARD)
+        .step_by(ust20lx::COUNT);
     let (mut seen, mut missed) = (0.0, 0.0);
     for reading in readings {
         if reading.is_finite() {
@@ -360,23 +365,27 @@ fn the_scenes_of_chance_and_limits_give_their_answers() {
 
     let (name, text) = scene_text!("custom-scanner");
     let (laboratory, stretch) = recorded(name, text);
-    assert!((stretch.ranges[beam::FORWARD] - 2.0).abs() < 1e-12);
-    assert_eq!(stretch.ranges[beam::FORWARD + 13], f64::INFINITY, "the far wall");
+    assert!((stretch.ranges[ust20lx::FORWARD] - 2.0).abs() < 1e-12);
     assert_eq!(
-        stretch.ranges[beam::FORWARD + 360],
+        stretch.ranges[ust20lx::FORWARD + 13],
+        f64::INFINITY,
+        "the far wall"
+    );
+    assert_eq!(
+        stretch.ranges[ust20lx::FORWARD + 360],
         f64::NEG_INFINITY,
         "the near one"
     );
     let sheet = laboratory.session().expect("known").scanner;
-    assert_eq!((stretch.scan_period_s, sheet.scan_rate_hz), (0.1, 10.0));
+    assert_eq!((stretch.scan_period_s, sheet.scan.scan_rate_hz()), (0.1, 10.0));
     assert_eq!((sheet.range_min_m, sheet.range_max_m), (0.5, 4.0));
 
     let (name, text) = scene_text!("warm-up");
     let (laboratory, stretch) = recorded(name, text);
-    for (scan, ranges) in stretch.ranges.chunks(beam::COUNT).enumerate() {
+    for (scan, ranges) in stretch.ranges.chunks(ust20lx::COUNT).enumerate() {
         let expected = 2.0 + 8e-3 * libm::exp(-(10.05 + scan as f64 / 40.0) / 100.0);
         assert!(
-            (ranges[beam::FORWARD] - expected).abs() < 1e-12,
+            (ranges[ust20lx::FORWARD] - expected).abs() < 1e-12,
             "{name}, scan {scan}"
         );
     }

@@ -7,7 +7,7 @@ use crate::common::{run, stdout};
 use catoptric::files::scene::{self, Template};
 use catoptric::model::assessment::{Assessment, HeldOut, SharedParameter, VarianceComponent};
 use catoptric::model::calibration::{FacetEstimate, MountEstimate};
-use catoptric::model::{AngleTable, BeamEstimate, Calibration, RangeBias, Status};
+use catoptric::model::{AngleTable, BeamEstimate, Calibration, RangeBias, ScanGeometry, Status};
 use catoptric::{calib, score, sim};
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -413,9 +413,11 @@ fn every_key() -> Calibration {
         covariance: Some([[0.0; 6]; 6]),
     };
     Calibration {
-        schema_version: 1,
+        schema_version: 2,
         method: "mine".to_owned(),
         frame: "sensor".to_owned(),
+        scanner: Some(*ScanGeometry::default().angles()),
+        dataset: Some("0".repeat(64)),
         beams: vec![estimate],
         facets: vec![facet],
         rig_from_sensor: Some(mount),

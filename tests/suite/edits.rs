@@ -2,13 +2,13 @@
 
 use crate::scenes::{PROTOTYPE, TWO_MIRROR, scene};
 use catoptric::layout::{Detail, Layout, analyze};
-use catoptric::model::beam;
 use catoptric::sim::Scene;
 use catoptric::sim::build::Structure;
 use catoptric::sim::build::layout::corners;
 use catoptric::sim::light::{Edit, Mirrors, Setting};
 use catoptric::sim::receive::Sensor;
 use catoptric::sim::scene::{FacetShape, PolygonShape};
+use catoptric_fixtures::ust20lx;
 use nalgebra::{Point3, Rotation3, Vector3};
 use proptest::prelude::*;
 
@@ -16,7 +16,7 @@ use proptest::prelude::*;
 fn change(scene: &mut Scene, facet: usize, turn: [f64; 3], shift_mm: [f64; 3], scale: f64) {
     let facets = &mut scene.superstructure.facet;
     let facet = facet % facets.len();
-    let before = corners(&facets[facet].shape).unwrap();
+    let before = corners(&facets[facet].shape, &Default::default()).unwrap();
     let (about, turn) = (before[0], Rotation3::new(Vector3::from(turn)));
     let place = |corner: &Point3<f64>| {
         let placed = about.coords * 1e3 + Vector3::from(shift_mm) + turn * (corner - about) * (1e3 * scale);
@@ -46,7 +46,7 @@ fn concerned(old: &Scene, new: &Scene) -> usize {
         }
         concerned
     };
-    (0..beam::COUNT).filter(is_concerned).count()
+    (0..ust20lx::COUNT).filter(is_concerned).count()
 }
 
 proptest! {
@@ -97,7 +97,7 @@ fn an_edit_concerns_its_own_beams_and_few_others() {
         change(&mut new, facet, [0.02, -0.01, 0.03], [0.3, -0.2, 0.4], 1.02);
         let beams = concerned(&old, &new);
         assert!(
-            beams > 20 && beams < beam::COUNT / 4,
+            beams > 20 && beams < ust20lx::COUNT / 4,
             "{beams} beams for facet {facet}"
         );
     }

@@ -4,7 +4,6 @@
 
 use crate::scenes::{BARE, scene};
 use catoptric::cast::{Polygon, Shape};
-use catoptric::model::beam;
 use catoptric::sim::Scene;
 use catoptric::sim::build::Structure;
 use catoptric::sim::build::color;
@@ -15,6 +14,7 @@ use catoptric::sim::receive::{Return, Sensor, Stop, SubRayEnd};
 use catoptric::sim::scene::{
     Detector, ErrorModel, Facet, FacetShape, Glass, Post, PostCylinder, PostShape, Principle, RectangleShape,
 };
+use catoptric_fixtures::ust20lx;
 use nalgebra::{Point3, Vector3};
 
 /// A white rectangle at a place, seen along its normal.
@@ -123,7 +123,7 @@ fn a_beams_energy_is_all_accounted_for() {
         }
         let setting = Setting::new(&scene, &structure, Mirrors::Attached, targets).unwrap();
         let sensor = Sensor::new(&scene).unwrap();
-        for index in (0..beam::COUNT).step_by(9) {
+        for index in (0..ust20lx::COUNT).step_by(9) {
             let ends = sensor.sub_ray_ends(&setting, index);
             let weight: f64 = ends.iter().map(|e| e.sub_ray.weight).sum();
             assert!((weight - 1.0).abs() < 1e-12, "beam {index}: {weight}");
@@ -158,8 +158,8 @@ fn forward(scene: &Scene, targets: Vec<Target>) -> (Option<Return>, Vec<SubRayEn
     let structure = Structure::nominal(scene).unwrap();
     let setting = Setting::new(scene, &structure, Mirrors::Attached, targets).unwrap();
     let sensor = Sensor::new(scene).unwrap();
-    let ends = sensor.sub_ray_ends(&setting, beam::FORWARD);
-    (sensor.observe(&setting, beam::FORWARD), ends)
+    let ends = sensor.sub_ray_ends(&setting, ust20lx::FORWARD);
+    (sensor.observe(&setting, ust20lx::FORWARD), ends)
 }
 
 #[test]

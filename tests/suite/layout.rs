@@ -17,6 +17,7 @@ use catoptric::sim::receive::Sensor;
 use catoptric::sim::scene::{Facet, FacetShape, PolygonShape};
 use catoptric::sim::truth::BeamClass;
 use catoptric::sim::{Laboratory, Scene};
+use catoptric_fixtures::ust20lx;
 use nalgebra::{Point3, Rotation3, Unit, Vector3};
 use std::path::{Path, PathBuf};
 
@@ -73,7 +74,7 @@ fn assert_is_the_truth(scene: &Scene, analysis: &Analysis, name: &str) {
         };
         assert_eq!(of_class, true_beam.status, "{at}");
         let exit = true_beam
-            .exit_direction()
+            .exit_direction(ust20lx::azimuth(true_beam.beam))
             .map(|v| libm::atan2(v.z, libm::hypot(v.x, v.y)).to_degrees());
         if let (Some(exit), Some(elevation)) = (exit, element.exit_elevation_deg) {
             assert!((exit - elevation).abs() < 1e-9, "{at}: {exit} {elevation}");
@@ -243,7 +244,7 @@ fn directions_near_one_fan_fill_a_strip_with_round_ends() {
         assert_eq!(arcs.len(), 1, "{arcs:?}");
         let [first, last] = arcs[0].beams;
         assert!(last - first + 1 >= least);
-        let arc = beam::azimuth(last) - beam::azimuth(first);
+        let arc = ust20lx::azimuth(last) - ust20lx::azimuth(first);
         let near = layout::NEAR_DEG.to_radians();
         let strip = 2.0 * arc * near.sin() + 2.0 * std::f64::consts::PI * (1.0 - near.cos());
         let closed = strip / (4.0 * std::f64::consts::PI);
@@ -273,7 +274,7 @@ fn what_two_facets_see_twice_counts_once() {
     let [wide, narrow] = [0.008_f64, 0.00125].map(f64::tan);
     let cell = |scan_azimuth_deg: f64| {
         let (sin, cos) = scan_azimuth_deg.to_radians().sin_cos();
-        2.0 * beam::STEP * (wide * sin).hypot(narrow * cos).atan().sin()
+        2.0 * ust20lx::STEP * (wide * sin).hypot(narrow * cos).atan().sin()
     };
     // Beyond the last beam of the scan nothing else looks. The fan is lower than the undeflected cells that it crosses.
     let beyond: Vec<f64> = own
@@ -327,7 +328,7 @@ fn counted_on_a_grid(scene: &Scene, analysis: &Analysis) -> f64 {
                 (Some(f.name.as_str()), direction - m * (2.0 * m.dot(&direction)))
             }));
             let seen = turned_back.into_iter().any(|(facet, u)| {
-                let Some(beam) = beam::nearest(u.y.atan2(u.x)) else {
+                let Some(beam) = ust20lx::nearest(u.y.atan2(u.x)) else {
                     return false;
                 };
                 let element = &analysis.elements[beam];
@@ -335,7 +336,7 @@ fn counted_on_a_grid(scene: &Scene, analysis: &Analysis) -> f64 {
                     None => element.class == Class::Direct,
                     Some(name) => element.class == Class::Deflected && element.facets[0] == name,
                 };
-                let (sin, cos) = beam::azimuth(beam).sin_cos();
+                let (sin, cos) = ust20lx::azimuth(beam).sin_cos();
                 own && u.z.asin().abs() <= (wide * sin).hypot(narrow * cos).atan()
             });
             if seen {

@@ -3,9 +3,9 @@
 //! Seeds are fixed and bounds are those of 99.9 %. None of this proves that a real scanner's noise is like that.
 
 use crate::scenes::{BARE, scene};
-use catoptric::model::beam;
 use catoptric::sim::scene::{Correlated, ErrorModel, Interference};
 use catoptric::sim::{Laboratory, Scene};
+use catoptric_fixtures::ust20lx;
 
 /// A closed room, recorded without boards: stretch 1.
 const ROOM: usize = 1;
@@ -65,7 +65,10 @@ fn a_million_readings_are_white_and_normal() {
     assert!((moment(2) - 1.0).abs() < Z * (2.0 / n).sqrt(), "variance");
     assert!((moment(4) - 3.0).abs() < Z * (96.0 / n).sqrt(), "fourth moment");
     assert!(lagged(&z, 1).abs() < Z / n.sqrt(), "neighbouring beams");
-    assert!(lagged(&z, beam::COUNT).abs() < Z / n.sqrt(), "successive scans");
+    assert!(
+        lagged(&z, ust20lx::COUNT).abs() < Z / n.sqrt(),
+        "successive scans"
+    );
     // Kolmogorov and Smirnov: 1.9495/√n is exceeded once in a thousand.
     z.sort_by(f64::total_cmp);
     let normal = |x: f64| 0.5 * libm::erfc(-x / std::f64::consts::SQRT_2);
@@ -89,8 +92,11 @@ fn without_noise_a_thousand_scans_are_one() {
             scene.errors.drift_sd_mm = 0.88;
         });
         let ranges = laboratory.stretch(ROOM).expect("recorded").ranges;
-        let first = &ranges[..beam::COUNT];
-        assert!(ranges.chunks(beam::COUNT).all(|scan| scan == first), "{model:?}");
+        let first = &ranges[..ust20lx::COUNT];
+        assert!(
+            ranges.chunks(ust20lx::COUNT).all(|scan| scan == first),
+            "{model:?}"
+        );
     }
 }
 
@@ -110,7 +116,7 @@ fn correlated_noise_forgets_as_it_is_told_and_is_recomputed_alone() {
     // normal one; twice that at lag 0.
     let bound = Z * (2.0 * (1.0 + memory * memory) / (1.0 - memory * memory) / z.len() as f64).sqrt();
     for scans in [0, 1, 2, 8] {
-        let found = lagged(&z, scans * beam::COUNT);
+        let found = lagged(&z, scans * ust20lx::COUNT);
         let expected = memory.powi(i32::try_from(scans).expect("small"));
         assert!(
             (found - expected).abs() < bound,
@@ -118,9 +124,9 @@ fn correlated_noise_forgets_as_it_is_told_and_is_recomputed_alone() {
         );
     }
     // The first scan is as wide as all others, and beams know nothing of each other.
-    let first = z[..beam::COUNT].iter().map(|z| z * z).sum::<f64>() / beam::COUNT as f64;
+    let first = z[..ust20lx::COUNT].iter().map(|z| z * z).sum::<f64>() / ust20lx::COUNT as f64;
     assert!(
-        (first - 1.0).abs() < Z * (2.0 / beam::COUNT as f64).sqrt(),
+        (first - 1.0).abs() < Z * (2.0 / ust20lx::COUNT as f64).sqrt(),
         "{first}"
     );
     assert!(lagged(&z, 1).abs() < bound);

@@ -4,9 +4,10 @@
 //! constants taken from the tables are the tables' own. They do not prove that the sensor is like that.
 
 use crate::scenes::{BARE, PROTOTYPE, scene, set_board_ahead};
-use catoptric::model::{PoseKind, beam};
+use catoptric::model::PoseKind;
 use catoptric::sim::scene::{ErrorModel, Errors, Preset};
 use catoptric::sim::{Laboratory, build::Structure};
+use catoptric_fixtures::ust20lx;
 
 /// Table 2: mean errors of three trials and their standard deviations, in metres.
 const TABLE_2: [(f64, [f64; 3], [f64; 3]); 3] = [
@@ -93,7 +94,7 @@ fn equation_4_is_the_line_through_table_3() {
 #[test]
 fn the_cooper_preset_is_table_1_read_as_three_beams() {
     let shape = Preset::Ust20lxCooper.beam_shape();
-    let step_mrad = 1e3 * beam::STEP;
+    let step_mrad = 1e3 * ust20lx::STEP;
     let but_2_m = TABLE_1.iter().filter(|(r, ..)| *r != 2.0);
     let (products, squares) = but_2_m.fold((0.0, 0.0), |(p, s), (r, _, w)| (p + r * w, s + r * r));
     let width = products / squares;
@@ -148,7 +149,7 @@ fn a_white_board_reads_table_2() {
             .into_record()
             .expect("tracked");
         assert_eq!(record.label.kind, PoseKind::Direct);
-        let found = record.summarize()[beam::FORWARD];
+        let found = record.summarize()[ust20lx::FORWARD];
         // 3.2905 standard errors: 99.9 % of seeds. The defaults are rounded to 0.05 mm of the table.
         let (sd, n) = (mean(&sds), f64::from(scans));
         assert!(
@@ -180,7 +181,7 @@ fn the_prototype_is_figure_5_as_far_as_it_is_known() {
             .truth()
             .expect("known")
     };
-    let azimuth = |b: usize| beam::azimuth(b).to_degrees();
+    let azimuth = |b: usize| ust20lx::azimuth(b).to_degrees();
     // The forward ±60° are free; every facet serves about 15° between 62° and 128°.
     for b in &truth.beams {
         assert!(

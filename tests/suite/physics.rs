@@ -13,6 +13,7 @@ use catoptric::sim::light::{End, Mirrors, Path, Role, Setting, Target};
 use catoptric::sim::noise::{Draws, Purpose};
 use catoptric::sim::scene::{ErrorModel, Facet, FacetShape, PolygonShape};
 use catoptric::sim::{Laboratory, Scene};
+use catoptric_fixtures::ust20lx;
 use nalgebra::{Matrix4, Point3, Unit, Vector3};
 
 /// A direction drawn evenly over the sphere.
@@ -252,7 +253,7 @@ fn a_45_degree_mirror_and_a_wall_add_their_two_legs() {
     // The corners run so that the face looks back at the scanner and to the left.
     let laboratory = Laboratory::new(&scene, 1).expect("the scene is good");
     let returns = laboratory.returns(1).expect("colors are built in");
-    let found = returns[beam::FORWARD].as_ref().expect("the wall is bright");
+    let found = returns[ust20lx::FORWARD].as_ref().expect("the wall is bright");
     assert_eq!(
         (found.role, found.facets.as_slice()),
         (Role::Wall, [0].as_slice())
@@ -264,7 +265,7 @@ fn a_45_degree_mirror_and_a_wall_add_their_two_legs() {
 fn a_static_wall_without_noise_never_varies() {
     let laboratory = board_ahead(2.0, |_| {});
     let stretch = laboratory.stretch(BOARD).expect("it is recorded");
-    let scans: Vec<&[f64]> = stretch.ranges.chunks(beam::COUNT).collect();
+    let scans: Vec<&[f64]> = stretch.ranges.chunks(ust20lx::COUNT).collect();
     assert!(scans.iter().all(|scan| scan == &scans[0]));
 }
 
@@ -273,8 +274,8 @@ fn every_point_of_a_flat_wall_is_on_it() {
     let laboratory = board_ahead(3.0, |_| {});
     let stretch = laboratory.stretch(BOARD).expect("it is recorded");
     let room = [5.0, 5.0];
-    for (index, range) in stretch.ranges[..beam::COUNT].iter().enumerate() {
-        let point = beam::direction(beam::azimuth(index)).into_inner() * *range;
+    for (index, range) in stretch.ranges[..ust20lx::COUNT].iter().enumerate() {
+        let point = beam::direction(ust20lx::azimuth(index)).into_inner() * *range;
         let to_walls = (room[0] - point.x.abs())
             .abs()
             .min((room[1] - point.y.abs()).abs());
@@ -303,7 +304,7 @@ fn a_board_edge_shares_the_beam_with_the_wall_behind() {
     let laboratory = board_ahead(4.7, |scene| scene.board[0].width_mm = 800.0);
     let returns = laboratory.returns(BOARD).expect("colors are built in");
     // Ahead of the scanner; elsewhere beams are shared by two walls.
-    let ahead = &returns[beam::FORWARD - 40..beam::FORWARD + 40];
+    let ahead = &returns[ust20lx::FORWARD - 40..ust20lx::FORWARD + 40];
     let shares: Vec<_> = ahead.iter().flatten().filter(|r| r.share < 1.0 - 1e-12).collect();
     assert!(!shares.is_empty(), "some beams meet the edge");
     for found in &shares {
@@ -330,7 +331,7 @@ fn a_chief_ray_that_misses_does_not_lose_the_beam() {
         scene.experiment.pose[0].center_m[1] = 0.011;
     });
     let returns = laboratory.returns(BOARD).expect("colors are built in");
-    let forward = returns[beam::FORWARD].as_ref().expect("there is an echo");
+    let forward = returns[ust20lx::FORWARD].as_ref().expect("there is an echo");
     assert_eq!(forward.role, Role::Board);
     assert!(
         forward.share < 0.5 && (forward.range() - 2.0).abs() < 0.01,
@@ -352,7 +353,7 @@ fn light_grows_continuously_through_face_on() {
             scene.experiment.pose[0].normal = [-libm::cos(tilt), libm::sin(tilt), 0.0];
         });
         let returns = laboratory.returns(BOARD).expect("colors are built in");
-        returns[beam::FORWARD].as_ref().expect("it is bright").power
+        returns[ust20lx::FORWARD].as_ref().expect("it is bright").power
     };
     let face_on = power(0.0);
     for tilt in [1e-9, 1e-7, -1e-7] {
@@ -376,7 +377,7 @@ fn the_leading_edge_walks_as_its_closed_form() {
             scene.scanner.sub_rays = 1;
         });
         let returns = laboratory.returns(BOARD).expect("colors are built in");
-        returns[beam::FORWARD].as_ref().expect("it is bright").range()
+        returns[ust20lx::FORWARD].as_ref().expect("it is bright").range()
     };
     let sd = 0.5 * 299_792_458.0 * 4e-9 / (8.0 * std::f64::consts::LN_2).sqrt();
     let height = |reflectivity: f64| reflectivity / 4.0 / (0.1 / 64.0);
@@ -398,12 +399,12 @@ fn codes_are_never_turned_into_ranges() {
         scene.experiment.scans_per_pose = 50;
     });
     let stretch = laboratory.stretch(BOARD).expect("it is recorded");
-    let scans: Vec<&[f64]> = stretch.ranges.chunks(beam::COUNT).collect();
+    let scans: Vec<&[f64]> = stretch.ranges.chunks(ust20lx::COUNT).collect();
     // The walls are out of range; the board is nearer than the scanner can tell most of the time.
     assert!(scans.iter().all(|scan| scan[0] == f64::INFINITY));
     assert!(
         scans
             .iter()
-            .all(|scan| scan[beam::FORWARD] == f64::NEG_INFINITY || scan[beam::FORWARD] >= 0.021)
+            .all(|scan| scan[ust20lx::FORWARD] == f64::NEG_INFINITY || scan[ust20lx::FORWARD] >= 0.021)
     );
 }

@@ -8,12 +8,13 @@ use crate::common::{catoptric, run, stderr, stdout};
 use crate::scenes::{PROTOTYPE, TWO_MIRROR, scene};
 use catoptric::files::scene::load;
 use catoptric::files::{DatasetWriter, Provenance};
-use catoptric::model::{Excerpt, Pose, beam};
+use catoptric::model::{Excerpt, Pose};
 use catoptric::sim::build::Structure;
 use catoptric::sim::laboratory::Memory;
 use catoptric::sim::light::{Mirrors, Setting};
 use catoptric::sim::scene::{Correlated, EchoChoice, Interference};
 use catoptric::sim::{Laboratory, Scene};
+use catoptric_fixtures::ust20lx;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use std::time::{Duration, Instant};
@@ -88,7 +89,7 @@ fn excerpts_are_the_stretch_whatever_their_length() {
                 joined.echoes.iter_mut().for_each(Vec::clear);
                 joined.tracks.iter_mut().for_each(|t| t.frames.clear());
                 for excerpt in excerpts(&laboratory, number, scans) {
-                    assert_eq!(excerpt.first_scan * beam::COUNT, joined.ranges.len());
+                    assert_eq!(excerpt.first_scan * ust20lx::COUNT, joined.ranges.len());
                     assert_eq!(excerpt.first_seen, whole.first_seen());
                     joined.ranges.extend(excerpt.part.ranges);
                     joined
@@ -325,7 +326,7 @@ position_m = [0, 0.05, 1.76]
     ]));
     same_over_the_rig(&laboratory, 1);
     let names = sight.setting().names();
-    let left = beam::nearest(std::f64::consts::FRAC_PI_2).unwrap();
+    let left = ust20lx::nearest(std::f64::consts::FRAC_PI_2).unwrap();
     let ends = sight.sub_ray_ends(0, left);
     let hits_intruder = ends.iter().any(|end| match end.stop {
         catoptric::sim::receive::Stop::Hit { surface, .. } => names[surface] == "intruder",
@@ -359,7 +360,7 @@ fn flights_within_a_mesh_are_those_without_the_compiled_rig() {
     assert!(!rig.holds_in(&[here, gone]));
     for scan in [0, ends] {
         let returns = sight.returns(scan);
-        for beam in (0..beam::COUNT).step_by(9) {
+        for beam in (0..ust20lx::COUNT).step_by(9) {
             let ends = sight.sub_ray_ends(scan, beam);
             // The chief ray is the first; its surface is the echo's unless another way is brighter.
             let way: f64 = ends[0].path;

@@ -5,11 +5,11 @@
 
 use crate::common::{VALID, folder_with, run, stderr};
 use crate::scenes::{BARE, scene};
-use catoptric::model::beam;
 use catoptric::sim::build::Structure;
 use catoptric::sim::light::{Mirrors, Setting};
 use catoptric::sim::receive::{Sensor, Stop, SubRayLight};
 use catoptric::sim::scene::{Facet, FacetShape, RectangleShape};
+use catoptric_fixtures::ust20lx;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -83,7 +83,7 @@ fn the_rows_of_a_beam_are_its_energy_and_its_echoes() {
     assert_eq!(text.lines().next(), Some(COLUMNS));
     let beams = by_beam(table(folder.path(), "sub_rays.csv"));
     let returns = by_beam(table(folder.path(), "returns.csv"));
-    assert_eq!(beams.len() % beam::COUNT, 0);
+    assert_eq!(beams.len() % ust20lx::COUNT, 0);
     for (key, rows) in &beams {
         let numbers: Vec<f64> = rows.iter().map(|r| number(r, "sub_ray")).collect();
         assert!(numbers.iter().copied().eq((0..19).map(f64::from)), "{key:?}");
@@ -212,7 +212,7 @@ fn light_that_ends_nowhere_has_no_place() {
     let structure = Structure::nominal(&scene).unwrap();
     let setting = Setting::new(&scene, &structure, Mirrors::Attached, Vec::new()).unwrap();
     let sensor = Sensor::new(&scene).unwrap();
-    let ahead = sensor.sub_ray_ends(&setting, beam::FORWARD);
+    let ahead = sensor.sub_ray_ends(&setting, ust20lx::FORWARD);
     assert_eq!(ahead.len(), 19);
     for end in &ahead {
         assert_eq!((&end.stop, end.light), (&Stop::Trapped, SubRayLight::Beam));
@@ -257,7 +257,7 @@ waypoint = [
         scans
     };
     let (rays, returns) = (in_flight("sub_rays.csv"), in_flight("returns.csv"));
-    assert_eq!(rays.len(), 2 * beam::COUNT);
+    assert_eq!(rays.len(), 2 * ust20lx::COUNT);
     let mut moved = 0;
     for ((scan, beam), rows) in &rays {
         assert!(scan == "0" || scan == "1", "{scan:?}");

@@ -6,12 +6,12 @@ use crate::common::{catoptric, run, stderr, stdout};
 use crate::traps::{file, forward, path, ray, trap, way};
 use catoptric::cast::Ray;
 use catoptric::files::{mesh, npy, scene};
-use catoptric::model::beam;
 use catoptric::sim::light::Role;
 use catoptric::sim::noise::{Draws, Purpose};
 use catoptric::sim::scene::{Glass, PlanePolygon, PlaneRectangle, PlaneShape, RoomMirror};
 use catoptric::sim::trace::Fate;
 use catoptric::sim::{Laboratory, Scene};
+use catoptric_fixtures::ust20lx;
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
 fn mirror(name: &str, corners: &[Point3<f64>]) -> RoomMirror {
@@ -352,7 +352,7 @@ fn a_mesh_is_read_beside_its_scene_and_kept_with_the_truth() {
     let kept = scene::load(&folder.path().join("b/truth/scene.toml"), &[]).unwrap();
     let returns = Laboratory::new(&kept, 1).unwrap().returns(1).unwrap();
     let at = |degrees: f64| {
-        returns[beam::nearest(degrees.to_radians()).unwrap()]
+        returns[ust20lx::nearest(degrees.to_radians()).unwrap()]
             .as_ref()
             .unwrap()
             .range()

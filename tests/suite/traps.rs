@@ -14,6 +14,7 @@ use catoptric::sim::scene::{BeamShape, Limits, Preset};
 use catoptric::sim::trace::{Fate, Scenery, Vertex};
 use catoptric::sim::truth::BeamClass;
 use catoptric::sim::{Laboratory, Scene};
+use catoptric_fixtures::ust20lx;
 use nalgebra::{Point3, Unit, Vector3};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -51,7 +52,7 @@ pub(crate) fn path(vertices: &[Vertex]) -> f64 {
 pub(crate) fn forward(scene: &Scene) -> Return {
     // The second stretch is the empty room.
     let returns = Laboratory::new(scene, 1).unwrap().returns(1).unwrap();
-    returns[beam::FORWARD].clone().expect("it is bright")
+    returns[ust20lx::FORWARD].clone().expect("it is bright")
 }
 
 #[test]
@@ -87,7 +88,7 @@ fn ridge() {
     let scene = trap("ridge");
     let laboratory = Laboratory::new(&scene, 1).unwrap();
     let truth = laboratory.truth().unwrap();
-    assert_eq!(truth.beams[beam::FORWARD].status, BeamClass::Split);
+    assert_eq!(truth.beams[ust20lx::FORWARD].status, BeamClass::Split);
     let found = forward(&scene);
     assert_eq!(found.role, Role::Wall);
     // Rays that meet the ridge itself may go either way.
@@ -201,7 +202,7 @@ const ROOM: usize = 1;
 #[test]
 fn tied_distances() {
     let laboratory = laboratory("tied-distances");
-    let ends = laboratory.sight(ROOM).unwrap().sub_ray_ends(0, beam::FORWARD);
+    let ends = laboratory.sight(ROOM).unwrap().sub_ray_ends(0, ust20lx::FORWARD);
     assert_eq!(ends.len(), 256);
     let distances: BTreeSet<u64> = ends.iter().map(|e| e.path.to_bits()).collect();
     assert!(
@@ -244,7 +245,7 @@ fn equal_noise() {
     };
     let (first, second) = (noise(ROOM), noise(ROOM + 1));
     let n = first.len();
-    assert_eq!((n, second.len()), (200 * beam::COUNT, 200 * beam::COUNT));
+    assert_eq!((n, second.len()), (200 * ust20lx::COUNT, 200 * ust20lx::COUNT));
     let all: BTreeSet<u64> = first.iter().chain(&second).map(|z| z.to_bits()).collect();
     assert_eq!(all.len(), 2 * n, "no noise comes twice");
     let correlation = |a: &[f64], b: &[f64]| {
@@ -252,14 +253,14 @@ fn equal_noise() {
         sum / a.len().min(b.len()) as f64
     };
     // 99.9 % for each; the seed is fixed.
-    let bound = 3.2905 / ((n - beam::COUNT) as f64).sqrt();
+    let bound = 3.2905 / ((n - ust20lx::COUNT) as f64).sqrt();
     assert!((correlation(&first, &first) - 1.0).abs() < bound * 2.0_f64.sqrt());
     assert!(
         correlation(&first, &first[1..]).abs() < bound,
         "neighboring beams"
     );
     assert!(
-        correlation(&first, &first[beam::COUNT..]).abs() < bound,
+        correlation(&first, &first[ust20lx::COUNT..]).abs() < bound,
         "successive scans"
     );
     assert!(correlation(&first, &second).abs() < bound, "stretches");
@@ -268,11 +269,12 @@ fn equal_noise() {
 #[test]
 fn no_return() {
     let stretch = laboratory("no-return").stretch(ROOM).unwrap();
-    let ahead = beam::nearest(-8.0_f64.to_radians()).unwrap()..=beam::nearest(8.0_f64.to_radians()).unwrap();
+    let ahead =
+        ust20lx::nearest(-8.0_f64.to_radians()).unwrap()..=ust20lx::nearest(8.0_f64.to_radians()).unwrap();
     let mut aside = Vec::new();
-    for scan in stretch.ranges.chunks(beam::COUNT) {
+    for scan in stretch.ranges.chunks(ust20lx::COUNT) {
         assert!(scan[ahead.clone()].iter().all(|r| *r == f64::INFINITY));
-        aside.push(scan[beam::FORWARD + 360]);
+        aside.push(scan[ust20lx::FORWARD + 360]);
     }
     // The noise is there: mean and spread over 200 scans, at 99.9 %.
     let n = aside.len() as f64;
@@ -339,10 +341,10 @@ fn workers() {
 #[test]
 fn static_wall() {
     let ranges = laboratory("static-wall").stretch(ROOM).unwrap().ranges;
-    assert_eq!(ranges.len(), 1000 * beam::COUNT);
-    for beam in 0..beam::COUNT {
+    assert_eq!(ranges.len(), 1000 * ust20lx::COUNT);
+    for beam in 0..ust20lx::COUNT {
         let first = ranges[beam];
-        let of_beam = ranges.iter().skip(beam).step_by(beam::COUNT);
+        let of_beam = ranges.iter().skip(beam).step_by(ust20lx::COUNT);
         let squares: f64 = of_beam.map(|r| (r - first) * (r - first)).sum();
         assert!(
             first.is_finite() && squares == 0.0,
@@ -354,9 +356,9 @@ fn static_wall() {
 #[test]
 fn flat_wall() {
     let ranges = laboratory("flat-wall").stretch(ROOM).unwrap().ranges;
-    assert_eq!(ranges.len(), beam::COUNT);
+    assert_eq!(ranges.len(), ust20lx::COUNT);
     for (index, range) in ranges.iter().enumerate() {
-        let point = beam::direction(beam::azimuth(index)).into_inner() * *range;
+        let point = beam::direction(ust20lx::azimuth(index)).into_inner() * *range;
         let off = (point.x.abs() - 5.0).abs().min((point.y.abs() - 3.0).abs());
         assert!(off < 1e-9, "beam {index} is {off} m off");
     }
@@ -396,7 +398,7 @@ fn same_direction() {
                 continue;
             };
             let mut vertices = Vec::new();
-            let direction = beam::direction(beam::azimuth(index));
+            let direction = beam::direction(ust20lx::azimuth(index));
             let origin = Point3::new(0.0, 0.0, 2.0);
             assert_eq!(
                 tracer.follow(&Ray { origin, direction }, &mut vertices),

@@ -11,6 +11,7 @@
 //! Two calibrations of one dataset share its errors, so honest ones differ by less than 1 says; one that is above it
 //! is over-confident on one side at least. This takes no truth.
 
+use crate::score::words::foreign;
 use crate::score::{Honesty, Score, Verdict, score};
 use catoptric_calib::observations;
 use catoptric_model::{BeamEstimate, Calibration, Dataset, Unreadable, beam};
@@ -45,6 +46,9 @@ pub struct Comparison {
     pub rows: Vec<Row>,
     /// Every pair of them, in the order of the rows.
     pub pairs: Vec<Pair>,
+    /// A sentence for each calibration that says that it is of another dataset or scanner.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub failures: Vec<String>,
 }
 
 /// One calibration.
@@ -137,6 +141,13 @@ pub fn compare(
         blind: truth.is_none(),
         rows: scored.iter().map(|(c, s)| row(&c.name, s)).collect(),
         pairs,
+        failures: contestants
+            .iter()
+            .flat_map(|c| {
+                let failures = foreign(dataset, &c.calibration);
+                failures.into_iter().map(|why| format!("{}: {why}", c.name))
+            })
+            .collect(),
     })
 }
 

@@ -61,6 +61,8 @@ pub fn calibrate_until(
         schema_version: calibration::SCHEMA_VERSION,
         method: method.name().to_owned(),
         frame: "sensor".to_owned(),
+        scanner: Some(*dataset.session.scanner.scan.angles()),
+        dataset: dataset.id.clone(),
         beams: Vec::new(),
         facets: Vec::new(),
         rig_from_sensor: Some(mount.to_file()),

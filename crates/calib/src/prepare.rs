@@ -77,11 +77,7 @@ impl Prepared {
 /// Whether the numbers of a session can be what they are said to be.
 pub(crate) fn check_session(session: &Session) -> Result<(), CalibError> {
     let believed = &session.believed;
-    let positive = [
-        ("scanner.beams", session.scanner.beams as f64),
-        ("scanner.step_deg", session.scanner.step_deg),
-        ("scanner.range_max_m", session.scanner.range_max_m),
-    ];
+    let positive = [("scanner.range_max_m", session.scanner.range_max_m)];
     let not_negative = [
         (
             "scanner.divergence_full_mrad",

@@ -18,6 +18,7 @@ use super::json::to_json;
 use super::manifest::{Manifest, Provenance};
 use super::playback::{read_recording, survey};
 use super::recording::{Encoded, RecordingEncoder, RecordingWriter};
+use super::results::require_version;
 use catoptric_model::{Dataset, ModelError, PoseRecord, Session, Stretch, session};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -298,13 +299,14 @@ fn check(
     name: &str,
     found: &String,
     hashes: Option<&BTreeMap<String, String>>,
-) -> Result<(), IoError> {
+) -> Result<String, IoError> {
+    let hash = sha256(bytes);
     match hashes {
         Some(hashes) if hashes.get(name) != Some(found) => Err(IoError::Changed {
             path: dataset.join(name),
             manifest: dataset.join(MANIFEST),
         }),
-        _ => Ok(()),
+        _ => Ok(hash),
     }
 }
 
@@ -313,12 +315,10 @@ fn parse_session(dataset: &Path, bytes: &[u8]) -> Result<Session, IoError> {
     let text = std::str::from_utf8(bytes)
         .map_err(|e| IoError::content(&path, format!("not UTF-8 from byte {}", e.valid_up_to())))?;
     let session: Session = toml::from_str(text).map_err(|e| IoError::toml(&path, text, &e))?;
-    if session.schema_version != session::SCHEMA_VERSION {
-        let (found, known) = (session.schema_version, session::SCHEMA_VERSION);
-        return Err(IoError::content(
-            path,
-            format!("schema_version is {found}, this program reads {known}"),
-        ));
-    }
-    Ok(session)
+    require_version(&path, session.schema_version, session::SCHEMA_VERSION)?;
+    // What version 1 lacks has its default now.
+    Ok(Session {
+        schema_version: session::SCHEMA_VERSION,
+        ..session
+    })
 }

@@ -75,10 +75,10 @@ pub enum IoError {
         /// What is wrong.
         message: String,
     },
-    /// Parts of a dataset that do not fit together.
+    /// Parts of a dataset, or a dataset and a calibration, that do not fit together.
     #[error("{}: {source}", path.display())]
     Inconsistent {
-        /// The folder.
+        /// The folder or file.
         path: PathBuf,
         /// The part.
         source: ModelError,

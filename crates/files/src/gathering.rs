@@ -7,6 +7,7 @@ use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::frame::Pose;
 use catoptric_model::session::ScannerSheet;
 use catoptric_model::{PoseLabel, Stretch, Track};
+use std::f64::consts::TAU;
 
 /// How far a period may be from the scanner's to be taken for it, in seconds: stamps are whole nanoseconds.
 const PERIOD_TOLERANCE_S: f64 = 1e-9;
@@ -75,15 +76,17 @@ impl<R: Keep> Gathering<R> {
 
     /// Takes a scan in; its beams must be those of the session.
     pub(super) fn scan(&mut self, scan: Scan, scanner: &ScannerSheet) -> Result<(), String> {
-        let beams = scanner.beams;
+        let beams = scanner.scan.beams();
         if scan.ranges.len() != beams {
             return Err(format!("{} beams, session.toml has {beams}", scan.ranges.len()));
         }
-        let step = scanner.step_deg.to_radians();
-        let first = messages::azimuth(scanner, 0);
+        let (first, step) = (scanner.scan.azimuth(0), scanner.scan.increment());
         let drift = (scan.angle_increment - step).abs() * beams as f64;
+        let off = scan.angle_min - first;
+        // Azimuths a turn apart are one.
+        let off = off - TAU * (off / TAU).round();
         // A quarter of a step tells rounding to 32 bits from another beam.
-        if drift + (scan.angle_min - first).abs() > step / 4.0 {
+        if drift + off.abs() > step.abs() / 4.0 {
             return Err(format!(
                 "beams from {} rad in steps of {} rad, session.toml has {first} and {step}",
                 scan.angle_min, scan.angle_increment
@@ -99,7 +102,7 @@ impl<R: Keep> Gathering<R> {
 
     /// Takes the echoes of a scan in; its beams must be those of the session.
     pub(super) fn echoes(&mut self, echoes: Vec<Vec<f64>>, scanner: &ScannerSheet) -> Result<(), String> {
-        let beams = scanner.beams;
+        let beams = scanner.scan.beams();
         if echoes.len() != beams {
             return Err(format!("{} beams, session.toml has {beams}", echoes.len()));
         }
@@ -156,7 +159,7 @@ impl<R: Keep> Gathering<R> {
         let stretch = Stretch {
             start_s: seconds_between(known.epoch, start),
             scan_period_s: self.period(known.scanner, start),
-            beams: known.scanner.beams,
+            beams: known.scanner.scan.beams(),
             tracks: self.tracks(known),
             ranges: Vec::new(),
             echoes: None,
@@ -167,7 +170,7 @@ impl<R: Keep> Gathering<R> {
 
     /// Time from scan to scan: the scanner's where the stamps agree with it to their resolution.
     fn period(&self, scanner: &ScannerSheet, start: u64) -> f64 {
-        let rated = 1.0 / scanner.scan_rate_hz;
+        let rated = scanner.scan.scan_period_s();
         let (measured, tolerance) = match self.scans {
             0 => return rated,
             1 => (self.scan_time, rated * f64::from(f32::EPSILON)),

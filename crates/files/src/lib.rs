@@ -80,7 +80,7 @@ pub use playback::read_recording;
 pub use recording::RecordingWriter;
 #[cfg(all(feature = "recording", feature = "scene"))]
 pub use results::read_truth;
-pub use results::{read_calibration, read_characterization};
+pub use results::{read_calibration, read_calibration_for, read_characterization};
 
 #[cfg(all(test, feature = "recording", feature = "scene"))]
 mod tests;

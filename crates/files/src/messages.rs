@@ -83,11 +83,6 @@ pub struct FrameTransform<'a> {
     pub pose: Pose,
 }
 
-/// Azimuth of a beam: (i − (n − 1)/2)·step, in radians.
-pub fn azimuth(scanner: &ScannerSheet, beam: usize) -> f64 {
-    (beam as f64 - (scanner.beams as f64 - 1.0) / 2.0) * scanner.step_deg.to_radians()
-}
-
 /// The nearest 32-bit number, as messages hold them; one NaN for all, so that equal readings are equal bytes.
 pub(super) fn single(value: f64) -> f32 {
     if value.is_nan() {
@@ -115,15 +110,16 @@ fn write_numbers(cdr: &mut CdrWriter, values: &[f64]) {
     }
 }
 
-/// What a scan begins with: header, angles, times and limits.
+/// What a scan begins with: header, angles, times and limits. The increment of a clockwise scan is negative, as drivers of
+/// scanners that turn that way have it.
 fn write_scan_sheet(cdr: &mut CdrWriter, stamp: u64, scanner: &ScannerSheet, period_s: f64) {
     write_header(cdr, stamp, LASER_FRAME);
-    let last = scanner.beams.saturating_sub(1);
+    let scan = &scanner.scan;
     for value in [
-        azimuth(scanner, 0),
-        azimuth(scanner, last),
-        scanner.step_deg.to_radians(),
-        period_s * scanner.step_deg / 360.0, // the mirror turns once in a period
+        scan.azimuth(0),
+        scan.azimuth(scan.beams() - 1),
+        scan.increment(),
+        scan.beam_time_s(),
         period_s,
         scanner.range_min_m,
         scanner.range_max_m,
@@ -163,7 +159,7 @@ pub fn encode_points(stamp: u64, scanner: &ScannerSheet, ranges: &[f64]) -> Vec<
     let mut data = Vec::new();
     let mut count = 0;
     for (i, r) in ranges.iter().enumerate().filter(|(_, r)| r.is_finite()) {
-        let point = beam::direction(azimuth(scanner, i)).into_inner() * *r;
+        let point = beam::direction(scanner.scan.azimuth(i)).into_inner() * *r;
         for coordinate in &point {
             data.extend_from_slice(&single(*coordinate).to_le_bytes());
         }

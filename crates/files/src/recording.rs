@@ -379,8 +379,8 @@ impl RecordingEncoder {
     /// What of a stretch does not fit.
     fn check(&self, stretch: &Stretch, scans: &Range<usize>) -> Result<(), String> {
         let time_fits = |t: f64| (0.0..=LONGEST_S).contains(&t);
-        let beams = self.scanner.beams;
-        if stretch.beams != beams || beams == 0 {
+        let beams = self.scanner.scan.beams();
+        if stretch.beams != beams {
             return Err(format!("{} beams, the scanner has {beams}", stretch.beams));
         }
         if scans.end > stretch.label.scans {

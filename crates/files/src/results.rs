@@ -2,7 +2,7 @@
 
 use super::error::IoError;
 use super::json::read_json;
-use catoptric_model::{Calibration, Characterization, calibration, characterization};
+use catoptric_model::{Calibration, Characterization, Session, calibration, characterization};
 use std::path::Path;
 
 /// Reads the truth of a dataset; `None` if the dataset is blind.
@@ -30,6 +30,21 @@ pub fn read_calibration(path: &Path) -> Result<Calibration, IoError> {
     Ok(found)
 }
 
+/// Reads a calibration to be used with a dataset of this session: of the same scanner, as far as it says.
+///
+/// # Errors
+/// As [`read_calibration`], and [`IoError::Inconsistent`] if it is of a scanner with other beams.
+pub fn read_calibration_for(path: &Path, session: &Session) -> Result<Calibration, IoError> {
+    let found = read_calibration(path)?;
+    match found.check_scanner(session) {
+        Ok(()) => Ok(found),
+        Err(source) => Err(IoError::Inconsistent {
+            path: path.to_owned(),
+            source,
+        }),
+    }
+}
+
 /// Reads a characterization of the bare sensor.
 ///
 /// # Errors
@@ -40,10 +55,15 @@ pub fn read_characterization(path: &Path) -> Result<Characterization, IoError> {
     Ok(found)
 }
 
-fn require_version(path: &Path, found: u32, known: u32) -> Result<(), IoError> {
-    if found == known {
+/// Whether a file is of the newest version of its format or an older one: each can still be read.
+pub(super) fn require_version(path: &Path, found: u32, newest: u32) -> Result<(), IoError> {
+    if (1..=newest).contains(&found) {
         return Ok(());
     }
+    let known = match newest {
+        1 => "1".to_owned(),
+        newest => format!("1 to {newest}"),
+    };
     let message = format!("schema_version is {found}, this program reads {known}");
     Err(IoError::content(path, message))
 }

@@ -1,36 +1,7 @@
-//! Beams of the bare scanner and what a mirror makes of them: azimuth, deflection, exit direction.
+//! A beam of the bare scanner and what a mirror makes of it: direction, deflection, exit direction.
 
 use nalgebra::{Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
-
-/// Beams of one scan of a 270° scanner with 0.25° between them.
-pub const COUNT: usize = 1081;
-
-/// Azimuth between neighbouring beams, in radians (0.25°).
-pub const STEP: f64 = 0.25 * std::f64::consts::PI / 180.0;
-
-/// The beam that looks along the x axis of the sensor frame.
-pub const FORWARD: usize = 540;
-
-/// Base azimuth θ_b of a beam, counter-clockwise from the x axis of the sensor frame, in radians.
-///
-/// ```
-/// use catoptric_model::beam;
-/// assert_eq!(beam::azimuth(540), 0.0);
-/// assert!((beam::azimuth(1080).to_degrees() - 135.0).abs() < 1e-12);
-/// ```
-#[doc(alias = "theta_b")]
-pub fn azimuth(beam: usize) -> f64 {
-    (beam as f64 - FORWARD as f64) * STEP
-}
-
-/// The beam whose azimuth is nearest to the given one; `None` outside the scan.
-pub fn nearest(azimuth: f64) -> Option<usize> {
-    let step = (azimuth / STEP).round() + FORWARD as f64;
-    // In range by the check just made, so nothing is cut off.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    (0.0..COUNT as f64).contains(&step).then_some(step as usize)
-}
 
 /// Direction of an undeflected beam: (cos θ_b, sin θ_b, 0).
 pub fn direction(azimuth: f64) -> Unit<Vector3<f64>> {
@@ -100,15 +71,6 @@ pub fn angle_between(a: &Unit<Vector3<f64>>, b: &Unit<Vector3<f64>>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn nearest_inverts_azimuth_for_every_beam() {
-        for beam in 0..COUNT {
-            assert_eq!(nearest(azimuth(beam)), Some(beam));
-        }
-        assert_eq!(nearest(azimuth(1080) + STEP), None);
-        assert_eq!(nearest(azimuth(0) - STEP), None);
-    }
 
     #[test]
     fn from_exit_inverts_exit_direction() {

@@ -3,11 +3,15 @@
 use crate::assessment::Assessment;
 use crate::beam::Deflection;
 use crate::bias::RangeBias;
+use crate::dataset::Dataset;
+use crate::error::ModelError;
 use crate::frame::PoseData;
+use crate::scan::ScanAngles;
+use crate::session::Session;
 use serde::{Deserialize, Serialize};
 
-/// Version of `calibration.json`.
-pub const SCHEMA_VERSION: u32 = 1;
+/// Version of `calibration.json`. Version 1 had neither `scanner` nor `dataset`.
+pub const SCHEMA_VERSION: u32 = 2;
 
 /// What became of an element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -55,7 +59,7 @@ impl Status {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BeamEstimate {
-    /// Index of the beam, 0…1080.
+    /// Index of the beam, from 0.
     pub beam: usize,
     /// What became of it.
     pub status: Status,
@@ -135,6 +139,12 @@ pub struct Calibration {
     pub method: String,
     /// Frame of the angles; always "sensor".
     pub frame: String,
+    /// The scanner that it is of; unless it is given, nothing is checked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scanner: Option<ScanAngles>,
+    /// [`Dataset::id`] of the dataset it was made from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dataset: Option<String>,
     /// The elements.
     pub beams: Vec<BeamEstimate>,
     /// The facets, for methods that estimate them.
@@ -198,6 +208,26 @@ impl MountEstimate {
 }
 
 impl Calibration {
+    /// Whether it is of the scanner of a session, as far as it says.
+    ///
+    /// # Errors
+    /// [`ModelError::OtherScanner`].
+    pub fn check_scanner(&self, session: &Session) -> Result<(), ModelError> {
+        let dataset = *session.scanner.scan.angles();
+        match self.scanner {
+            Some(calibration) if !calibration.same_as(&dataset) => {
+                Err(ModelError::OtherScanner { calibration, dataset })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The dataset it was made from, and this one, if it says that they are two.
+    pub fn other_dataset<'a>(&'a self, dataset: &'a Dataset) -> Option<[&'a str; 2]> {
+        let ids = [self.dataset.as_deref()?, dataset.id.as_deref()?];
+        (!ids[0].eq_ignore_ascii_case(ids[1])).then_some(ids)
+    }
+
     /// The entry of a beam.
     pub fn beam(&self, beam: usize) -> Option<&BeamEstimate> {
         // Our own files list every element in order; others' need not.

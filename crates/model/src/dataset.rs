@@ -85,7 +85,7 @@ pub struct Dataset {
     pub session: Session,
     /// The stretches, in the order they were recorded.
     pub poses: Vec<PoseRecord>,
-    /// SHA-256 of the recording, as hexadecimal digits; `None` of a dataset that was made in memory.
+    /// SHA-256 of the recording that it was read from, as hexadecimal digits; `None` for one that was made in memory.
     pub id: Option<String>,
 }
 
@@ -201,8 +201,8 @@ impl Dataset {
         };
         for pose in &self.poses {
             let (beams, found) = (pose.beams(), pose.readings.len());
-            if beams != self.session.scanner.beams {
-                let scanner = self.session.scanner.beams;
+            let scanner = self.session.scanner.scan.beams();
+            if beams != scanner {
                 return fail(pose, format!("{beams} beams, the scanner has {scanner}"));
             }
             let expected = pose.label.scans * beams;

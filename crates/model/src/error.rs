@@ -1,5 +1,7 @@
 //! What can be wrong with the quantities of this crate.
 
+use crate::scan::ScanAngles;
+
 /// A quantity that cannot be what it is said to be.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ModelError {
@@ -20,4 +22,12 @@ pub enum ModelError {
     /// A dataset that refers to something it does not hold, or whose numbers of beams differ.
     #[error("{0}")]
     Inconsistent(String),
+    /// A calibration of another scanner than the dataset's.
+    #[error("the calibration is of a scanner with {calibration}; the dataset's has {dataset}")]
+    OtherScanner {
+        /// Where the beams of the calibration point.
+        calibration: ScanAngles,
+        /// Where the beams of the dataset point.
+        dataset: ScanAngles,
+    },
 }

@@ -16,15 +16,15 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Time at which a beam of a scan is read, in seconds since the recording began: start + k·T + i·step.
+    /// Time at which a beam of a scan is read, in seconds since the recording began: start + k·T + i·beam time.
     ///
     /// ```
     /// use catoptric_model::Motion;
     /// let motion = Motion { start_s: 2.0, scan_period_s: 0.025, frames: Vec::new() };
     /// assert!((motion.time_s(4, 72, 0.025 / 1440.0) - 2.10125).abs() < 1e-15 * 4.0);
     /// ```
-    pub fn time_s(&self, scan: usize, beam: usize, step_period_s: f64) -> f64 {
-        self.start_s + (scan as f64 * self.scan_period_s + beam as f64 * step_period_s)
+    pub fn time_s(&self, scan: usize, beam: usize, beam_time_s: f64) -> f64 {
+        self.start_s + (scan as f64 * self.scan_period_s + beam as f64 * beam_time_s)
     }
 
     /// `room_from_rig` at a time; `None` if the rig was never solved.

@@ -7,11 +7,12 @@ use crate::bias::{DistanceBias, RangeBias};
 use crate::board::{BoardPlane, Rectangle};
 use crate::characterization::Characterization;
 use crate::frame::PoseData;
+use crate::scan::{ScanAngles, ScanDirection, ScanError, ScanGeometry};
 use nalgebra::{Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Version of `session.toml`.
-pub const SCHEMA_VERSION: u32 = 1;
+pub const SCHEMA_VERSION: u32 = 2;
 
 /// Everything known before the first reading is looked at.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -46,22 +47,38 @@ pub struct Session {
 
 /// What the scanner's data sheet says.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "FlatSheet", into = "FlatSheet")]
 pub struct ScannerSheet {
     /// Name of the preset.
     pub preset: String,
-    /// Beams of a scan; beam i points to (i − (beams − 1)/2)·step.
-    pub beams: usize,
-    /// Azimuth between neighbouring beams, in degrees.
-    pub step_deg: f64,
-    /// Scans per second.
-    pub scan_rate_hz: f64,
+    /// How it scans.
+    pub scan: ScanGeometry,
     /// Shortest range, in metres.
     pub range_min_m: f64,
     /// Longest range, in metres.
     pub range_max_m: f64,
     /// Full 1/e² divergence of a beam along the longer axis of its spot, in milliradians.
     pub divergence_full_mrad: f64,
+}
+
+/// The same as `session.toml` has it. What a file of version 1 lacks is as all scanners had it then: beams on either side
+/// of the x axis alike, counter-clockwise, spread evenly over the turn.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FlatSheet {
+    preset: String,
+    beams: usize,
+    step_deg: f64,
+    #[serde(default)]
+    first_deg: Option<f64>,
+    #[serde(default)]
+    direction: ScanDirection,
+    scan_rate_hz: f64,
+    #[serde(default)]
+    beam_time_us: Option<f64>,
+    range_min_m: f64,
+    range_max_m: f64,
+    divergence_full_mrad: f64,
 }
 
 /// How far the optical frame may stand from its nominal place, 1σ of each axis; 0 for a place that is known, in the rig as
@@ -210,10 +227,41 @@ pub struct BoardSheet {
     pub markers: Vec<Marker>,
 }
 
-impl ScannerSheet {
-    /// Time between two beams of a scan, in seconds: the scanner turns once from one scan to the next.
-    pub fn step_period_s(&self) -> f64 {
-        self.step_deg / 360.0 / self.scan_rate_hz
+impl TryFrom<FlatSheet> for ScannerSheet {
+    type Error = ScanError;
+
+    fn try_from(flat: FlatSheet) -> Result<Self, ScanError> {
+        let centered = ScanAngles::centered(flat.step_deg, flat.beams);
+        let angles = ScanAngles {
+            first_deg: flat.first_deg.unwrap_or(centered.first_deg),
+            direction: flat.direction,
+            ..centered
+        };
+        Ok(Self {
+            preset: flat.preset,
+            scan: ScanGeometry::new(angles, flat.scan_rate_hz, flat.beam_time_us)?,
+            range_min_m: flat.range_min_m,
+            range_max_m: flat.range_max_m,
+            divergence_full_mrad: flat.divergence_full_mrad,
+        })
+    }
+}
+
+impl From<ScannerSheet> for FlatSheet {
+    fn from(sheet: ScannerSheet) -> Self {
+        let angles = *sheet.scan.angles();
+        Self {
+            preset: sheet.preset,
+            beams: angles.beams,
+            step_deg: angles.step_deg,
+            first_deg: Some(angles.first_deg),
+            direction: angles.direction,
+            scan_rate_hz: sheet.scan.scan_rate_hz(),
+            beam_time_us: Some(sheet.scan.beam_time_s() * 1e6),
+            range_min_m: sheet.range_min_m,
+            range_max_m: sheet.range_max_m,
+            divergence_full_mrad: sheet.divergence_full_mrad,
+        }
     }
 }
 

@@ -144,9 +144,9 @@ pub(super) fn laws(size: (u32, u32), axes: &Axes, title: &str, marks: &[Mark], s
 }
 
 /// One dot for each element over its azimuth, each on its band.
-pub(super) fn per_beam(size: (u32, u32), axes: &Axes, title: &str, dots: &[Dot]) -> String {
+pub(super) fn per_beam(size: (u32, u32), axes: &Axes, title: &str, step_deg: f64, dots: &[Dot]) -> String {
     // Half the step between beams, so that neighbouring bands touch.
-    let half_step = 0.5 * catoptric_model::beam::STEP.to_degrees();
+    let half_step = 0.5 * step_deg;
     draw(size, title, |area| {
         let mut chart = frame(area, axes, true)?;
         let (low, high) = (axes.y.start, axes.y.end);
@@ -314,7 +314,7 @@ mod tests {
             half_band: 0.1,
             color: color(1),
         };
-        let at = |y: f64| per_beam((300, 300), &axes(), "", &[dot(y)]);
+        let at = |y: f64| per_beam((300, 300), &axes(), "", 0.25, &[dot(y)]);
         assert_eq!(at(5.0), at(1.0));
         assert_ne!(at(0.5), at(1.0));
     }

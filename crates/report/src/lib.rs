@@ -58,7 +58,7 @@ pub fn report(
         escape(name)
     );
     html += &format!("<p>{}</p>\n", escape(&words::experiment(dataset, truth)));
-    html += &verdict::verdicts(results);
+    html += &verdict::verdicts(&dataset.session.scanner.scan, results);
     if results.is_empty() {
         html += "<p>No calibration was given to this report.</p>\n";
     }

@@ -3,11 +3,11 @@
 use super::page::{escape, number};
 use super::words::findings;
 use catoptric_assess::score::{Score, Verdict};
-use catoptric_model::{Calibration, beam};
+use catoptric_model::{Calibration, ScanGeometry, beam};
 use std::collections::BTreeMap;
 
 /// The verdicts on all calibrations. One that says what the verdict above it says is told in a sentence.
-pub(super) fn verdicts(results: &[(Calibration, Score)]) -> String {
+pub(super) fn verdicts(scan: &ScanGeometry, results: &[(Calibration, Score)]) -> String {
     let mut html = String::new();
     let mut above: Option<(&Calibration, Verdict, String)> = None;
     for (calibration, score) in results {
@@ -16,7 +16,7 @@ pub(super) fn verdicts(results: &[(Calibration, Score)]) -> String {
         if let Some((first, verdict, words)) = &above
             && *verdict == score.verdict
             && *words == said
-            && let Some(difference) = largest_difference_deg(first, calibration)
+            && let Some(difference) = largest_difference_deg(scan, first, calibration)
         {
             // More digits than the figures of the report have would say nothing.
             let size = if difference < 1e-4 {
@@ -40,11 +40,11 @@ pub(super) fn verdicts(results: &[(Calibration, Score)]) -> String {
 
 /// Largest angle between the directions that two calibrations give an element, in degrees; `None` unless both give
 /// the same elements a direction.
-fn largest_difference_deg(a: &Calibration, b: &Calibration) -> Option<f64> {
+fn largest_difference_deg(scan: &ScanGeometry, a: &Calibration, b: &Calibration) -> Option<f64> {
     let directions = |c: &Calibration| -> BTreeMap<usize, _> {
         let solved = c.beams.iter().filter_map(|b| Some((b.beam, b.deflection()?)));
         solved
-            .map(|(beam, d)| (beam, d.exit_direction(beam::azimuth(beam))))
+            .map(|(beam, d)| (beam, d.exit_direction(scan.azimuth(beam))))
             .collect()
     };
     let (a, b) = (directions(a), directions(b));
@@ -69,10 +69,13 @@ mod tests {
             let mut second = first.clone();
             second.method = "a < b".to_owned();
             change(&mut second);
-            verdicts(&[first.clone(), second].map(|c| {
-                let score = score(&s.dataset, &c, Some(&s.truth)).expect("in memory");
-                (c, score)
-            }))
+            verdicts(
+                &s.dataset.session.scanner.scan,
+                &[first.clone(), second].map(|c| {
+                    let score = score(&s.dataset, &c, Some(&s.truth)).expect("in memory");
+                    (c, score)
+                }),
+            )
         };
         let same = "<p>Method “a &lt; b” ends at the same answer (largest difference";
         let told = verdicts_with(&|_| {});

@@ -20,7 +20,7 @@ pub(super) fn experiment(dataset: &Dataset, truth: Option<&Truth>) -> String {
     let mut text = format!(
         "A {} with {} beams looks through {}. A board was set up {} in the fans of the mirrors{each}",
         session.scanner.preset.to_uppercase(),
-        session.scanner.beams,
+        session.scanner.scan.beams(),
         plural(session.facets.len(), "mirror"),
         plural(count(PoseKind::Facet), "time"),
     );

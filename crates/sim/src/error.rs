@@ -1,5 +1,7 @@
 //! What can stop a simulation.
 
+use catoptric_model::ScanError;
+
 /// Why a scene cannot be simulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SimError {
@@ -74,6 +76,9 @@ pub enum SimError {
     /// Patterns that nobody has made facets of.
     #[error("the scene's patterns have not been worked out into facets")]
     Patterns,
+    /// A scanner that cannot scan as the scene says.
+    #[error("scanner.custom: {0}")]
+    Scanner(#[from] ScanError),
     /// A scene to trace rays in, and no more.
     #[error(
         "the scene has no laboratory: recording takes a [superstructure] with markers, and either room.size_m and a \

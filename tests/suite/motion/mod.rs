@@ -24,6 +24,7 @@ use catoptric::sim::scene::{Attitude, ErrorModel, Flight, Waypoint};
 use catoptric::sim::truth::BeamClass;
 use catoptric::sim::{Laboratory, Scene};
 use catoptric::{CloudFrame, apply};
+use catoptric_fixtures::ust20lx;
 use nalgebra::{Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
@@ -130,7 +131,7 @@ fn compare_with_room(laboratory: &Laboratory, way: impl Fn(f64) -> (Vector3<f64>
     for (scan, returns) in flown(laboratory).iter().enumerate() {
         for (b, found) in returns.iter().enumerate() {
             let (place, attitude) = way(time(scan, b));
-            let direction = beam::direction(beam::azimuth(b)).into_inner();
+            let direction = beam::direction(ust20lx::azimuth(b)).into_inner();
             let expected = leaves(&seen(&room, &place, &attitude), &direction);
             let found = found.as_ref().expect("the room is white and near");
             assert_eq!(found.role, Role::Wall);
@@ -142,7 +143,7 @@ fn compare_with_room(laboratory: &Laboratory, way: impl Fn(f64) -> (Vector3<f64>
             compared += 1;
         }
     }
-    assert!(compared >= 8 * beam::COUNT, "{compared}");
+    assert!(compared >= 8 * ust20lx::COUNT, "{compared}");
 }
 
 /// [`BARE`] with one thin ray for a beam, flying.
@@ -195,7 +196,7 @@ fn the_scene_past_a_wall_gives_what_its_first_comment_says() {
     let mut near = 0;
     for (scan, returns) in flown(&laboratory).iter().enumerate() {
         for (b, found) in returns.iter().enumerate() {
-            let (sin, cos) = libm::sincos(beam::azimuth(b));
+            let (sin, cos) = libm::sincos(ust20lx::azimuth(b));
             let ahead = (6.0 - 2.0 * time(scan, b)) / cos;
             let ranges = [1.5 / sin, ahead];
             let expected = ranges
@@ -228,7 +229,7 @@ fn the_scene_through_a_duct_gives_what_its_first_comment_says() {
         for (b, found) in returns.iter().enumerate() {
             let t = time(scan, b);
             let (x, roll) = (3.0 + t, (90.0 * t).to_radians());
-            let (sin, cos) = libm::sincos(beam::azimuth(b));
+            let (sin, cos) = libm::sincos(ust20lx::azimuth(b));
             let v = Vector3::new(cos, sin * libm::cos(roll), sin * libm::sin(roll));
             let side = |k: u32| {
                 let (sin, cos) = libm::sincos(f64::from(60 * k).to_radians());
@@ -315,8 +316,8 @@ fn a_rig_that_hovers_reads_what_one_at_rest_does_to_the_bit() {
     let room = laboratory.stretch(1).unwrap().ranges;
     let flight = laboratory.stretch(flight_number(&laboratory)).unwrap().ranges;
     let bits = |ranges: &[f64]| ranges.iter().map(|r| r.to_bits()).collect::<Vec<_>>();
-    for scan in flight.chunks(beam::COUNT) {
-        assert_eq!(bits(scan), bits(&room[..beam::COUNT]));
+    for scan in flight.chunks(ust20lx::COUNT) {
+        assert_eq!(bits(scan), bits(&room[..ust20lx::COUNT]));
     }
 }
 
@@ -365,7 +366,7 @@ fn compare_with_images(
             }
             let facet = &truth.facets[*first];
             let planes = mirrored(&planes, (&Vector3::from(facet.normal), facet.offset_m));
-            let direction = beam::direction(beam::azimuth(b)).into_inner();
+            let direction = beam::direction(ust20lx::azimuth(b)).into_inner();
             let expected = leaves(&planes, &direction);
             assert!(
                 (found.range() - expected).abs() < 1e-12,

@@ -1,6 +1,7 @@
 //! Flights as they are recorded, told by the truth, refused, and put into the room by `apply`.
 
 use super::*;
+use catoptric_fixtures::ust20lx;
 
 #[test]
 fn threads_and_order_change_nothing() {
@@ -85,7 +86,9 @@ fn undeflected(rig_from_sensor: Pose) -> Calibration {
         schema_version: calibration::SCHEMA_VERSION,
         method: "known".to_owned(),
         frame: "sensor".to_owned(),
-        beams: (0..beam::COUNT)
+        scanner: None,
+        dataset: None,
+        beams: (0..ust20lx::COUNT)
             .map(|b| BeamEstimate::without_angles(b, Status::Direct, None))
             .collect(),
         facets: Vec::new(),
@@ -134,7 +137,7 @@ fn apply_puts_every_reading_of_a_flight_onto_the_walls() {
             CloudFrame::Room,
         )
         .unwrap();
-        assert_eq!(cloud.points.len(), 8 * beam::COUNT);
+        assert_eq!(cloud.points.len(), 8 * ust20lx::COUNT);
         let off = cloud.points.iter().map(|p| off_planes(&room, &p.position));
         off.fold(0.0, f64::max)
     };

@@ -3,7 +3,7 @@
 use super::cases;
 use crate::scenes::layouts;
 use catoptric::files::{mesh, npy, rays, scene};
-use catoptric::model::{BeamEstimate, Calibration, Status};
+use catoptric::model::{BeamEstimate, Calibration, ScanAngles, Status};
 use catoptric::sim::Mesh;
 use nalgebra::Point3;
 use proptest::collection::vec;
@@ -47,6 +47,8 @@ proptest! {
             schema_version: 1,
             method: name.clone(),
             frame: "sensor".to_owned(),
+            scanner: Some(ScanAngles::centered(0.352, 682)),
+            dataset: Some(name.clone()),
             beams: beams.collect(),
             facets: Vec::new(),
             rig_from_sensor: None,

@@ -6,12 +6,14 @@ use crate::score::residual;
 #[cfg(doc)]
 use catoptric_model::Motion;
 use catoptric_model::cloud::{self, CloudFrame, CloudPoint, PointCloud};
-use catoptric_model::{Calibration, Dataset, Deflection, Pose, PoseKind, PoseRecord, RangeBias, Status};
-use catoptric_model::{Unreadable, beam};
+use catoptric_model::{
+    Calibration, Dataset, Deflection, ModelError, Pose, PoseKind, PoseRecord, RangeBias, ScanGeometry, Status,
+    Unreadable,
+};
 pub use sketch::{CloudSketch, Extent};
 
 /// Why no cloud can be made.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ApplyError {
     /// No stretch has the number asked for.
     #[error("the dataset has no pose {asked}; its poses are numbered {first} to {last}")]
@@ -29,6 +31,9 @@ pub enum ApplyError {
     /// Readings that the dataset's recording gives no more.
     #[error(transparent)]
     Unreadable(#[from] Unreadable),
+    /// The calibration is of another scanner.
+    #[error(transparent)]
+    Scanner(#[from] ModelError),
 }
 
 /// Lifts every range of a stretch into space: of pose number `pose`, or else of the first stretch of the empty room.
@@ -43,7 +48,7 @@ pub enum ApplyError {
 /// The cloud is in memory; [`Lift`] hands on point by point.
 ///
 /// # Errors
-/// [`ApplyError`] if there is no such stretch, or its readings are there no more.
+/// [`ApplyError`] if there is no such stretch, its readings are there no more, or the calibration is of another scanner.
 pub fn apply(
     dataset: &Dataset,
     calibration: &Calibration,
@@ -103,7 +108,7 @@ pub struct Lift<'a> {
     record: &'a PoseRecord,
     deflections: Vec<Option<Deflection>>,
     rig_from_sensor: Pose,
-    step_period_s: f64,
+    scan: &'a ScanGeometry,
     bias: &'a RangeBias,
     color: &'a str,
 }
@@ -112,13 +117,14 @@ impl<'a> Lift<'a> {
     /// Prepares a stretch.
     ///
     /// # Errors
-    /// [`ApplyError`] if there is no such stretch.
+    /// [`ApplyError`] if there is no such stretch, or the calibration is of another scanner.
     pub fn new(
         dataset: &'a Dataset,
         calibration: &'a Calibration,
         pose: Option<usize>,
         frame: CloudFrame,
     ) -> Result<Self, ApplyError> {
+        calibration.check_scanner(&dataset.session)?;
         let record = find(dataset, pose)?;
         // Nothing is believed about a color without a name.
         let room_color = dataset.session.room.as_ref().map_or("", |room| &room.color);
@@ -145,7 +151,7 @@ impl<'a> Lift<'a> {
             record,
             deflections,
             rig_from_sensor: residual::mount(dataset, calibration),
-            step_period_s: dataset.session.scanner.step_period_s(),
+            scan: &dataset.session.scanner.scan,
             bias: residual::bias(dataset, calibration),
             color: record.label.color.as_deref().unwrap_or(room_color),
         })
@@ -167,7 +173,7 @@ impl<'a> Lift<'a> {
                 // E_a of whatever incidence is not added, so any will do here.
                 let terms = self.bias.terms(range, 1.0, self.color);
                 let corrected = range - terms.distance - terms.color;
-                let in_sensor = cloud::lift(deflection, beam::azimuth(beam), corrected);
+                let in_sensor = cloud::lift(deflection, self.scan.azimuth(beam), corrected);
                 take(CloudPoint {
                     position: self.frame_from_sensor(scan, beam) * in_sensor,
                     beam,
@@ -189,7 +195,7 @@ impl<'a> Lift<'a> {
     fn room_from_rig(&self, scan: usize, beam: usize) -> Pose {
         let motion = self.record.motion.as_ref();
         motion
-            .and_then(|m| m.room_from_rig(m.time_s(scan, beam, self.step_period_s)))
+            .and_then(|m| m.room_from_rig(m.time_s(scan, beam, self.scan.beam_time_s())))
             .unwrap_or(self.record.room_from_rig)
     }
 }

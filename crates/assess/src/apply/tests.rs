@@ -1,6 +1,7 @@
 //! The cloud of a room is the room, in every frame; what cannot be lifted is counted.
 
 use super::*;
+use catoptric_fixtures::ust20lx;
 use catoptric_fixtures::{perfect, sample};
 use catoptric_model::{ColorBias, DistanceBias, RangeBias};
 use nalgebra::Point3;
@@ -66,10 +67,10 @@ fn direct_elements_stay_in_the_plane() {
     let forward = cloud
         .points
         .iter()
-        .find(|p| p.beam == beam::FORWARD)
+        .find(|p| p.beam == ust20lx::FORWARD)
         .expect("it is direct");
     assert_eq!((forward.position.y, forward.position.z), (0.0, 0.0));
-    assert_eq!(forward.position.x, scan(&s.dataset)[beam::FORWARD]);
+    assert_eq!(forward.position.x, scan(&s.dataset)[ust20lx::FORWARD]);
     assert!(cloud.points.iter().any(|p| p.position.z > 1.0));
 }
 
@@ -97,9 +98,9 @@ fn ranges_lose_what_depends_on_distance_and_color_but_not_on_incidence() {
     let forward = cloud
         .points
         .iter()
-        .find(|p| p.beam == beam::FORWARD)
+        .find(|p| p.beam == ust20lx::FORWARD)
         .expect("it is direct");
-    let range = scan(&s.dataset)[beam::FORWARD];
+    let range = scan(&s.dataset)[ust20lx::FORWARD];
     assert!((forward.position.x - (range - 0.010)).abs() < 1e-12);
 }
 

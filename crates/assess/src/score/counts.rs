@@ -85,7 +85,7 @@ pub(super) fn statuses(dataset: &Dataset, calibration: &Calibration) -> BTreeMap
 
 /// Elements that the calibration does not mention.
 pub fn absent(dataset: &Dataset, calibration: &Calibration) -> usize {
-    let beams = 0..dataset.session.scanner.beams;
+    let beams = 0..dataset.session.scanner.scan.beams();
     beams.filter(|&b| calibration.beam(b).is_none()).count()
 }
 

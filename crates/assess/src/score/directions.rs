@@ -3,7 +3,7 @@
 use super::statistics::{best_rotation, largest, percentile, rms, rotation_angle};
 use super::{ElementError, POINT_RANGES_M, PointError, Spread};
 use catoptric_model::frame::Pose;
-use catoptric_model::{Deflection, beam};
+use catoptric_model::{Deflection, ScanGeometry, beam};
 use nalgebra::{Rotation3, Unit, Vector3};
 
 /// Errors of directions and points.
@@ -17,12 +17,13 @@ pub(super) struct Directions {
 
 impl Directions {
     pub(super) fn of(
+        scan: &ScanGeometry,
         scored: &[&ElementError],
         believed_from_sensor: &Pose,
         actual_from_sensor: &Pose,
     ) -> Self {
         let ray = |beam: usize, deflection: &Deflection, pose: &Pose| {
-            let azimuth = beam::azimuth(beam);
+            let azimuth = scan.azimuth(beam);
             let exit = deflection.exit_direction(azimuth);
             (
                 pose * deflection.deflection_point(azimuth),

@@ -74,6 +74,8 @@ pub const POINT_RANGES_M: [f64; 3] = [1.0, 4.0, 10.0];
 
 /// Scores a calibration against the truth, `&truth`; without one, `None`, against boards and walls only.
 ///
+/// A calibration that says that it was made from another dataset, or of another scanner, fails.
+///
 /// # Errors
 /// [`Unreadable`] if the recording of the dataset can no longer be read.
 pub fn score<'t>(
@@ -107,16 +109,17 @@ pub fn score_by(
         .filter(|e| e.class == BeamClass::Deflected)
         .collect();
 
-    let in_sensor = Directions::of(&scored, &Pose::identity(), &Pose::identity());
+    let scan = &dataset.session.scanner.scan;
+    let in_sensor = Directions::of(scan, &scored, &Pose::identity(), &Pose::identity());
     let in_room = truth
         .zip(calibration.rig_from_sensor.as_ref())
         .zip(tracked_rig(dataset))
         .map(|((truth, mount), room_from_rig)| {
             let believed = room_from_rig * mount.pose();
             let actual = Pose::from(&truth.room_from_rig) * Pose::from(&truth.rig_from_sensor);
-            Directions::of(&scored, &believed, &actual)
+            Directions::of(scan, &scored, &believed, &actual)
         })
-        .unwrap_or_else(|| Directions::of(&[], &Pose::identity(), &Pose::identity()));
+        .unwrap_or_else(|| Directions::of(scan, &[], &Pose::identity(), &Pose::identity()));
 
     let squares = |e: &&ElementError| e.across.powi(2) + e.up.powi(2);
     let mahalanobis: Vec<f64> = scored.iter().filter_map(|e| e.mahalanobis_squared).collect();
@@ -169,7 +172,7 @@ pub fn score_by(
         elements: Vec::new(),
     };
     score.elements = elements;
-    words::judge(&mut score, calibration, truth.is_some());
+    words::judge(&mut score, dataset, calibration, truth.is_some());
     Ok(score)
 }
 

@@ -5,7 +5,7 @@ use catoptric_calib::tracking;
 use catoptric_model::{
     BeamEstimate, Calibration, CorrectedRange, Dataset, Deflection, Pose, PoseKind, PoseRecord,
 };
-use catoptric_model::{RangeBias, RawRange, Unreadable, beam};
+use catoptric_model::{RangeBias, RawRange, Unreadable};
 use nalgebra::Unit;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -60,8 +60,9 @@ pub fn boards(dataset: &Dataset, calibration: &Calibration) -> Result<SurfaceRes
         let board = BoardInSensor::of(pose, &dataset.session, &rig_from_sensor);
         move |beam: usize, deflection: &Deflection| {
             let board = board.as_ref()?;
-            let exit = deflection.exit_direction(beam::azimuth(beam));
-            let hit = board.hit(&deflection.deflection_point(beam::azimuth(beam)), &exit)?;
+            let azimuth = observations::azimuth(&dataset.session, beam);
+            let exit = deflection.exit_direction(azimuth);
+            let hit = board.hit(&deflection.deflection_point(azimuth), &exit)?;
             let predicted = deflection.distance + hit.distance;
             board.holds(&hit, cone * predicted, 0.0).then(|| Surface {
                 predicted,
@@ -82,8 +83,9 @@ pub fn walls(dataset: &Dataset, calibration: &Calibration) -> Result<SurfaceResi
         let room_from_sensor = pose.room_from_rig * rig_from_sensor;
         move |beam: usize, deflection: &Deflection| {
             let room = dataset.session.room.as_ref()?;
-            let origin = room_from_sensor * deflection.deflection_point(beam::azimuth(beam));
-            let exit = deflection.exit_direction(beam::azimuth(beam));
+            let azimuth = observations::azimuth(&dataset.session, beam);
+            let origin = room_from_sensor * deflection.deflection_point(azimuth);
+            let exit = deflection.exit_direction(azimuth);
             let exit = Unit::new_unchecked(room_from_sensor * exit.into_inner());
             let (s, wall) = room.cast(&origin, &exit)?;
             Some(Surface {

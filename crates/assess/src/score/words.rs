@@ -3,7 +3,7 @@
 use super::honesty::{self, Honesty};
 use super::nulls::nulls;
 use super::{DISHONEST_NEES, Score, Verdict};
-use catoptric_model::{Calibration, Status};
+use catoptric_model::{Calibration, Dataset, Status};
 use std::collections::BTreeMap;
 
 /// Share of the squared error beyond which one rotation is said to dominate it.
@@ -27,9 +27,10 @@ pub fn common_share(score: &Score) -> f64 {
 }
 
 /// Sets the verdict, and writes down its reasons, the warnings, and why figures are missing.
-pub(super) fn judge(score: &mut Score, calibration: &Calibration, has_truth: bool) {
+pub(super) fn judge(score: &mut Score, dataset: &Dataset, calibration: &Calibration, has_truth: bool) {
     score.honesty = honesty::of(score);
-    let failures = failures(score);
+    let mut failures = foreign(dataset, calibration);
+    failures.extend(self::failures(score));
     score.verdict = match (has_truth && !nothing_deflected(score), failures.is_empty()) {
         (_, false) => Verdict::Fail,
         (true, true) => Verdict::Pass,
@@ -43,6 +44,19 @@ pub(super) fn judge(score: &mut Score, calibration: &Calibration, has_truth: boo
 /// Whether there is a truth, and no element in it whose direction could be asked for.
 fn nothing_deflected(score: &Score) -> bool {
     score.beams.deflected == Some(0)
+}
+
+/// Whether a calibration says that it is of something else than a dataset.
+pub(crate) fn foreign(dataset: &Dataset, calibration: &Calibration) -> Vec<String> {
+    let scanner = calibration.check_scanner(&dataset.session).err();
+    let other = calibration.other_dataset(dataset).map(|[its, this]| {
+        format!("fails: the calibration was made from another dataset (SHA-256 {its}); this one is {this}")
+    });
+    scanner
+        .map(|error| format!("fails: {error}"))
+        .into_iter()
+        .chain(other)
+        .collect()
 }
 
 fn failures(score: &Score) -> Vec<String> {

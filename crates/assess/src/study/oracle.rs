@@ -51,7 +51,9 @@ impl Calibrator for Oracle {
             schema_version: calibration::SCHEMA_VERSION,
             method: "oracle".to_owned(),
             frame: "sensor".to_owned(),
-            beams: (0..dataset.session.scanner.beams).map(estimate).collect(),
+            scanner: Some(*dataset.session.scanner.scan.angles()),
+            dataset: dataset.id.clone(),
+            beams: (0..dataset.session.scanner.scan.beams()).map(estimate).collect(),
             facets: Vec::new(),
             rig_from_sensor: Some(MountEstimate {
                 translation_m: mount.translation_m,

@@ -5,7 +5,7 @@ mod problem;
 mod sane;
 mod shared;
 
-use catoptric_model::beam;
+use catoptric_model::ScanGeometry;
 use catoptric_model::calibration::{self, Calibration};
 use element::check_element;
 use problem::Problems;
@@ -22,6 +22,9 @@ pub const MIRROR_DISTANCE_M: f64 = 10.0;
 /// that says nothing.
 pub const ANGLE_SD_RAD: [f64; 2] = [1e-10, PI];
 
+/// Hexadecimal digits of a SHA-256.
+const SHA256_DIGITS: usize = 64;
+
 /// Everything wrong with a calibration, in the order of the file; nothing if it is sound.
 ///
 /// ```
@@ -30,6 +33,8 @@ pub const ANGLE_SD_RAD: [f64; 2] = [1e-10, PI];
 ///     schema_version: 1,
 ///     method: "mine".to_owned(),
 ///     frame: "room".to_owned(),
+///     scanner: None,
+///     dataset: None,
 ///     beams: Vec::new(),
 ///     facets: Vec::new(),
 ///     rig_from_sensor: None,
@@ -42,11 +47,11 @@ pub const ANGLE_SD_RAD: [f64; 2] = [1e-10, PI];
 /// ```
 pub fn validate(calibration: &Calibration) -> Vec<Problem> {
     let mut problems = Problems::default();
-    if calibration.schema_version != calibration::SCHEMA_VERSION {
+    if !(1..=calibration::SCHEMA_VERSION).contains(&calibration.schema_version) {
         problems.error(
             "schema_version",
             format!(
-                "is {}, this program reads {}",
+                "is {}, this program reads 1 to {}",
                 calibration.schema_version,
                 calibration::SCHEMA_VERSION
             ),
@@ -61,14 +66,36 @@ pub fn validate(calibration: &Calibration) -> Vec<Problem> {
             format!("is {:?}; angles are given in \"sensor\"", calibration.frame),
         );
     }
+    if let Some(Err(wrong)) = calibration.scanner.map(|angles| angles.check()) {
+        problems.error(&format!("scanner.{}", wrong.key), wrong.problem);
+    }
+    // Who does not say which scanner it is has the usual one.
+    let beams = calibration
+        .scanner
+        .map_or(ScanGeometry::default().beams(), |angles| angles.beams);
+    if let Some(id) = &calibration.dataset
+        && !(id.len() == SHA256_DIGITS && id.chars().all(|c| c.is_ascii_hexdigit()))
+    {
+        problems.error(
+            "dataset",
+            format!("is {id:?}; the SHA-256 of observations.mcap has {SHA256_DIGITS} hexadecimal digits"),
+        );
+    }
     if calibration.beams.is_empty() {
         problems.error("beams", "lists no element".to_owned());
     }
     let mut seen = BTreeSet::new();
     for (place, estimate) in calibration.beams.iter().enumerate() {
         let mut at = problems.of_beam(place, estimate.beam);
-        if estimate.beam >= beam::COUNT {
-            at.error("beam", format!("is not among 0…{}", beam::COUNT - 1));
+        if estimate.beam >= beams {
+            let which = match calibration.scanner {
+                Some(_) => "of `scanner`",
+                None => "of the UST-20LX; name another `scanner`",
+            };
+            at.error(
+                "beam",
+                format!("is not among the beams 0…{} {which}", beams.saturating_sub(1)),
+            );
         }
         if !seen.insert(estimate.beam) {
             at.error("beam", "is listed more than once".to_owned());

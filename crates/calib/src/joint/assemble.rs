@@ -12,7 +12,7 @@ use crate::mount::pose::{self, Mount, Prior};
 use crate::readings::observations::azimuth;
 use crate::readings::spread;
 use crate::screen::Candidate;
-use catoptric_model::{BeamEstimate, MirrorPlane, Pose, Status, beam};
+use catoptric_model::{BeamEstimate, MirrorPlane, Pose, ScanGeometry, Status, beam};
 use nalgebra::{DVector, Dyn, Matrix6, OMatrix, RowDVector, U6, Vector6};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -163,7 +163,11 @@ pub(super) fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) 
             azimuth,
             u: beam::direction(azimuth),
             facet: facets.iter().position(|f| *f == element.facet),
-            along: along(session.facets[element.facet].beams, element.beam),
+            along: along(
+                &session.scanner.scan,
+                session.facets[element.facet].beams,
+                element.beam,
+            ),
             sights,
         });
     }
@@ -171,9 +175,9 @@ pub(super) fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) 
 }
 
 /// Place of a beam in a fan, −1 at its first beam and 1 at its last.
-pub(super) fn along([first, last]: [usize; 2], beam: usize) -> f64 {
-    let half = 0.5 * (last.saturating_sub(first)).max(1) as f64;
-    ((beam as f64 - first as f64) / half - 1.0).clamp(-1.5, 1.5)
+pub(super) fn along(scan: &ScanGeometry, fan: [usize; 2], beam: usize) -> f64 {
+    let half = 0.5 * scan.length(fan).max(1) as f64;
+    (scan.along(fan, beam) / half - 1.0).clamp(-1.5, 1.5)
 }
 
 /// One board before undeflected beams.

@@ -60,7 +60,7 @@ pub fn limit(
         planes[index] = mean;
         let places = of_facet
             .iter()
-            .map(|t| along(facet.beams, t.beam))
+            .map(|t| along(&session.scanner.scan, facet.beams, t.beam))
             .collect::<Vec<_>>();
         flat.push(flatness(&mean, &built, &places));
         for t in of_facet {

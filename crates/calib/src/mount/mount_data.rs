@@ -11,8 +11,8 @@ use catoptric_model::{
 };
 use nalgebra::{DMatrix, DVector, Matrix4, Point3};
 
-/// Beams this close to a served range may meet a mirror as built: half a spot and some facet tilt.
-const CLEAR_OF_FACETS: usize = 12;
+/// Beams this close to a served range may meet a mirror as built, in degrees: half a spot and some facet tilt.
+const CLEAR_OF_FACETS_DEG: f64 = 3.0;
 
 /// Noise of a mean below which readings are not weighted further, in metres: whole millimetres, 1/√12 mm.
 const LEAST_NOISE: f64 = 2.9e-4;
@@ -165,13 +165,16 @@ impl Selection {
 
 impl<'a> Selector<'a> {
     pub(crate) fn new(dataset: &'a Dataset, summaries: &'a [Vec<Summary>]) -> Self {
-        let clear = (0..dataset.session.scanner.beams)
-            .map(|b| {
-                dataset.session.facets.iter().all(|f| {
-                    b + CLEAR_OF_FACETS < f.beams[0] || b > f.beams[1].saturating_add(CLEAR_OF_FACETS)
-                })
-            })
-            .collect();
+        let scan = &dataset.session.scanner.scan;
+        let near = scan.steps_in(CLEAR_OF_FACETS_DEG);
+        let is_clear = |b| {
+            dataset
+                .session
+                .facets
+                .iter()
+                .all(|f| scan.beside(f.beams, b) > near)
+        };
+        let clear = (0..scan.beams()).map(is_clear).collect();
         Self {
             dataset,
             summaries,
@@ -201,12 +204,18 @@ impl<'a> Selector<'a> {
             .filter_map(|(pose, record)| {
                 let board = BoardInSensor::of(record, &self.dataset.session, rig_from_sensor)?;
                 let rays: Vec<Ray> = (0..record.beams())
-                    .filter(|b| self.clear[*b] && is_within(record, *b))
+                    .filter(|b| self.clear[*b] && self.is_within(record, *b))
                     .filter_map(|b| self.ray(&board, b, &self.summaries[pose][b], stage))
                     .collect();
                 (rays.len() >= LEAST_RAYS).then_some(DirectBoard { pose, rays })
             })
             .collect()
+    }
+
+    /// Whether the experimenter set the board up for this beam, as far as the label says.
+    fn is_within(&self, record: &PoseRecord, beam: usize) -> bool {
+        let scan = &self.dataset.session.scanner.scan;
+        record.label.beams.is_none_or(|run| scan.holds(run, beam))
     }
 
     fn ray(&self, board: &BoardInSensor, beam: usize, summary: &Summary, stage: &Selection) -> Option<Ray> {
@@ -287,12 +296,4 @@ impl<'a> Selector<'a> {
             variance,
         })
     }
-}
-
-/// Whether the experimenter set the board up for this beam, as far as the label says.
-fn is_within(record: &PoseRecord, beam: usize) -> bool {
-    record
-        .label
-        .beams
-        .is_none_or(|[first, last]| (first..=last).contains(&beam))
 }

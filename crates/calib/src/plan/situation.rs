@@ -227,7 +227,7 @@ impl Fan {
             margin,
             boards: 0,
         };
-        for beam in facet.beams[0]..=facet.beams[1] {
+        for beam in session.scanner.scan.run(facet.beams) {
             let azimuth = azimuth(session, beam);
             let Some(deflection) = plane.deflect(beam::direction(azimuth)) else {
                 let reason = "the facet's plane does not face it".to_owned();
@@ -336,7 +336,7 @@ fn expected_mount(session: &Session, room_from_rig: &Pose, placed: &[Placed]) ->
             room_from_board: Some(place.room_from_board),
             motion: None,
             watched: Vec::new(),
-            readings: Readings::in_memory(session.scanner.beams, Vec::new()),
+            readings: Readings::in_memory(session.scanner.scan.beams(), Vec::new()),
         });
     }
     let dataset = Dataset {
@@ -350,7 +350,7 @@ fn expected_mount(session: &Session, room_from_rig: &Pose, placed: &[Placed]) ->
 /// What every undeflected beam would read of a board, free of chance.
 fn predicted(session: &Session, board: &BoardInSensor, readings: usize) -> Vec<Summary> {
     let believed = &session.believed;
-    (0..session.scanner.beams)
+    (0..session.scanner.scan.beams())
         .map(|b| {
             let u = beam::direction(azimuth(session, b));
             match board.hit(&Point3::origin(), &u) {

@@ -5,7 +5,7 @@ use crate::judge::covariance::{self, MountUncertainty};
 use crate::readings::observations::BoardView;
 use catoptric_model::frame::tangent_basis;
 use catoptric_model::session::*;
-use catoptric_model::{Pose, PoseData, RangeBias, beam};
+use catoptric_model::{Pose, PoseData, RangeBias, ScanGeometry, beam};
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
 const FACET: &str = "up";
@@ -24,9 +24,7 @@ fn session() -> Session {
         name: String::new(),
         scanner: ScannerSheet {
             preset: String::new(),
-            beams: 1081,
-            step_deg: 0.25,
-            scan_rate_hz: 40.0,
+            scan: ScanGeometry::default(),
             range_min_m: 0.06,
             range_max_m: 20.0,
             divergence_full_mrad: 10.0,

@@ -63,8 +63,8 @@ impl Bare {
 
 /// Azimuth and distance of every beam of a facet's fan that met the structure.
 fn measured(session: &Session, facet: &NominalFacet) -> Vec<(f64, f64)> {
-    let [first, last] = facet.beams;
-    (first..=last.min(session.scanner.beams.saturating_sub(1)))
+    let beams = session.scanner.scan.run(facet.beams);
+    beams
         .filter_map(|b| Some((azimuth(session, b), session.bare_structure.distance(b)?)))
         .collect()
 }

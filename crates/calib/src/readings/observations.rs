@@ -127,9 +127,9 @@ impl BoardInSensor {
     }
 }
 
-/// Base azimuth of a beam of the session's scanner, in radians: (i − (beams − 1)/2)·step.
+/// Base azimuth of a beam of the session's scanner, in radians.
 pub fn azimuth(session: &Session, beam: usize) -> f64 {
-    (beam as f64 - 0.5 * (session.scanner.beams as f64 - 1.0)) * session.scanner.step_deg.to_radians()
+    session.scanner.scan.azimuth(beam)
 }
 
 /// Half angle of the cone that has to fall on one surface, in radians: [`SPOT_RADII`] times half the divergence.

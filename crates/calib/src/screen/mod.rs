@@ -32,7 +32,7 @@ pub(crate) fn candidates(
     boards: &[Option<BoardInSensor>],
 ) -> Vec<Candidate> {
     let screen = Screen::new(dataset, summaries, mount, boards);
-    let beams = (0..dataset.session.scanner.beams).into_par_iter();
+    let beams = (0..dataset.session.scanner.scan.beams()).into_par_iter();
     beams.map(|b| screen.classify(b)).collect()
 }
 
@@ -40,7 +40,7 @@ impl Screen<'_> {
     /// The class of one element, from statistics alone.
     fn classify(&self, beam: usize) -> Candidate {
         let session = &self.dataset.session;
-        let facets = facets_near(&session.facets, beam);
+        let facets = facets_near(&session.scanner.scan, &session.facets, beam);
         let tally = self.tally(beam, &facets);
         if let Some(reason) = self.abnormal(beam, &facets) {
             return Candidate::Rejected(reason);

@@ -91,11 +91,12 @@ pub(super) fn of_readings(record: &PoseRecord, session: &Session) -> Option<Stri
     let label = &record.label;
     let facet = label.facet.as_deref();
     let drawn = facet.and_then(|name| session.facets.iter().find(|f| f.name == name));
-    let [first, last] = label.beams.or(drawn.map(|f| f.beams))?;
+    let run = label.beams.or(drawn.map(|f| f.beams))?;
     label.board.as_ref()?;
     let unsteady = LEVEL_FLOOR + LEVEL_SIGMAS * session.believed.drift_sd_mm * 1e-3;
     let (mut beams, mut changes) = (0, Vec::new());
-    for beam in record.readings.statistics().iter().take(last + 1).skip(first) {
+    let statistics = record.readings.statistics();
+    for beam in session.scanner.scan.run(run).filter_map(|b| statistics.get(b)) {
         let [Some((m1, v1)), Some((m2, v2))] = beam.halves.map(level) else {
             continue;
         };

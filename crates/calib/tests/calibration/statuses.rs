@@ -56,7 +56,7 @@ fn every_fault_has_its_reason() {
 fn one_reading_of_the_wall_does_not_lose_the_element() {
     let mut made = World::noisy(12).make();
     let clean = solve(&made.dataset).beams[66].clone();
-    let beams = made.dataset.session.scanner.beams;
+    let beams = made.dataset.session.scanner.scan.beams();
     let pose = made
         .dataset
         .poses

@@ -150,8 +150,13 @@ impl World {
         }
     }
 
+    fn scan(&self) -> ScanGeometry {
+        let angles = ScanAngles::centered(self.step_deg, self.beams);
+        ScanGeometry::new(angles, 40.0, None).expect("a scanner can have it")
+    }
+
     pub(crate) fn azimuth(&self, beam: usize) -> f64 {
-        (beam as f64 - 0.5 * (self.beams as f64 - 1.0)) * self.step_deg.to_radians()
+        self.scan().azimuth(beam)
     }
 
     /// The plane of a facet, as built or as drawn.
@@ -312,9 +317,7 @@ impl World {
             name: "inverse crime".to_owned(),
             scanner: ScannerSheet {
                 preset: "ust-20lx".to_owned(),
-                beams: self.beams,
-                step_deg: self.step_deg,
-                scan_rate_hz: 40.0,
+                scan: self.scan(),
                 range_min_m: 0.06,
                 range_max_m: 20.0,
                 divergence_full_mrad: 10.0,

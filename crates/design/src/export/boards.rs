@@ -97,14 +97,14 @@ fn write_board(
         PoseKind::Facet => ("facet", BESIDE),
         _ => ("direct", 0),
     };
-    let last_beam = session.scanner.beams.saturating_sub(1);
-    let [first, last] = label.beams.unwrap_or([0, last_beam]);
-    let rows = first.saturating_sub(beside)..=last.saturating_add(beside).min(last_beam);
+    let scan = &session.scanner.scan;
+    let own = label.beams.unwrap_or([0, scan.beams() - 1]);
+    let rows = scan.widened(own, beside);
     let summaries = record.summarize();
     for (beam, read) in summaries
         .iter()
         .enumerate()
-        .filter(|(beam, _)| rows.contains(beam))
+        .filter(|(beam, _)| scan.holds(rows, *beam))
     {
         let inside = match label.kind {
             PoseKind::Direct => inside_edge(&board, &direction(azimuth(session, beam))),
@@ -119,7 +119,7 @@ fn write_board(
             board.color.clone(),
             label.facet.clone().unwrap_or_default(),
             beam.to_string(),
-            u8::from((first..=last).contains(&beam)).to_string(),
+            u8::from(scan.holds(own, beam)).to_string(),
             azimuth(session, beam).to_string(),
             or_empty(session.bare_structure.distance(beam)),
             or_empty(inside),

@@ -7,7 +7,7 @@
 
 use catoptric_assess::score::true_directions;
 use catoptric_calib::{TrueDirection, limit};
-use catoptric_model::{Dataset, PoseKind, PoseRecord, Readings, beam};
+use catoptric_model::{Dataset, PoseKind, PoseRecord, Readings};
 use catoptric_sim::laboratory::Returns;
 use catoptric_sim::{Laboratory, Scene, SimError};
 use nalgebra::Matrix2;
@@ -178,7 +178,7 @@ fn record(laboratory: &Laboratory, number: usize, readings: usize) -> Result<Opt
 fn spread(returns: &Returns, readings: usize) -> Vec<f64> {
     // An even number of ±a has the sample variance a²·n/(n − 1).
     let share = ((readings.max(2) - 1) as f64 / readings.max(2) as f64).sqrt();
-    let mut ranges = Vec::with_capacity(readings * beam::COUNT);
+    let mut ranges = Vec::with_capacity(readings * returns.len());
     for scan in 0..readings {
         let last_of_odd = readings % 2 == 1 && scan + 1 == readings;
         let sign = match (last_of_odd, scan % 2) {

@@ -5,7 +5,7 @@ use super::field::{Cell, cells};
 use super::footprint::{Footprint, Outlines};
 use super::size::HOUSING;
 use catoptric_cast::Triangle;
-use catoptric_model::Pose;
+use catoptric_model::{Pose, ScanGeometry};
 use catoptric_sim::build::room_from_rig;
 use catoptric_sim::build::{BuiltFacet, Structure};
 use catoptric_sim::light::{End, Mirrors, Setting};
@@ -30,6 +30,8 @@ pub struct Drawing {
     pub footprints: Vec<Footprint>,
     /// What every beam stands for in the scan.
     pub cells: Vec<Cell>,
+    /// How the scanner scans.
+    pub scan: ScanGeometry,
 }
 
 /// An opaque body.
@@ -95,7 +97,8 @@ impl Drawing {
             room_from_sensor: room_from_rig(&scene.room) * structure.rig_from_sensor,
             rays,
             footprints,
-            cells: cells(sensor.shape()),
+            cells: cells(&sensor),
+            scan: *sensor.scan(),
             parts: structure
                 .parts
                 .iter()

@@ -10,7 +10,7 @@
 
 use super::footprint::Footprint;
 use catoptric_cast::Ray;
-use catoptric_model::beam;
+use catoptric_model::ScanGeometry;
 use catoptric_sim::Scene;
 use catoptric_sim::build::Structure;
 use catoptric_sim::build::color;
@@ -172,7 +172,7 @@ fn mirror_at(path: &Path) -> f64 {
 
 /// Follows every beam through a setting without targets.
 pub(crate) fn trace(sensor: &Sensor, bare: &Setting<'_>, scene: &Scene) -> Vec<Traced> {
-    let beams = (0..beam::COUNT).into_par_iter();
+    let beams = (0..sensor.scan().beams()).into_par_iter();
     beams.map(|beam| trace_one(sensor, bare, scene, beam)).collect()
 }
 
@@ -228,6 +228,7 @@ fn nearest(scene: &Scene, traced: &Traced) -> f64 {
 /// What is told of every element.
 pub(crate) fn elements(
     scene: &Scene,
+    scan: &ScanGeometry,
     structure: &Structure,
     names: &[&str],
     traced: &[&Traced],
@@ -246,7 +247,7 @@ pub(crate) fn elements(
         let reach = |reflectivity| t.sees.then(|| farthest(scene, t, reflectivity));
         Element {
             beam: t.beam,
-            scan_azimuth_deg: beam::azimuth(t.beam).to_degrees(),
+            scan_azimuth_deg: scan.azimuth(t.beam).to_degrees(),
             class: t.class(),
             status: t.status,
             facets: t

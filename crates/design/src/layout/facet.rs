@@ -5,7 +5,7 @@ use super::field::Cell;
 use super::footprint::Footprint;
 use super::sensitivity::{RANGE_M, Shift, shifts};
 use catoptric_cast::area_vector;
-use catoptric_model::beam;
+use catoptric_model::ScanGeometry;
 use catoptric_sim::build::Structure;
 use serde::Serialize;
 
@@ -64,6 +64,7 @@ pub struct FacetView {
 
 /// All facets.
 pub(crate) fn facets(
+    scan: &ScanGeometry,
     structure: &Structure,
     elements: &[Element],
     traced: &[&Traced],
@@ -71,11 +72,12 @@ pub(crate) fn facets(
     footprints: &[&Footprint],
 ) -> Vec<FacetView> {
     (0..structure.facets.len())
-        .map(|facet| view(structure, facet, elements, traced, cells, footprints))
+        .map(|facet| view(scan, structure, facet, elements, traced, cells, footprints))
         .collect()
 }
 
 fn view(
+    scan: &ScanGeometry,
     structure: &Structure,
     facet: usize,
     elements: &[Element],
@@ -113,7 +115,7 @@ fn view(
         .filter(|(e, t)| e.class.sees() && meets(t))
         .map(|(e, t)| {
             let faces = t.chief.facets().iter().map(|&f| &structure.facets[f].face);
-            let all = shifts(e.beam, faces, RANGE_M);
+            let all = shifts(scan.azimuth(e.beam), faces, RANGE_M);
             // A facet that is met twice moves the point twice.
             let own = all.iter().zip(t.chief.facets()).filter(|(_, f)| **f == facet);
             let sum = own.fold(Shift::default(), |sum, (shift, _)| sum + *shift);
@@ -125,7 +127,7 @@ fn view(
     FacetView {
         name: built.name.clone(),
         elements: own.len(),
-        beams: own.first().zip(own.last()).map(|(a, b)| [a.0.beam, b.0.beam]),
+        beams: scan.shortest_run(&own.iter().map(|(e, _)| e.beam).collect::<Vec<_>>()),
         multi_bounce: of_class(Class::MultiBounce).len(),
         split: of_class(Class::Split).len(),
         shaded: of_class(Class::Shaded).len(),
@@ -159,6 +161,5 @@ fn azimuths(own: &[(&Element, &&Traced)]) -> Option<[f64; 2]> {
         })
     };
     let (low, high) = (offsets().reduce(f64::min)?, offsets().reduce(f64::max)?);
-    debug_assert!(own.len() <= beam::COUNT);
     Some([(from + low).to_degrees(), (from + high).to_degrees()])
 }

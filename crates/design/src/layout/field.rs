@@ -7,12 +7,13 @@
 //! exactly.
 
 use super::element::{Traced, exit};
-use catoptric_model::beam;
+use catoptric_model::ScanGeometry;
 use catoptric_sim::build::Structure;
-use catoptric_sim::scene::BeamShape;
+use catoptric_sim::receive::Sensor;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
 /// Angle within which a direction is near a beam, in degrees.
@@ -34,12 +35,14 @@ pub struct Cell {
     pub azimuth: f64,
     /// Half its extent across the scan, in radians.
     pub half_height: f64,
+    /// Its extent along the scan, in radians.
+    pub width: f64,
 }
 
 impl Cell {
     /// Its solid angle, in steradians: step·2·sin(δ/2).
     pub fn solid_angle(&self) -> f64 {
-        2.0 * beam::STEP * libm::sin(self.half_height)
+        2.0 * self.width * libm::sin(self.half_height)
     }
 }
 
@@ -52,6 +55,7 @@ pub(crate) struct Way {
     /// Number of its elements below each beam: `below[j] - below[i]` of them are in i..j.
     below: Vec<usize>,
     pub(crate) beams: Vec<usize>,
+    scan: ScanGeometry,
 }
 
 /// All ways of seeing elements.
@@ -68,11 +72,12 @@ pub(crate) struct Field {
 }
 
 /// The cells of all beams.
-pub(crate) fn cells(shape: &BeamShape) -> Vec<Cell> {
+pub(crate) fn cells(sensor: &Sensor) -> Vec<Cell> {
+    let (scan, shape) = (sensor.scan(), sensor.shape());
     let tan = |full_mrad: f64| libm::tan(0.5e-3 * full_mrad);
     let (wide, narrow) = (tan(shape.wide_full_mrad), tan(shape.narrow_full_mrad));
     let cell = |beam| {
-        let azimuth = beam::azimuth(beam);
+        let azimuth = scan.azimuth(beam);
         let (sin, cos) = if shape.turns {
             libm::sincos(azimuth)
         } else {
@@ -81,13 +86,14 @@ pub(crate) fn cells(shape: &BeamShape) -> Vec<Cell> {
         Cell {
             azimuth,
             half_height: libm::atan(libm::hypot(wide * sin, narrow * cos)),
+            width: scan.step(),
         }
     };
-    (0..beam::COUNT).map(cell).collect()
+    (0..scan.beams()).map(cell).collect()
 }
 
 impl Ways {
-    pub(crate) fn new(structure: &Structure, traced: &[&Traced]) -> Self {
+    pub(crate) fn new(structure: &Structure, scan: &ScanGeometry, traced: &[&Traced]) -> Self {
         let mut beams: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
         for t in traced.iter().filter(|t| t.sees) {
             beams.entry(t.chief.facets().to_vec()).or_default().push(t.beam);
@@ -97,11 +103,11 @@ impl Ways {
                 let m = structure.facets[facet].face.normal.into_inner();
                 (Matrix3::identity() - m * m.transpose() * 2.0) * turn
             });
-            let mut below = vec![0; beam::COUNT + 1];
+            let mut below = vec![0; scan.beams() + 1];
             for &beam in &beams {
                 below[beam + 1] = 1;
             }
-            for beam in 0..beam::COUNT {
+            for beam in 0..scan.beams() {
                 below[beam + 1] += below[beam];
             }
             Way {
@@ -109,6 +115,7 @@ impl Ways {
                 turn,
                 below,
                 beams,
+                scan: *scan,
             }
         };
         Self(beams.into_iter().map(way).collect())
@@ -125,10 +132,10 @@ impl Way {
         self.turn.column(2).dot(direction)
     }
 
-    /// The place in the scan, in steps from beam 0, of a direction out there.
-    fn step(&self, direction: &Vector3<f64>) -> f64 {
+    /// Azimuth in the scan of a direction out there.
+    fn azimuth(&self, direction: &Vector3<f64>) -> f64 {
         let along = [0, 1].map(|axis| self.turn.column(axis).dot(direction));
-        libm::atan2(along[1], along[0]) / beam::STEP + beam::FORWARD as f64
+        libm::atan2(along[1], along[0])
     }
 
     /// Whether one of its cells holds a direction out there.
@@ -137,14 +144,8 @@ impl Way {
         if sin.abs() > highest {
             return false;
         }
-        let step = self.step(direction).round();
-        if !(0.0..beam::COUNT as f64).contains(&step) {
-            return false;
-        }
-        // A whole number within the scan.
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let beam = step as usize;
-        self.holds(beam) && libm::asin(sin).abs() <= cells[beam].half_height
+        let beam = self.scan.nearest(self.azimuth(direction));
+        beam.is_some_and(|beam| self.holds(beam) && libm::asin(sin).abs() <= cells[beam].half_height)
     }
 
     /// Whether one of its beams is within an angle of a direction out there; its sine and cosine are given.
@@ -154,10 +155,18 @@ impl Way {
             return false;
         }
         // cos(angle) = cos(elevation)·cos(difference of azimuth).
-        let reach = libm::acos((cos_near / (1.0 - sin * sin).sqrt()).min(1.0)) / beam::STEP;
-        let step = self.step(direction);
-        let (first, last) = ((step - reach).ceil().max(0.0), (step + reach).floor());
-        let last = last.min((beam::COUNT - 1) as f64);
+        let reach = libm::acos((cos_near / (1.0 - sin * sin).sqrt()).min(1.0)) / self.scan.step();
+        let (place, turn) = (self.scan.place(self.azimuth(direction)), TAU / self.scan.step());
+        // What is near one end of the scan may be a turn away from it.
+        [place - turn, place, place + turn]
+            .into_iter()
+            .any(|place| self.has_beams(place - reach, place + reach))
+    }
+
+    /// Whether it has beams between two places in the scan, in steps from beam 0.
+    fn has_beams(&self, from: f64, to: f64) -> bool {
+        let (first, last) = (from.ceil().max(0.0), to.floor());
+        let last = last.min((self.scan.beams() - 1) as f64);
         if first > last {
             return false;
         }
@@ -210,15 +219,15 @@ pub(crate) fn field(ways: &Ways, cells: &[Cell], traced: &[&Traced]) -> Field {
 /// The parts of a cell: a direction in the scan and a solid angle, which sum to the cell's.
 fn part_directions(cell: &Cell) -> impl Iterator<Item = (Vector3<f64>, f64)> {
     let [along, across] = PARTS;
-    let (azimuth, top) = (cell.azimuth, libm::sin(cell.half_height));
+    let (azimuth, top, cell_width) = (cell.azimuth, libm::sin(cell.half_height), cell.width);
     (0..across).flat_map(move |j| {
         // Slices of equal solid angle are slices of equal sine.
         let z = top * ((2 * j + 1) as f64 / across as f64 - 1.0);
         let radius = (1.0 - z * z).sqrt();
         (0..along).map(move |i| {
-            let at = azimuth + beam::STEP * ((2 * i + 1) as f64 / (2 * along) as f64 - 0.5);
+            let at = azimuth + cell_width * ((2 * i + 1) as f64 / (2 * along) as f64 - 0.5);
             let (sin, cos) = libm::sincos(at);
-            let weight = 2.0 * top * beam::STEP / (along * across) as f64;
+            let weight = 2.0 * top * cell_width / (along * across) as f64;
             (Vector3::new(radius * cos, radius * sin, z), weight)
         })
     })

@@ -7,7 +7,7 @@
 use super::element::Traced;
 use catoptric_cast::Polygon;
 use catoptric_cast::Ray;
-use catoptric_model::{beam, mirror};
+use catoptric_model::mirror;
 use catoptric_sim::build::Structure;
 use catoptric_sim::light::footprint::{SubRay, ray};
 use catoptric_sim::receive::Sensor;
@@ -77,10 +77,10 @@ impl<'a> Outlines<'a> {
             narrow: 0.0,
             weight: 1.0,
         };
-        let azimuth = beam::azimuth(beam);
+        let azimuth = self.sensor.scan().azimuth(beam);
         let mut rays: [Ray; OUTLINE] = std::array::from_fn(|k| ray(shape, azimuth, &self.contour[k]));
         let mut center = ray(shape, azimuth, &chief);
-        let mut neighbor = ray(shape, azimuth + beam::STEP, &chief);
+        let mut neighbor = ray(shape, azimuth + self.sensor.scan().step(), &chief);
         let of_bounce = |(bounce, &facet): (usize, &usize)| {
             let face = &self.structure.facets[facet].face;
             for ray in rays.iter_mut().chain([&mut center, &mut neighbor]) {

@@ -57,7 +57,7 @@ pub(crate) use size::plate_thickness;
 pub use size::{MIRROR_DENSITY, POST_DENSITY, Size};
 pub use ways::Layout;
 
-use catoptric_model::beam;
+use catoptric_model::ScanGeometry;
 use catoptric_sim::build::Structure;
 use catoptric_sim::receive::Sensor;
 use catoptric_sim::{Scene, SimError};
@@ -143,12 +143,12 @@ pub struct Spot {
     pub spacing_mm: f64,
 }
 
-/// Neighboring elements of one class that meet the same things.
+/// Neighboring elements of one class that meet the same things; a run ends where the scan does.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Run {
     /// First and last beam.
     pub beams: [usize; 2],
-    /// Azimuths that they take up in the scan, in degrees.
+    /// Azimuths that they take up in the scan, in degrees, the smaller first.
     pub azimuth_deg: [f64; 2],
     /// Their class.
     pub class: Class,
@@ -174,16 +174,16 @@ fn analysis(layout: &Layout, names: &[&str], traced: &[&Traced], footprints: &[&
         sensor,
         ..
     } = layout;
-    let ways = field::Ways::new(structure, traced);
-    let cells = field::cells(sensor.shape());
-    let elements = element::elements(scene, structure, names, traced, footprints);
+    let ways = field::Ways::new(structure, sensor.scan(), traced);
+    let cells = field::cells(sensor);
+    let elements = element::elements(scene, sensor.scan(), structure, names, traced, footprints);
     let field = field::field(&ways, &cells, traced);
     let mut counts: BTreeMap<Class, usize> = Class::ALL.map(|class| (class, 0)).into();
     for element in &elements {
         *counts.entry(element.class).or_default() += 1;
     }
     let seeing = elements.iter().filter(|e| e.class.sees()).count();
-    let runs = runs(&elements);
+    let runs = runs(&elements, sensor.scan());
     Analysis {
         schema_version: SCHEMA_VERSION,
         name: scene.name.clone(),
@@ -193,7 +193,7 @@ fn analysis(layout: &Layout, names: &[&str], traced: &[&Traced], footprints: &[&
         seeing,
         lost: elements.len() - seeing,
         stopped_by_facets: stopped_by_facets(structure, &elements),
-        largest_gap_deg: largest_gap(&elements),
+        largest_gap_deg: largest_gap(&elements, sensor.scan()),
         field_of_regard: field.covered_sr / SPHERE_SR,
         solid_angle_sr: field.covered_sr,
         direct_field_of_regard: field.direct_sr / SPHERE_SR,
@@ -201,7 +201,7 @@ fn analysis(layout: &Layout, names: &[&str], traced: &[&Traced], footprints: &[&
         elevation_deg: field.elevation_deg,
         elevation_covered_deg: field.elevation_covered_deg,
         azimuth_covered_deg: field.azimuth_covered_deg,
-        facets: facet::facets(structure, &elements, traced, &cells, footprints),
+        facets: facet::facets(sensor.scan(), structure, &elements, traced, &cells, footprints),
         spots: spots(sensor),
         size: size::size(scene, structure),
         accuracy: None,
@@ -224,15 +224,15 @@ fn spots(sensor: &Sensor) -> Vec<Spot> {
             range_m,
             wide_mm: width(shape.wide_aperture_mm, shape.wide_full_mrad, range_m),
             narrow_mm: width(shape.narrow_aperture_mm, shape.narrow_full_mrad, range_m),
-            spacing_mm: 2e3 * range_m * libm::sin(0.5 * beam::STEP),
+            spacing_mm: 2e3 * range_m * libm::sin(0.5 * sensor.scan().step()),
         })
         .to_vec()
 }
 
-fn runs(elements: &[Element]) -> Vec<Run> {
+fn runs(elements: &[Element], scan: &ScanGeometry) -> Vec<Run> {
     let same =
         |a: &Element, b: &Element| a.class == b.class && a.facets == b.facets && a.stopped_by == b.stopped_by;
-    let half_step = 0.5 * beam::STEP.to_degrees();
+    let half_step = 0.5 * scan.step().to_degrees();
     elements
         .chunk_by(same)
         .filter_map(|run| {
@@ -240,8 +240,8 @@ fn runs(elements: &[Element]) -> Vec<Run> {
             Some(Run {
                 beams: [first.beam, last.beam],
                 azimuth_deg: [
-                    first.scan_azimuth_deg - half_step,
-                    last.scan_azimuth_deg + half_step,
+                    first.scan_azimuth_deg.min(last.scan_azimuth_deg) - half_step,
+                    first.scan_azimuth_deg.max(last.scan_azimuth_deg) + half_step,
                 ],
                 class: first.class,
                 facets: first.facets.clone(),
@@ -257,9 +257,19 @@ fn stopped_by_facets(structure: &Structure, elements: &[Element]) -> usize {
     stopped.filter(|name| is_facet(name)).count()
 }
 
-/// The longest run of elements that do not see, in degrees of the scan.
-fn largest_gap(elements: &[Element]) -> f64 {
-    let runs = elements.chunk_by(|a, b| a.class.sees() == b.class.sees());
-    let blind = runs.filter(|run| run.first().is_some_and(|e| !e.class.sees()));
-    blind.map(<[Element]>::len).max().unwrap_or(0) as f64 * beam::STEP.to_degrees()
+/// The longest run of elements that do not see, in degrees of the scan; it goes over the seam of a scan that closes.
+fn largest_gap(elements: &[Element], scan: &ScanGeometry) -> f64 {
+    // From the first element on that sees: before it no run goes on.
+    let sees = |e: &Element| e.class.sees();
+    let start = match scan.closes() {
+        true => elements.iter().position(sees).unwrap_or(0),
+        false => 0,
+    };
+    let (before, after) = elements.split_at(start);
+    let (mut longest, mut run) = (0, 0);
+    for element in after.iter().chain(before) {
+        run = if sees(element) { 0 } else { run + 1 };
+        longest = longest.max(run);
+    }
+    longest as f64 * scan.step().to_degrees()
 }

@@ -49,9 +49,9 @@ impl Shift {
     }
 }
 
-/// How the point of a reading of a beam moves with the faces that its chief ray meets, one for every bounce.
-pub(super) fn shifts<'f>(beam: usize, faces: impl Iterator<Item = &'f Polygon>, range: f64) -> Vec<Shift> {
-    let mut image = Point3::from(beam::direction(beam::azimuth(beam)).into_inner() * range);
+/// How the point of a reading of a beam of this base azimuth moves with the faces that its chief ray meets, one for every bounce.
+pub(super) fn shifts<'f>(azimuth: f64, faces: impl Iterator<Item = &'f Polygon>, range: f64) -> Vec<Shift> {
+    let mut image = Point3::from(beam::direction(azimuth).into_inner() * range);
     let mut shifts: Vec<Shift> = Vec::new();
     for face in faces {
         let m = face.normal.into_inner();
@@ -106,8 +106,8 @@ mod tests {
     }
 
     /// The point of a reading, by reflection after reflection.
-    fn point(faces: &[Polygon], beam: usize, range: f64) -> Point3<f64> {
-        let start = Point3::from(beam::direction(beam::azimuth(beam)).into_inner() * range);
+    fn point(faces: &[Polygon], azimuth: f64, range: f64) -> Point3<f64> {
+        let start = Point3::from(beam::direction(azimuth).into_inner() * range);
         faces.iter().fold(start, |p, f| {
             let m = f.normal.into_inner();
             p - m * (2.0 * m.dot(&(p - f.origin)))
@@ -116,18 +116,20 @@ mod tests {
 
     #[test]
     fn derivatives_over_two_mirrors_are_finite_differences() {
+        /// Ten steps of 0.25°.
+        const AZIMUTH: f64 = 2.5 * std::f64::consts::PI / 180.0;
         let faces = [
             face([0.07, 0.0, 0.0], [-1.0, 0.2, 1.0]),
             face([0.07, 0.02, 0.3], [0.1, 0.4, -1.0]),
         ];
-        let found = shifts(550, faces.iter(), RANGE_M);
+        let found = shifts(AZIMUTH, faces.iter(), RANGE_M);
         assert_eq!(found.len(), 2);
         let step = 1e-5;
         for (number, shift) in found.iter().enumerate() {
             let with = |turn: Vector3<f64>, by: Vector3<f64>| {
                 let mut faces = faces.clone();
                 faces[number] = moved(&faces[number], turn, by);
-                point(&faces, 550, RANGE_M)
+                point(&faces, AZIMUTH, RANGE_M)
             };
             let (a, b) = tangent_basis(&faces[number].normal);
             for (column, axis) in [a, b].into_iter().enumerate() {

@@ -7,7 +7,6 @@
 use super::element::{self, Traced};
 use super::footprint::{Footprint, Outlines};
 use super::{Analysis, Detail};
-use catoptric_model::beam;
 use catoptric_sim::build::Structure;
 use catoptric_sim::light::{Edit, Mirrors, Setting};
 use catoptric_sim::receive::Sensor;
@@ -133,7 +132,7 @@ impl Layout {
             let footprints = outlines.of(&traced);
             Arc::new(Beam { traced, footprints })
         };
-        let beams = (0..beam::COUNT).into_par_iter();
+        let beams = (0..self.sensor.scan().beams()).into_par_iter();
         beams
             .map(|beam| known(beam).unwrap_or_else(|| look(beam)))
             .collect()

@@ -4,6 +4,7 @@ use super::Stated;
 use crate::layout::{Analysis, Requirement};
 use catoptric_model::beam;
 use catoptric_model::place::nearest;
+use catoptric_model::scan::MOST_BEAMS;
 use nalgebra::{Unit, Vector3};
 use serde::Serialize;
 
@@ -118,7 +119,7 @@ impl Wanted {
             [azimuth, elevation, elements] => (azimuth, elevation, elements.parse().map_err(|_| wrong())?),
             _ => return Err(wrong()),
         };
-        if !(1..=beam::COUNT).contains(&elements) {
+        if !(1..=MOST_BEAMS).contains(&elements) {
             return Err(wrong());
         }
         Ok(Self {

@@ -9,12 +9,20 @@ use super::playback::parse_recording;
 use super::*;
 use catoptric_model::frame::{PoseData, yaw_pitch_roll};
 use catoptric_model::session::*;
-use catoptric_model::{Pose, PoseKind, PoseLabel, RangeBias, Session, Stretch, Track, TrackedFrame};
+use catoptric_model::{
+    Pose, PoseKind, PoseLabel, RangeBias, ScanAngles, ScanGeometry, Session, Stretch, Track, TrackedFrame,
+};
 use nalgebra::{Point3, Translation3};
 use std::io::Write;
 use std::path::Path;
 
 const NAME: &str = "x.mcap";
+
+/// A scan of so many beams, 40 times a second.
+fn scan(step_deg: f64, beams: usize) -> ScanGeometry {
+    let angles = ScanAngles::centered(step_deg, beams);
+    ScanGeometry::new(angles, 40.0, None).expect("a scanner can have it")
+}
 
 /// A session with a rig, two boards and a scanner of so many beams.
 fn session(beams: usize) -> Session {
@@ -37,9 +45,7 @@ fn session(beams: usize) -> Session {
         name: "there and back".to_owned(),
         scanner: ScannerSheet {
             preset: "test".to_owned(),
-            beams,
-            step_deg: 0.25,
-            scan_rate_hz: 40.0,
+            scan: scan(0.25, beams),
             range_min_m: 0.023,
             range_max_m: 60.0,
             divergence_full_mrad: 3.0,
@@ -154,8 +160,8 @@ fn stretch(session: &Session, pose: usize, scans: usize, frames: usize, seed: u6
         },
         start_s,
         scan_period_s: 0.025,
-        beams: session.scanner.beams,
-        ranges: ranges(&mut numbers, scans * session.scanner.beams),
+        beams: session.scanner.scan.beams(),
+        ranges: ranges(&mut numbers, scans * session.scanner.scan.beams()),
         echoes: None,
         tracks,
     }

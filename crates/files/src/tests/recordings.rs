@@ -156,7 +156,7 @@ fn another_sessions_recording_is_refused() {
     let error = play(&session(7), &bytes).expect_err("other beams").to_string();
     assert!(error.contains("5 beams, session.toml has 7"), "{error}");
     let mut coarser = session(5);
-    coarser.scanner.step_deg = 0.5;
+    coarser.scanner.scan = scan(0.5, 5);
     let error = play(&coarser, &bytes).expect_err("other angles").to_string();
     assert!(error.contains("in steps of"), "{error}");
 }

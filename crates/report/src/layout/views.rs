@@ -61,8 +61,8 @@ pub(super) fn map(drawn: &Drawn) -> String {
     // Where a lost element would look without the structure.
     for ray in drawing.rays.iter().filter(|r| !r.class.sees()) {
         let (at, half) = (
-            beam::azimuth(ray.beam).to_degrees(),
-            0.5 * beam::STEP.to_degrees(),
+            around(drawing.scan.azimuth(ray.beam).to_degrees()),
+            0.5 * drawing.scan.step().to_degrees(),
         );
         let points = vec![
             (-at - half, -1.2),
@@ -85,7 +85,12 @@ pub(super) fn map(drawn: &Drawn) -> String {
     }
     for (number, facet) in drawn.analysis.facets.iter().enumerate() {
         let of = |r: &&DrawnRay| r.class == Class::Deflected && r.facets.first() == Some(&number);
-        let own: Vec<&DrawnRay> = drawing.rays.iter().filter(of).collect();
+        let mut own: Vec<&DrawnRay> = drawing.rays.iter().filter(of).collect();
+        let beams: Vec<usize> = own.iter().map(|ray| ray.beam).collect();
+        if let Some([begin, _]) = drawing.scan.shortest_run(&beams) {
+            // In the order of the fan, which may go over the seam of the scan.
+            own.rotate_left(beams.partition_point(|beam| *beam < begin));
+        }
         let exit = |place: usize| own.get(place).and_then(|ray| ray.exit).map(|v| degrees(&v));
         let middle = own.len() / 2;
         let (Some(first), Some(at), Some(last)) = (exit(0), exit(middle), exit(own.len().max(1) - 1)) else {
@@ -115,7 +120,7 @@ pub(super) fn cell(drawn: &Drawn, ray: &DrawnRay) -> Vec<Vec<(f64, f64)>> {
         return Vec::new();
     };
     let cell = drawn.drawing.cells[ray.beam];
-    let half = 0.5 * beam::STEP;
+    let half = 0.5 * drawn.drawing.scan.step();
     let corners = [(-half, -1.0), (half, -1.0), (half, 1.0), (-half, 1.0)].map(|(along, across)| {
         let v = turn * beam::spherical(cell.azimuth + along, across * cell.half_height).into_inner();
         degrees(&v)
@@ -166,8 +171,11 @@ fn on_map(corners: [(f64, f64); 4]) -> Vec<Vec<(f64, f64)>> {
 
 /// The scan, with its left on the left: what becomes of every element.
 pub(super) fn scan(drawn: &Drawn) -> String {
+    /// Between ticks, in degrees.
+    const TICK_DEG: f64 = 30.0;
+    let [low, high] = drawn.drawing.scan.range_deg();
     let axes = Axes {
-        x: -136.0..136.0,
+        x: -high - 1.0..-low + 1.0,
         y: 0.0..3.0,
         x_label: "azimuth in the scan, to the left (°)".to_owned(),
         y_label: String::new(),
@@ -190,11 +198,28 @@ pub(super) fn scan(drawn: &Drawn) -> String {
     let shapes = Shapes {
         areas: drawn.analysis.runs.iter().map(area).collect(),
         row_names: vec![(2.5, "sees"), (1.5, "split"), (0.5, "ends")],
-        ticks: [(-4..=4).map(|k| 30.0 * f64::from(k)).collect(), Vec::new()],
+        ticks: [ticks(-high, -low, TICK_DEG), Vec::new()],
         mirrored: true,
         ..Shapes::default()
     };
     fine(STRIP, &axes, "What becomes of the scan", &shapes)
+}
+
+/// Multiples of a step between two values.
+fn ticks(from: f64, to: f64, step: f64) -> Vec<f64> {
+    let first = (from / step).ceil();
+    (0..)
+        .map(|k| step * (first + f64::from(k)))
+        .take_while(|tick| *tick <= to)
+        .collect()
+}
+
+/// An azimuth in degrees within half a turn of the x axis, as the map has it.
+fn around(azimuth_deg: f64) -> f64 {
+    if azimuth_deg.abs() <= 180.0 {
+        return azimuth_deg;
+    }
+    azimuth_deg - 360.0 * (azimuth_deg / 360.0).round()
 }
 
 /// The outline of a facet and the footprints of its beams, in the facet's own plane.
@@ -202,7 +227,12 @@ pub(super) fn footprints(drawn: &Drawn, facet: usize) -> Option<String> {
     let face = &drawn.drawing.facets[facet].face;
     let of = |f: &&Footprint| f.facet == facet;
     let own: Vec<&Footprint> = drawn.drawing.footprints.iter().filter(of).collect();
-    let (first, last) = (own.first()?, own.last()?);
+    let beams: Vec<usize> = own.iter().map(|f| f.beam).collect();
+    let [begin, end] = drawn.drawing.scan.shortest_run(&beams)?;
+    let (first, last) = (
+        own.iter().find(|f| f.beam == begin)?,
+        own.iter().rfind(|f| f.beam == end)?,
+    );
     // To the right as the scan goes, seen from before the mirror.
     let right = (last.center - first.center).try_normalize(1e-9)?;
     let up = face.normal.cross(&right);

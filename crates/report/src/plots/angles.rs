@@ -75,7 +75,7 @@ fn show(dataset: &Dataset, elements: &[Angles], style: &Style) -> String {
     let mut svgs = String::new();
     for (axis, title) in style.titles.iter().enumerate() {
         let dot = |e: &Angles| Dot {
-            x: azimuth_deg(e.beam),
+            x: azimuth_deg(dataset, e.beam),
             y: e.values[axis],
             half_band: if style.with_bands && !e.sigma[axis].is_nan() {
                 2.0 * e.sigma[axis]
@@ -90,7 +90,7 @@ fn show(dataset: &Dataset, elements: &[Angles], style: &Style) -> String {
     let row = |e: &Angles| {
         vec![
             e.beam.to_string(),
-            number(azimuth_deg(e.beam), 2),
+            number(azimuth_deg(dataset, e.beam), 2),
             e.mirror.clone(),
             number(e.values[0], style.decimals),
             number(e.sigma[0], 4),

@@ -15,8 +15,8 @@ const WIDE_GAP_DEG: f64 = 40.0;
 
 /// Azimuths of all beams, with a margin.
 pub(super) fn azimuth_axis(dataset: &Dataset) -> Range<f64> {
-    let last = dataset.session.scanner.beams.saturating_sub(1);
-    azimuth_deg(0) - 1.0..azimuth_deg(last) + 1.0
+    let ends = [0, dataset.session.scanner.scan.beams() - 1].map(|beam| azimuth_deg(dataset, beam));
+    ends[0].min(ends[1]) - 1.0..ends[0].max(ends[1]) + 1.0
 }
 
 /// Errors around zero over azimuth.
@@ -28,6 +28,10 @@ pub(super) fn over_azimuth(dataset: &Dataset, title: &str, dots: &[Dot]) -> Stri
 /// Dots over azimuth; in two plots side by side if a wide sector in the middle has none.
 pub(super) fn parted(dataset: &Dataset, title: &str, unit: &str, y: &Range<f64>, dots: &[Dot]) -> String {
     let whole = azimuth_axis(dataset);
+    // A clockwise scan has its elements the other way round.
+    let mut dots = dots.to_vec();
+    dots.sort_by(|a, b| a.x.total_cmp(&b.x));
+    let step_deg = dataset.session.scanner.scan.step().to_degrees();
     let gap = dots
         .iter()
         .zip(dots.iter().skip(1))
@@ -48,7 +52,10 @@ pub(super) fn parted(dataset: &Dataset, title: &str, unit: &str, y: &Range<f64>,
             x_label: "Base azimuth of the element (°)".to_owned(),
             y_label: unit.to_owned(),
         };
-        svgs += &format!("<div>{}</div>", figure::per_beam(size, &axes, title, &inside));
+        svgs += &format!(
+            "<div>{}</div>",
+            figure::per_beam(size, &axes, title, step_deg, &inside)
+        );
     }
     format!("<div class=\"plot\"><h4>{title}</h4><div class=\"views\">{svgs}</div></div>\n")
 }

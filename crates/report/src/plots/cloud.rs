@@ -14,7 +14,7 @@ pub const MOST_POINTS: usize = 6000;
 /// The cloud from above.
 pub(crate) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud: &CloudSketch) -> String {
     let sheet = &cloud.sheet;
-    let facets: Vec<Option<usize>> = (0..dataset.session.scanner.beams)
+    let facets: Vec<Option<usize>> = (0..dataset.session.scanner.scan.beams())
         .map(|b| facet_of(dataset, calibration?.beam(b)?))
         .collect();
     let points: Vec<(f64, f64, RGBColor)> = cloud

@@ -2,7 +2,7 @@
 
 use super::super::figure;
 use catoptric_model::session::NominalFacet;
-use catoptric_model::{BeamEstimate, Calibration, Dataset, Deflection, beam};
+use catoptric_model::{BeamEstimate, Calibration, Dataset, Deflection};
 use plotters::style::{BLACK, RGBColor};
 
 /// An element with a direction.
@@ -37,8 +37,8 @@ pub(super) fn legend(dataset: &Dataset) -> Vec<(String, String)> {
 }
 
 /// Azimuth at which the scanner sends a beam out, in degrees.
-pub(super) fn azimuth_deg(beam: usize) -> f64 {
-    beam::azimuth(beam).to_degrees()
+pub(super) fn azimuth_deg(dataset: &Dataset, beam: usize) -> f64 {
+    dataset.session.scanner.scan.azimuth(beam).to_degrees()
 }
 
 /// Name of a facet by its number; a dash for an element of none.
@@ -53,6 +53,6 @@ pub(super) fn facet_of(dataset: &Dataset, estimate: &BeamEstimate) -> Option<usi
         Some(name) => facets.iter().position(|f| &f.name == name),
         None => facets
             .iter()
-            .position(|f| (f.beams[0]..=f.beams[1]).contains(&estimate.beam)),
+            .position(|f| dataset.session.scanner.scan.holds(f.beams, estimate.beam)),
     }
 }

@@ -83,7 +83,7 @@ pub(crate) fn fans(dataset: &Dataset, calibration: &Calibration) -> String {
         rows.push(vec![
             facet_name(dataset, facet),
             of.len().to_string(),
-            range(&|s| azimuth_deg(s.estimate.beam), 1),
+            range(&|s| azimuth_deg(dataset, s.estimate.beam), 1),
             range(&|s| s.deflection.azimuth.to_degrees(), 1),
             range(&|s| s.deflection.elevation.to_degrees(), 1),
             range(&|s| s.deflection.distance * 1e3, 1),
@@ -101,6 +101,7 @@ fn strokes(
     view: impl Fn(&Point3<f64>) -> (f64, f64),
 ) -> Vec<Stroke> {
     let far = 1.5 * REACH_M;
+    let scan = &dataset.session.scanner.scan;
     let mut strokes = Vec::new();
     let ray = |points: &[Point3<f64>], color, width, opacity| Stroke {
         points: points.iter().map(&view).collect(),
@@ -110,11 +111,11 @@ fn strokes(
     };
     let direct = calibration.beams.iter().filter(|b| b.status == Status::Direct);
     for b in direct.filter(|b| b.beam % DIRECT_STEP == 0) {
-        let end = Point3::from(beam::direction(beam::azimuth(b.beam)).into_inner() * reach.min(REACH_M));
+        let end = Point3::from(beam::direction(scan.azimuth(b.beam)).into_inner() * reach.min(REACH_M));
         strokes.push(ray(&[Point3::origin(), end], GRID, 1, 0.9));
     }
     for s in solved.iter().filter(|s| s.estimate.beam % RAY_STEP == 0) {
-        let azimuth = beam::azimuth(s.estimate.beam);
+        let azimuth = scan.azimuth(s.estimate.beam);
         let mirror = s.deflection.deflection_point(azimuth);
         let exit = s.deflection.exit_direction(azimuth).into_inner();
         let length = if reach < REACH_M { reach } else { REACH_M };
@@ -142,7 +143,7 @@ fn labels(
         let Some(middle) = of.get(of.len() / 2) else {
             continue;
         };
-        let azimuth = beam::azimuth(middle.estimate.beam);
+        let azimuth = dataset.session.scanner.scan.azimuth(middle.estimate.beam);
         let exit = middle.deflection.exit_direction(azimuth).into_inner();
         let mut at = view(&(middle.deflection.deflection_point(azimuth) + exit * reach * 0.98));
         // A word that falls on another one moves towards the middle by a line.

@@ -16,7 +16,7 @@ pub(crate) fn residuals(dataset: &Dataset, calibration: &Calibration) -> String 
     let dots: Vec<Dot> = of
         .iter()
         .map(|(s, mm)| Dot {
-            x: azimuth_deg(s.estimate.beam),
+            x: azimuth_deg(dataset, s.estimate.beam),
             y: *mm,
             half_band: 0.0,
             color: color_of(s.facet),
@@ -30,7 +30,7 @@ pub(crate) fn residuals(dataset: &Dataset, calibration: &Calibration) -> String 
         .map(|(s, mm)| {
             vec![
                 s.estimate.beam.to_string(),
-                number(azimuth_deg(s.estimate.beam), 2),
+                number(azimuth_deg(dataset, s.estimate.beam), 2),
                 facet_name(dataset, s.facet),
                 number(*mm, 2),
                 count(s.estimate.poses),

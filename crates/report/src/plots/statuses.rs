@@ -6,7 +6,7 @@ use super::azimuth::azimuth_axis;
 use super::elements::azimuth_deg;
 use catoptric_assess::score::counts::absent;
 use catoptric_assess::score::words::{abstentions, spelled};
-use catoptric_model::{Calibration, Dataset, Status, beam};
+use catoptric_model::{Calibration, Dataset, Status};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
 use plotters::style::RGBColor;
@@ -17,7 +17,7 @@ const STRIP: (u32, u32) = (980, 150);
 /// What the calibration says of every element, and what is true.
 pub(crate) fn statuses(dataset: &Dataset, calibration: &Calibration, truth: Option<&Truth>) -> String {
     let found = calibration.beams.iter().map(|b| (b.beam, status_color(b.status)));
-    let mut bars = runs(0, found);
+    let mut bars = runs(dataset, 0, found);
     let mut legend: Vec<(String, String)> = Status::ALL
         .iter()
         .filter(|s| calibration.beams.iter().any(|b| b.status == **s))
@@ -25,6 +25,7 @@ pub(crate) fn statuses(dataset: &Dataset, calibration: &Calibration, truth: Opti
         .collect();
     if let Some(truth) = truth {
         bars.extend(runs(
+            dataset,
             1,
             truth.beams.iter().map(|b| (b.beam, class_color(b.status).0)),
         ));
@@ -99,14 +100,17 @@ fn class_color(class: BeamClass) -> (RGBColor, &'static str) {
 }
 
 /// One bar for each run of neighbouring elements of the same color.
-fn runs(row: usize, elements: impl Iterator<Item = (usize, RGBColor)>) -> Vec<Bar> {
-    let half = 0.5 * beam::STEP.to_degrees();
+fn runs(dataset: &Dataset, row: usize, elements: impl Iterator<Item = (usize, RGBColor)>) -> Vec<Bar> {
+    let half = 0.5 * dataset.session.scanner.scan.step().to_degrees();
     let mut bars: Vec<Bar> = Vec::new();
     for (beam, color) in elements {
-        let x = azimuth_deg(beam) - half..azimuth_deg(beam) + half;
+        let x = azimuth_deg(dataset, beam) - half..azimuth_deg(dataset, beam) + half;
         match bars.last_mut() {
             // Neighbours share an edge up to rounding.
             Some(last) if last.color == color && (last.x.end - x.start).abs() < half => last.x.end = x.end,
+            Some(last) if last.color == color && (last.x.start - x.end).abs() < half => {
+                last.x.start = x.start
+            }
             _ => bars.push(Bar { x, row, color }),
         }
     }

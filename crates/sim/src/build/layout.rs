@@ -2,18 +2,18 @@
 
 use crate::scene::{FacetShape, Plate, RectangleShape, Wedge};
 use catoptric_cast::area_vector;
-use catoptric_model::beam;
-use catoptric_model::mirror;
+use catoptric_model::{ScanGeometry, beam, mirror};
 use nalgebra::{Point3, Unit, Vector3};
 
-/// Corners of a facet as drawn, in metres, counter-clockwise seen from the reflecting side.
+/// Corners of a facet as drawn, in metres, counter-clockwise seen from the reflecting side; the scan is that of beams named
+/// by their index.
 ///
 /// `None` if the description spans no mirror: a beam that is not deflected, a plane that one of the two azimuths
 /// does not meet, a normal of zero length.
-pub fn corners(shape: &FacetShape) -> Option<Vec<Point3<f64>>> {
+pub fn corners(shape: &FacetShape, scan: &ScanGeometry) -> Option<Vec<Point3<f64>>> {
     match shape {
         FacetShape::Wedge(wedge) => wedge_corners(wedge),
-        FacetShape::Plate(plate) => plate_corners(plate),
+        FacetShape::Plate(plate) => plate_corners(plate, scan),
         FacetShape::Rectangle(rectangle) => rectangle_corners(rectangle),
         FacetShape::Polygon(polygon) => Some(
             polygon
@@ -54,14 +54,14 @@ fn wedge_corners(wedge: &Wedge) -> Option<Vec<Point3<f64>>> {
 }
 
 /// Azimuth of the beam that a plate is drawn about, in degrees.
-pub(crate) fn plate_azimuth_deg(plate: &Plate) -> Option<f64> {
-    let of_beam = |b: u32| beam::azimuth(b as usize).to_degrees();
+pub(crate) fn plate_azimuth_deg(plate: &Plate, scan: &ScanGeometry) -> Option<f64> {
+    let of_beam = |b: u32| scan.azimuth(b as usize).to_degrees();
     plate.azimuth_deg.or(plate.beam.map(of_beam))
 }
 
 /// The rectangle about the point where the beam meets it.
-fn plate_corners(plate: &Plate) -> Option<Vec<Point3<f64>>> {
-    let u = beam::direction(plate_azimuth_deg(plate)?.to_radians());
+fn plate_corners(plate: &Plate, scan: &ScanGeometry) -> Option<Vec<Point3<f64>>> {
+    let u = beam::direction(plate_azimuth_deg(plate, scan)?.to_radians());
     let toward = |azimuth: f64, elevation: f64| beam::spherical(azimuth.to_radians(), elevation.to_radians());
     let exit = plate.exit_azimuth_deg.zip(plate.exit_elevation_deg);
     let normal = plate.normal_azimuth_deg.zip(plate.normal_elevation_deg);

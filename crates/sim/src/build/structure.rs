@@ -280,7 +280,9 @@ fn build_facet(
         name: facet.name.clone(),
         reason: reason.to_owned(),
     };
-    let drawn = layout::corners(&facet.shape).ok_or_else(|| fail("no plane mirror fits its description"))?;
+    let scan = scene.scanner.scan()?;
+    let drawn =
+        layout::corners(&facet.shape, &scan).ok_or_else(|| fail("no plane mirror fits its description"))?;
     let as_built = &scene.superstructure.as_built;
     let error = seed_and_index.map_or_else(Pose::identity, |(seed, index)| {
         let mut draws = Draws::new(seed, Purpose::FacetPose, index);

@@ -2,12 +2,12 @@
 
 use super::findings::{Findings, suggestion};
 use super::outline::{Meets, Obstacles, nominal_room_from_sensor};
-use super::structure::{SCAN_HALF_DEG, rounded};
+use super::structure::{reach, rounded};
 use crate::build::board::{before_beam, stands_in};
 use crate::scene::{Board, BoardPose, Scene, SensorTest};
 use catoptric_model::frame::yaw_pitch_roll;
 use catoptric_model::place::Path;
-use catoptric_model::{BoardPlane, Pose, Rectangle, beam};
+use catoptric_model::{BoardPlane, Pose, Rectangle, ScanGeometry, beam};
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// Names of the two walls of each axis.
@@ -17,15 +17,16 @@ const WALLS: [[&str; 2]; 3] = [
     ["floor", "ceiling"],
 ];
 
-pub(super) fn check(scene: &Scene, found: &mut Findings) {
+pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     let before = found.0.len();
-    check_rig(scene, found);
+    check_rig(scene, scan, found);
     let rig_has_its_place = found.0.len() == before;
     check_boards(scene, found);
-    let obstacles = Obstacles::of(scene);
+    let obstacles = Obstacles::of(scene, scan);
     let met = obstacles.met_by_beams();
     let bench = Bench {
         scene,
+        scan,
         room_from_sensor: nominal_room_from_sensor(scene),
         obstacles,
         met,
@@ -59,7 +60,7 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
     }
 }
 
-fn check_rig(scene: &Scene, found: &mut Findings) {
+fn check_rig(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     let room = &scene.room;
     let path = Path::of("room").key("rig_position_m");
     let rig = Point3::from(Vector3::from(room.rig_position_m));
@@ -85,7 +86,7 @@ fn check_rig(scene: &Scene, found: &mut Findings) {
         return;
     }
     for (i, facet) in scene.superstructure.facet.iter().enumerate() {
-        let corners = crate::build::layout::corners(&facet.shape).unwrap_or_default();
+        let corners = crate::build::layout::corners(&facet.shape, scan).unwrap_or_default();
         let beyond = corners
             .iter()
             .find_map(|c| outside(&(room_from_sensor * c), &room.size_m));
@@ -178,6 +179,7 @@ fn room_from_board(pose: &BoardPose) -> Option<Pose> {
 /// The experiment as drawn.
 struct Bench<'a> {
     scene: &'a Scene,
+    scan: &'a ScanGeometry,
     room_from_sensor: Pose,
     obstacles: Obstacles,
     met: Vec<Option<Meets>>,
@@ -263,7 +265,15 @@ impl Bench<'_> {
         if !place {
             return;
         }
-        let beam = beam::nearest(test.azimuth_deg.to_radians());
+        let beam = self.scan.nearest(test.azimuth_deg.to_radians());
+        if beam.is_none() {
+            found.add(
+                &path.key("azimuth_deg"),
+                format_args!("is {}°; {}", test.azimuth_deg, reach(self.scan)),
+                None,
+            );
+            return;
+        }
         if let Some(met) = beam.and_then(|b| self.met[b]) {
             let what = match met {
                 Meets::Facet(facet) => format!("facet {:?}", scene.superstructure.facet[facet].name),
@@ -302,13 +312,13 @@ impl Bench<'_> {
     fn check_direct(&self, outline: &Rectangle, sensor_from_board: &Pose, path: &Path, found: &mut Findings) {
         let center = sensor_from_board.translation.vector;
         let azimuth = libm::atan2(center.y, center.x).to_degrees();
-        if azimuth.abs() > SCAN_HALF_DEG {
+        if self.scan.nearest(azimuth.to_radians()).is_none() {
             found.add(
                 &path.key("center_m"),
                 format_args!(
-                    "puts the board behind the sensor: at azimuth {}°, the scan reaches from -{SCAN_HALF_DEG}° \
-                     to {SCAN_HALF_DEG}°",
-                    rounded(azimuth)
+                    "puts the board behind the sensor: at azimuth {}°, {}",
+                    rounded(azimuth),
+                    reach(self.scan)
                 ),
                 self.forward_help(),
             );
@@ -319,7 +329,7 @@ impl Bench<'_> {
             return;
         }
         let direct = self.met.iter().enumerate().filter(|(_, met)| met.is_none());
-        let mut rays = direct.map(|(i, _)| (Point3::origin(), beam::direction(beam::azimuth(i))));
+        let mut rays = direct.map(|(i, _)| (Point3::origin(), beam::direction(self.scan.azimuth(i))));
         if !rays.any(|(origin, v)| meets(outline, sensor_from_board, &origin, &v)) {
             found.add(
                 &path.key("center_m"),
@@ -346,10 +356,10 @@ impl Bench<'_> {
         let Some(face) = &self.obstacles.facets[facet] else {
             return;
         };
-        let rays: Vec<(Point3<f64>, Unit<Vector3<f64>>)> = (0..beam::COUNT)
+        let rays: Vec<(Point3<f64>, Unit<Vector3<f64>>)> = (0..self.scan.beams())
             .filter(|i| self.met[*i] == Some(Meets::Facet(facet)))
             .filter_map(|i| {
-                let azimuth = beam::azimuth(i);
+                let azimuth = self.scan.azimuth(i);
                 let deflection = face.deflect(&beam::direction(azimuth))?;
                 Some((
                     deflection.deflection_point(azimuth),

@@ -8,6 +8,7 @@ use crate::build::layout;
 use crate::build::structure;
 use crate::build::trajectory::{self, Trajectory};
 use crate::scene::{Flight, Scene};
+use catoptric_model::ScanGeometry;
 use catoptric_model::place::Path;
 use nalgebra::{Point3, Vector3};
 
@@ -17,7 +18,7 @@ const HALF_TURN_MARGIN_DEG: f64 = 1.0;
 /// Places between two waypoints at which the way is looked at.
 const STEPS: u32 = 32;
 
-pub(super) fn check(scene: &Scene, found: &mut Findings) {
+pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     let flights = Path::of("flight");
     distinct(&flights, scene.flight.iter().map(|f| f.name.as_str()), found);
     for (i, flight) in scene.flight.iter().enumerate() {
@@ -26,9 +27,9 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
         check_times(flight, &path, found);
         check_turns(flight, &path, found);
         if found.0.len() == before {
-            check_scans(scene, flight, &path, found);
+            check_scans(scan, flight, &path, found);
             if scene.room.has_walls() {
-                check_way(scene, flight, &path, found);
+                check_way(scene, scan, flight, &path, found);
             }
         }
     }
@@ -77,8 +78,8 @@ fn check_turns(flight: &Flight, path: &Path, found: &mut Findings) {
     }
 }
 
-fn check_scans(scene: &Scene, flight: &Flight, path: &Path, found: &mut Findings) {
-    let period = scene.scanner.limits().scan_period_s();
+fn check_scans(scan: &ScanGeometry, flight: &Flight, path: &Path, found: &mut Findings) {
+    let period = scan.scan_period_s();
     let whole = flight.whole_scans(period);
     let duration = rounded(flight.duration_s());
     if whole == 0 {
@@ -98,13 +99,13 @@ fn check_scans(scene: &Scene, flight: &Flight, path: &Path, found: &mut Findings
 }
 
 /// The rig, the sensor and the mirrors have to stay inside the walls all the way.
-fn check_way(scene: &Scene, flight: &Flight, path: &Path, found: &mut Findings) {
+fn check_way(scene: &Scene, scan: &ScanGeometry, flight: &Flight, path: &Path, found: &mut Findings) {
     let Some(way) = Trajectory::of(flight) else { return };
     let rig_from_sensor = structure::nominal_mount(scene);
     let mut parts = vec![("rig".to_owned(), Point3::origin())];
     parts.push(("sensor".to_owned(), rig_from_sensor * Point3::origin()));
     for facet in &scene.superstructure.facet {
-        let corners = layout::corners(&facet.shape).unwrap_or_default();
+        let corners = layout::corners(&facet.shape, scan).unwrap_or_default();
         parts.extend(
             corners
                 .iter()

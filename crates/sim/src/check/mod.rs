@@ -16,7 +16,7 @@ mod values;
 pub use outline::{Outline, ServedFacet, outline};
 
 use crate::scene::Scene;
-use catoptric_model::place::Problem;
+use catoptric_model::place::{Path, Problem};
 use findings::Findings;
 
 /// Everything that is wrong with a scene.
@@ -24,14 +24,23 @@ pub fn problems(scene: &Scene) -> Vec<Problem> {
     let mut found = Findings(Vec::new());
     values::check(scene, &mut found);
     stage::check(scene, &mut found);
+    let scan = match scene.scanner.scan() {
+        Ok(scan) => scan,
+        Err(error) => {
+            let path = Path::of("scanner").key("custom").key(error.key);
+            found.add(&path, error.problem, None);
+            // Nothing can be said of beams that there are not.
+            return found.0;
+        }
+    };
     // Where there is no laboratory, structure and procedure have nothing to be checked against.
     if !scene.has_no_laboratory() {
-        structure::check(scene, &mut found);
+        structure::check(scene, &scan, &mut found);
         if scene.room.has_walls() {
-            experiment::check(scene, &mut found);
+            experiment::check(scene, &scan, &mut found);
             mishap::check(scene, &mut found);
         }
-        flight::check(scene, &mut found);
+        flight::check(scene, &scan, &mut found);
     }
     found.0
 }

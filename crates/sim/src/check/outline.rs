@@ -8,7 +8,7 @@ use catoptric_cast::Ray;
 use catoptric_cast::Shape;
 use catoptric_model::beam;
 use catoptric_model::frame::yaw_pitch_roll;
-use catoptric_model::{Deflection, MirrorPlane, Pose};
+use catoptric_model::{Deflection, MirrorPlane, Pose, ScanGeometry};
 use nalgebra::{Point3, Translation3, Unit, Vector3};
 
 /// What the beams of a scan are for, from the drawing alone.
@@ -33,7 +33,9 @@ pub struct ServedFacet {
 
 /// What the beams of a scan are for, from the drawing alone.
 pub fn outline(scene: &Scene) -> Outline {
-    let met = Obstacles::of(scene).met_by_beams();
+    // Of a scanner that cannot be, the checks have said so.
+    let scan = scene.scanner.scan().unwrap_or_default();
+    let met = Obstacles::of(scene, &scan).met_by_beams();
     let facets: Vec<ServedFacet> = scene
         .superstructure
         .facet
@@ -49,7 +51,7 @@ pub fn outline(scene: &Scene) -> Outline {
     Outline {
         facets,
         direct_beams,
-        blocked_beams: beam::COUNT - direct_beams - served,
+        blocked_beams: scan.beams() - direct_beams - served,
     }
 }
 
@@ -80,6 +82,7 @@ struct Block {
 pub(super) struct Obstacles {
     pub(super) facets: Vec<Option<Face>>,
     posts: Vec<Solid>,
+    scan: ScanGeometry,
 }
 
 /// An opaque body.
@@ -156,9 +159,9 @@ impl Block {
 }
 
 impl Obstacles {
-    pub(super) fn of(scene: &Scene) -> Self {
+    pub(super) fn of(scene: &Scene, scan: &ScanGeometry) -> Self {
         let drawn = &scene.superstructure;
-        let face = |shape| layout::corners(shape).and_then(Face::new);
+        let face = |shape| layout::corners(shape, scan).and_then(Face::new);
         let facets = drawn.facet.iter().map(|f| face(&f.shape)).collect();
         let posts = drawn.post.iter().map(|post| match (post.size_mm, &post.shape) {
             (Some(size), None) => {
@@ -179,6 +182,7 @@ impl Obstacles {
         Self {
             facets,
             posts: posts.collect(),
+            scan: *scan,
         }
     }
 
@@ -203,8 +207,8 @@ impl Obstacles {
 
     /// What every beam of a scan meets first.
     pub(super) fn met_by_beams(&self) -> Vec<Option<Meets>> {
-        (0..beam::COUNT)
-            .map(|i| self.met_by(&beam::direction(beam::azimuth(i))))
+        (0..self.scan.beams())
+            .map(|i| self.met_by(&beam::direction(self.scan.azimuth(i))))
             .collect()
     }
 

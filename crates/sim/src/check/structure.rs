@@ -5,8 +5,8 @@ use super::outline::{Face, Meets, Obstacles};
 use super::values::distinct;
 use crate::build::layout;
 use crate::scene::{Facet, FacetShape, Marker, Plate, RectangleShape, Scanner, Scene, Wedge};
-use catoptric_model::beam;
 use catoptric_model::place::Path;
+use catoptric_model::{ScanGeometry, beam};
 use nalgebra::{Point3, Unit, Vector3};
 
 /// Corners nearer than this are one corner, and a polygon narrower than this is a line: no cutter is better.
@@ -16,10 +16,7 @@ const CUTTING_ERROR_M: f64 = 1e-5;
 /// Markers nearer than this to one line do not fix the turn about it: cameras see a marker to some tenths of it.
 const MARKER_SPREAD_M: f64 = 1e-3;
 
-/// Half the field of view of the scan, in degrees.
-pub(super) const SCAN_HALF_DEG: f64 = 135.0;
-
-pub(super) fn check(scene: &Scene, found: &mut Findings) {
+pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     let structure = Path::of("superstructure");
     if !scene.superstructure.pattern.is_empty() {
         found.add(
@@ -28,17 +25,17 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
             "io::scene does so as it reads a file, sim::pattern::expand by itself".to_owned(),
         );
     }
-    let obstacles = Obstacles::of(scene);
+    let obstacles = Obstacles::of(scene, scan);
     let met = obstacles.met_by_beams();
     for (i, facet) in scene.superstructure.facet.iter().enumerate() {
         let path = structure.key("facet").index(i).key("shape");
         let before = found.0.len();
         match &facet.shape {
-            FacetShape::Wedge(wedge) => check_wedge(wedge, &path.key("wedge"), found),
-            FacetShape::Plate(plate) => check_plate(plate, &path.key("plate"), found),
-            FacetShape::Rectangle(shape) => check_rectangle(shape, &path.key("rectangle"), found),
+            FacetShape::Wedge(wedge) => check_wedge(wedge, scan, &path.key("wedge"), found),
+            FacetShape::Plate(plate) => check_plate(plate, scan, &path.key("plate"), found),
+            FacetShape::Rectangle(shape) => check_rectangle(shape, scan, &path.key("rectangle"), found),
             FacetShape::Polygon(shape) => {
-                let corners = layout::corners(&facet.shape).unwrap_or_default();
+                let corners = layout::corners(&facet.shape, scan).unwrap_or_default();
                 let path = path.key("polygon").key("corners_mm");
                 if shape.corners_mm.len() >= 3 {
                     check_polygon(&corners, &path, found);
@@ -49,7 +46,7 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
         if found.0.len() == before
             && let Some(face) = &obstacles.facets[i]
         {
-            check_reach(scene, i, face, &met, found);
+            check_reach(scene, scan, i, face, &met, found);
         }
     }
     for (i, post) in scene.superstructure.post.iter().enumerate() {
@@ -112,7 +109,7 @@ fn check_housing(scanner: &Scanner, found: &mut Findings) {
     }
 }
 
-fn check_wedge(wedge: &Wedge, path: &Path, found: &mut Findings) {
+fn check_wedge(wedge: &Wedge, scan: &ScanGeometry, path: &Path, found: &mut Findings) {
     let [first, last] = wedge.azimuth_deg;
     let azimuths = path.key("azimuth_deg");
     if first >= last {
@@ -123,17 +120,16 @@ fn check_wedge(wedge: &Wedge, path: &Path, found: &mut Findings) {
         );
         return;
     }
-    if first.abs().max(last.abs()) > SCAN_HALF_DEG {
+    if !covers(scan, first, last) {
         found.add(
             &azimuths,
-            format_args!(
-                "is [{first}, {last}]°; the scan reaches from -{SCAN_HALF_DEG}° to {SCAN_HALF_DEG}°"
-            ),
+            format_args!("is [{first}, {last}]°; {}", reach(scan)),
             "a mirror behind the scanner would get no light".to_owned(),
         );
         return;
     }
-    if last - first < beam::STEP.to_degrees() {
+    let step_deg = scan.angles().step_deg;
+    if last - first < step_deg {
         let radians = last.abs().max(first.abs()) <= std::f64::consts::PI;
         let in_degrees = || {
             let [a, b] = [first, last].map(|v| rounded(v.to_degrees()));
@@ -144,13 +140,13 @@ fn check_wedge(wedge: &Wedge, path: &Path, found: &mut Findings) {
             format_args!(
                 "spans {}°; a mirror needs at least the {}° between two beams",
                 rounded(last - first),
-                beam::STEP.to_degrees()
+                rounded(step_deg)
             ),
             radians.then(in_degrees),
         );
         return;
     }
-    if layout::corners(&FacetShape::Wedge(wedge.clone())).is_none() {
+    if layout::corners(&FacetShape::Wedge(wedge.clone()), scan).is_none() {
         let middle = 0.5 * (first + last);
         let u = beam::direction(middle.to_radians());
         let v = beam::spherical(
@@ -170,13 +166,21 @@ fn check_wedge(wedge: &Wedge, path: &Path, found: &mut Findings) {
     }
 }
 
-fn check_plate(plate: &Plate, path: &Path, found: &mut Findings) {
+fn check_plate(plate: &Plate, scan: &ScanGeometry, path: &Path, found: &mut Findings) {
     match (plate.azimuth_deg, plate.beam) {
         (Some(_), Some(_)) => found.add(
             &path.key("beam"),
             "names a beam, and `azimuth_deg` another",
             "delete one of the two".to_owned(),
         ),
+        (None, Some(beam)) if beam as usize >= scan.beams() => {
+            found.add(
+                &path.key("beam"),
+                format_args!("is {beam}; 0 to {} is allowed", scan.beams() - 1),
+                None,
+            );
+            return;
+        }
         (None, None) => found.add(
             path,
             "says of no beam that it meets its center",
@@ -197,7 +201,7 @@ fn check_plate(plate: &Plate, path: &Path, found: &mut Findings) {
         return;
     }
     let one_beam = plate.azimuth_deg.is_some() != plate.beam.is_some();
-    match layout::corners(&FacetShape::Plate(plate.clone())) {
+    match layout::corners(&FacetShape::Plate(plate.clone()), scan) {
         Some(corners) => {
             let help = "turn the normal round: it points from the mirror towards the scanner's side";
             check_side(&corners, path, help, found);
@@ -211,8 +215,8 @@ fn check_plate(plate: &Plate, path: &Path, found: &mut Findings) {
     }
 }
 
-fn check_rectangle(shape: &RectangleShape, path: &Path, found: &mut Findings) {
-    let Some(corners) = layout::corners(&FacetShape::Rectangle(shape.clone())) else {
+fn check_rectangle(shape: &RectangleShape, scan: &ScanGeometry, path: &Path, found: &mut Findings) {
+    let Some(corners) = layout::corners(&FacetShape::Rectangle(shape.clone()), scan) else {
         let path = path.key("normal");
         found.add(
             &path,
@@ -326,14 +330,21 @@ fn check_side(corners: &[Point3<f64>], path: &Path, help: &str, found: &mut Find
     }
 }
 
-fn check_reach(scene: &Scene, index: usize, face: &Face, met: &[Option<Meets>], found: &mut Findings) {
+fn check_reach(
+    scene: &Scene,
+    scan: &ScanGeometry,
+    index: usize,
+    face: &Face,
+    met: &[Option<Meets>],
+    found: &mut Findings,
+) {
     if met.contains(&Some(Meets::Facet(index))) {
         return;
     }
     let path = Path::of("superstructure").key("facet").index(index);
     let name = |facet: &Facet| format!("{:?}", facet.name);
-    let reached: Vec<usize> = (0..beam::COUNT)
-        .filter(|i| face.distance(&beam::direction(beam::azimuth(*i))).is_some())
+    let reached: Vec<usize> = (0..scan.beams())
+        .filter(|i| face.distance(&beam::direction(scan.azimuth(*i))).is_some())
         .collect();
     if let Some(hider) = reached.iter().find_map(|i| met[*i]) {
         let hider = match hider {
@@ -363,11 +374,11 @@ fn check_reach(scene: &Scene, index: usize, face: &Face, met: &[Option<Meets>], 
     found.add(
         &path,
         format_args!(
-            "is not reached by any beam: its corners are at azimuths {}° to {}°, the scan reaches from \
-             -{SCAN_HALF_DEG}° to {SCAN_HALF_DEG}° in steps of {}°",
+            "is not reached by any beam: its corners are at azimuths {}° to {}°, {} in steps of {}°",
             rounded(low),
             rounded(high),
-            beam::STEP.to_degrees()
+            reach(scan),
+            rounded(scan.angles().step_deg)
         ),
         None,
     );
@@ -428,6 +439,19 @@ fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
         (low.min(v), high.max(v))
     })
+}
+
+/// Whether a scan sees everything from one azimuth to another, in degrees, the smaller first.
+fn covers(scan: &ScanGeometry, first: f64, last: f64) -> bool {
+    let [low, high] = scan.range_deg();
+    let around = |turn: f64| low <= first + turn && last + turn <= high;
+    scan.closes() || [-360.0, 0.0, 360.0].into_iter().any(around)
+}
+
+/// How far a scan reaches, in words.
+pub(super) fn reach(scan: &ScanGeometry) -> String {
+    let [low, high] = scan.range_deg().map(rounded);
+    format!("the scan reaches from {low}° to {high}°")
 }
 
 /// Three decimals: as much as a message needs.

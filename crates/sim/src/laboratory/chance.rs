@@ -7,13 +7,14 @@ use super::setup::Laboratory;
 use crate::noise::{Columns, Draws, Purpose};
 use crate::receive::reading::{Chance, MAX_ECHOES};
 use crate::scene::{Correlated, ErrorModel, Scene};
-use catoptric_model::beam;
+use catoptric_model::ScanGeometry;
 use std::sync::Arc;
 
 /// What is by chance in all readings of a stretch, and how what is new in every scan is drawn.
 #[derive(Clone)]
 pub(super) struct Luck<'a> {
     scene: &'a Scene,
+    geometry: &'a ScanGeometry,
     seed: u64,
     drift: f64,
     /// Constant error of every beam; empty without any.
@@ -71,6 +72,7 @@ impl Laboratory {
     pub(super) fn luck(&self, number: usize) -> Luck<'_> {
         Luck {
             scene: &self.scene,
+            geometry: self.sensor.scan(),
             seed: self.seed,
             drift: self.drift(number),
             elements: self.elements(number).into(),
@@ -86,7 +88,7 @@ impl Laboratory {
             return Vec::new();
         }
         let mut draws = Draws::new(self.seed, Purpose::Element, number as u64);
-        (0..beam::COUNT)
+        (0..self.sensor.scan().beams())
             .map(|beam| {
                 draws.seek(beam as u64);
                 sd * draws.normal()
@@ -128,7 +130,12 @@ impl Luck<'_> {
     pub(super) fn innovations(&self, scan: usize, columns: &mut Columns, out: &mut Vec<f64>) {
         out.clear();
         if self.correlated().is_some() {
-            columns.draw(beam::COUNT, self.seed, Purpose::Correlated, self.row(scan));
+            columns.draw(
+                self.geometry.beams(),
+                self.seed,
+                Purpose::Correlated,
+                self.row(scan),
+            );
             columns.normals(0, out);
         }
     }
@@ -137,14 +144,14 @@ impl Luck<'_> {
     /// xₖ = φ·xₖ₋₁ + √(1 − φ²)·εₖ.
     pub(super) fn remember(&self, scan: usize, memory: &mut Memory, innovations: &mut [f64]) {
         let Some(law) = self.correlated() else { return };
-        let period_s = self.scene.scanner.limits().scan_period_s();
+        let period_s = self.geometry.scan_period_s();
         let share = if scan == 0 {
             0.0
         } else {
             libm::exp(-period_s / law.time_constant_s)
         };
         let fresh = (1.0 - share * share).sqrt();
-        memory.states.resize(beam::COUNT, 0.0);
+        memory.states.resize(self.geometry.beams(), 0.0);
         for (state, innovation) in memory.states.iter_mut().zip(innovations) {
             *state = share * *state + fresh * *innovation;
             *innovation = *state;
@@ -157,11 +164,12 @@ impl Luck<'_> {
     pub(super) fn draw(&self, scan: usize, states: &[f64], asked: Option<&[usize]>, into: &mut ScanLuck) {
         let (errors, row) = (&self.scene.errors, self.row(scan));
         if errors.model != ErrorModel::None {
-            let time_s = self.start_s + scan as f64 * self.scene.scanner.limits().scan_period_s();
+            let time_s = self.start_s + scan as f64 * self.geometry.scan_period_s();
             into.drift = self.drift;
             into.warm_up = warm_up(self.scene, time_s);
             into.elements = Arc::clone(&self.elements);
-            into.columns.draw(beam::COUNT, self.seed, Purpose::Reading, row);
+            into.columns
+                .draw(self.geometry.beams(), self.seed, Purpose::Reading, row);
             into.columns.normals(0, &mut into.noise);
             into.columns.uniforms(2, &mut into.dropout);
             if let Some(law) = self.correlated() {
@@ -171,7 +179,7 @@ impl Luck<'_> {
             }
             if let Some(law) = &errors.interference {
                 into.columns
-                    .draw(beam::COUNT, self.seed, Purpose::Interference, row);
+                    .draw(self.geometry.beams(), self.seed, Purpose::Interference, row);
                 into.columns.uniforms(0, &mut into.interference);
                 for step in &mut into.interference {
                     let u = *step;
@@ -188,7 +196,7 @@ impl Luck<'_> {
         into.asked.clear();
         if self.scene.detection.noise_over_threshold > 0.0 {
             match asked {
-                Some(beams) if beams.len() < beam::COUNT / FEW => {
+                Some(beams) if beams.len() < self.geometry.beams() / FEW => {
                     let mut draws = Draws::new(self.seed, Purpose::Detection, row);
                     into.asked.extend(beams.iter().map(|beam| {
                         draws.seek(*beam as u64);
@@ -197,7 +205,7 @@ impl Luck<'_> {
                 }
                 _ => into
                     .detection
-                    .draw(beam::COUNT, self.seed, Purpose::Detection, row),
+                    .draw(self.geometry.beams(), self.seed, Purpose::Detection, row),
             }
         }
     }
@@ -269,7 +277,8 @@ impl Iterator for Chances<'_> {
     type Item = Vec<Chance>;
 
     fn next(&mut self) -> Option<Vec<Chance>> {
+        let beams = self.luck.geometry.beams();
         let scan = self.next_scan(None);
-        Some((0..beam::COUNT).map(|beam| scan.of(beam)).collect())
+        Some((0..beams).map(|beam| scan.of(beam)).collect())
     }
 }

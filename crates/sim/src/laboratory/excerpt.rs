@@ -11,7 +11,7 @@ use super::sight::Returns;
 use crate::noise::Columns;
 use crate::receive::reading::Chance;
 use catoptric_model::dataset::nanoseconds;
-use catoptric_model::{Excerpt, Pose, beam};
+use catoptric_model::{Excerpt, Pose};
 use std::ops::Range;
 
 /// Some scans of a stretch with their correlated noise.
@@ -128,7 +128,9 @@ impl Laboratory {
         let mut scan_luck = ScanLuck::default();
         self.luck(drawn.number)
             .draw(scan, drawn.states(scan), None, &mut scan_luck);
-        (0..beam::COUNT).map(|beam| scan_luck.of(beam)).collect()
+        (0..self.sensor.scan().beams())
+            .map(|beam| scan_luck.of(beam))
+            .collect()
     }
 
     /// When and where each body of a stretch is solved for the first time.
@@ -161,7 +163,7 @@ impl Laboratory {
         }
         let start_s = self.start_s(number);
         let rate = self.scene.mocap.frame_rate_hz;
-        let elapsed_s = scan as f64 * self.scene.scanner.limits().scan_period_s();
+        let elapsed_s = scan as f64 * self.sensor.scan().scan_period_s();
         let begins = nanoseconds(start_s) + nanoseconds(elapsed_s);
         // One less than the quotient, which rounding may have moved.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]

@@ -36,9 +36,7 @@ impl Laboratory {
             name: scene.name.clone(),
             scanner: session::ScannerSheet {
                 preset: scene.scanner.preset.name().to_owned(),
-                beams: beam::COUNT,
-                step_deg: 0.25,
-                scan_rate_hz: limits.scan_rate_hz,
+                scan: *self.sensor.scan(),
                 range_min_m: limits.range_min_m,
                 range_max_m: limits.range_max_m,
                 divergence_full_mrad: scene.scanner.beam_shape().wide_full_mrad,
@@ -94,10 +92,10 @@ impl Laboratory {
     fn nominal_facets(&self) -> Result<Vec<session::NominalFacet>, SimError> {
         let nominal = Structure::nominal(&self.scene)?;
         let setting = Setting::new(&self.scene, &nominal, Mirrors::Attached, Vec::new())?;
-        let paths: Vec<_> = (0..beam::COUNT)
+        let paths: Vec<_> = (0..self.sensor.scan().beams())
             .map(|b| self.sensor.chief_path(&setting, b))
             .collect();
-        let served = placement::served_beams(&paths, nominal.facets.len());
+        let served = placement::served_beams(&paths, nominal.facets.len(), self.sensor.scan());
         Ok(nominal
             .facets
             .iter()
@@ -139,7 +137,8 @@ impl Laboratory {
         if let Some(sd_mm) = self.scene.experiment.bare_distance_sd_mm {
             return self.measured_bare(sd_mm);
         }
-        let mut distance_m = vec![0.0; beam::COUNT];
+        let scan = self.sensor.scan();
+        let mut distance_m = vec![0.0; scan.beams()];
         let mut variance: f64 = 0.0;
         for (beam, summary) in summaries.iter().enumerate() {
             let Some(normal) = facet_normals[beam] else {
@@ -148,7 +147,7 @@ impl Laboratory {
             if summary.count == 0 || summary.mean > FARTHEST_STRUCTURE {
                 continue;
             }
-            let cos = normal.dot(&beam::direction(beam::azimuth(beam))).abs();
+            let cos = normal.dot(&beam::direction(scan.azimuth(beam))).abs();
             distance_m[beam] = summary.mean - self.believed.terms(summary.mean, cos, "structure").total();
             variance = variance.max(self.bare_variance(summary.count, cos));
         }
@@ -164,7 +163,8 @@ impl Laboratory {
     /// Step 3 with another instrument: the distances of a facet's beams all share one error.
     fn measured_bare(&self, sd_mm: f64) -> Result<session::BareStructure, SimError> {
         let served = self.nominal_facets()?;
-        let mut distance_m = vec![0.0; beam::COUNT];
+        let scan = self.sensor.scan();
+        let mut distance_m = vec![0.0; scan.beams()];
         for (index, built) in self.structure.facets.iter().enumerate() {
             let Some(sheet) = served.iter().find(|f| f.name == built.name) else {
                 continue;
@@ -172,18 +172,11 @@ impl Laboratory {
             let mut draws = Draws::new(self.seed, Purpose::BareDistance, index as u64);
             let error = sd_mm * 1e-3 * draws.normal();
             let normal = built.face.normal;
-            let [first, last] = sheet.beams;
-            let last = (last + NEAR_FACET).min(beam::COUNT - 1);
-            for (beam, distance) in distance_m
-                .iter_mut()
-                .enumerate()
-                .take(last + 1)
-                .skip(first.saturating_sub(NEAR_FACET))
-            {
-                let u = beam::direction(beam::azimuth(beam));
+            for beam in scan.run(scan.widened(sheet.beams, NEAR_FACET)) {
+                let u = beam::direction(scan.azimuth(beam));
                 let facing = normal.dot(&u).abs();
                 let to_face = normal.dot(&built.face.corners[0].coords) / normal.dot(&u);
-                *distance = to_face + built.thickness / facing + error;
+                distance_m[beam] = to_face + built.thickness / facing + error;
             }
         }
         let superstructure = &self.scene.superstructure;
@@ -199,18 +192,15 @@ impl Laboratory {
     /// For every beam, the drawn normal of the facet that serves it or is nearest to it within a few beams.
     fn drawn_normals(&self) -> Result<Vec<Option<Unit<Vector3<f64>>>>, SimError> {
         let facets = self.nominal_facets()?;
-        let away = |f: &session::NominalFacet, beam: usize| {
-            f.beams[0]
-                .saturating_sub(beam)
-                .max(beam.saturating_sub(f.beams[1]))
-        };
+        let scan = self.sensor.scan();
+        let away = |f: &session::NominalFacet, beam: usize| scan.beside(f.beams, beam);
         let nearest = |beam| {
             facets
                 .iter()
                 .min_by_key(|f| away(f, beam))
                 .filter(|f| away(f, beam) <= NEAR_FACET)
         };
-        Ok((0..beam::COUNT)
+        Ok((0..scan.beams())
             .map(|beam| Some(nearest(beam)?.plane()?.normal))
             .collect())
     }

@@ -4,8 +4,8 @@ use super::chance::{Chances, ScanLuck};
 use super::setup::Laboratory;
 use super::sight::Returns;
 use crate::scene::EchoChoice;
+use catoptric_model::Stretch;
 use catoptric_model::range::NO_RETURN;
-use catoptric_model::{Stretch, beam};
 
 /// A stretch being recorded.
 pub struct Recorder<'a> {
@@ -36,7 +36,7 @@ impl Laboratory {
     pub(super) fn readings(&self, scans: usize) -> Readings {
         let all_echoes = self.scene.detection.echo == EchoChoice::All;
         Readings {
-            ranges: Vec::with_capacity(scans * beam::COUNT),
+            ranges: Vec::with_capacity(scans * self.sensor.scan().beams()),
             echoes: all_echoes.then(Vec::new),
         }
     }
@@ -137,8 +137,8 @@ impl Laboratory {
         Stretch {
             label: self.label(number),
             start_s: self.start_s(number),
-            scan_period_s: self.scene.scanner.limits().scan_period_s(),
-            beams: beam::COUNT,
+            scan_period_s: self.sensor.scan().scan_period_s(),
+            beams: self.sensor.scan().beams(),
             ranges: readings.ranges,
             echoes: readings.echoes,
             tracks: self.tracks(number, frames),

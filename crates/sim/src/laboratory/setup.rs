@@ -167,7 +167,7 @@ impl Laboratory {
 
     /// When a stretch begins, in seconds since the recording began.
     pub(super) fn start_s(&self, number: usize) -> f64 {
-        let scan_period_s = self.scene.scanner.limits().scan_period_s();
+        let scan_period_s = self.sensor.scan().scan_period_s();
         self.first_scan(number) as f64 * scan_period_s + number as f64 * self.scene.experiment.pause_s
     }
 }

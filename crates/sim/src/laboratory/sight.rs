@@ -1,6 +1,6 @@
 //! What the sensor sees during a stretch, scan by scan, free of chance.
 //!
-//! In a flight beam i of scan k is cast from where the sensor is at k·T + i·step after the first waypoint; all the rest
+//! In a flight beam i of scan k is cast from where the sensor is at k·T + i·beam time after the first waypoint; all the rest
 //! is as where nothing moves. Every scan is a function of the scene, the seed and its number alone.
 
 use super::setup::Laboratory;
@@ -12,7 +12,7 @@ use crate::error::SimError;
 use crate::light::optics::{Mirrors, Rig, Setting};
 use crate::receive::reading::{Parts, Return, SubRayEnd};
 use catoptric_cast::BUNDLE;
-use catoptric_model::{Pose, PoseKind, beam};
+use catoptric_model::{Pose, PoseKind};
 use rayon::prelude::*;
 
 /// What a beam met during a scan, free of chance; `None` without an echo.
@@ -126,8 +126,8 @@ impl Laboratory {
 
     /// Time at which a beam of a scan is read, in seconds since its stretch began.
     pub(super) fn elapsed_s(&self, scan: usize, beam: usize) -> f64 {
-        let limits = self.scene.scanner.limits();
-        scan as f64 * limits.scan_period_s() + beam as f64 * limits.step_period_s()
+        let geometry = self.sensor.scan();
+        scan as f64 * geometry.scan_period_s() + geometry.time_of(beam)
     }
 }
 
@@ -174,7 +174,7 @@ impl Sight<'_> {
                 }
             }
         };
-        returns.resize_with(beam::COUNT, || None);
+        returns.resize_with(sensor.scan().beams(), || None);
         returns
             .par_chunks_mut(together)
             .enumerate()

@@ -11,7 +11,7 @@ use std::ops::Range;
 impl Laboratory {
     /// Frames of motion capture during a stretch.
     pub(super) fn frames_of(&self, number: usize) -> u64 {
-        let duration_s = self.planned[number].scans as f64 * self.scene.scanner.limits().scan_period_s();
+        let duration_s = self.planned[number].scans as f64 * self.sensor.scan().scan_period_s();
         // Frame numbers and counts of a recording of hours stay far below 2³².
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let frames = (duration_s * self.scene.mocap.frame_rate_hz).floor() as u64;

@@ -6,7 +6,7 @@ use crate::build::trajectory::Trajectory;
 use crate::error::SimError;
 use crate::laboratory::truth::{self, TrueBeam, TrueFacet, TruePose, Truth};
 use crate::light::optics::{End, Mirrors, Setting};
-use catoptric_model::{Deflection, PoseData, beam};
+use catoptric_model::{Deflection, PoseData};
 use rayon::prelude::*;
 
 impl Laboratory {
@@ -17,7 +17,7 @@ impl Laboratory {
     pub fn truth(&self) -> Result<Truth, SimError> {
         let setting = Setting::new(&self.scene, &self.structure, Mirrors::Attached, Vec::new())?;
         let facets = &self.structure.facets;
-        let beams = (0..beam::COUNT)
+        let beams = (0..self.sensor.scan().beams())
             .into_par_iter()
             .map(|b| self.true_beam(&setting, b))
             .collect();
@@ -50,7 +50,7 @@ impl Laboratory {
                     warm_up_m: self.scene.errors.warm_up.map(|_| {
                         let last = self.planned[number].scans.saturating_sub(1) as f64;
                         let begin = self.start_s(number);
-                        let end = begin + last * self.scene.scanner.limits().scan_period_s();
+                        let end = begin + last * self.sensor.scan().scan_period_s();
                         [self.warm_up(begin), self.warm_up(end)]
                     }),
                 })
@@ -76,7 +76,7 @@ impl Laboratory {
         let distance = chief.points().first().map(|p| p.coords.norm());
         let deflection = leaves.then(|| {
             Deflection::from_exit(
-                beam::azimuth(beam),
+                self.sensor.scan().azimuth(beam),
                 &chief.last.direction,
                 distance.unwrap_or(0.0),
             )

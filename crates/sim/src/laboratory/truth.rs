@@ -112,10 +112,10 @@ impl TrueBeam {
         })
     }
 
-    /// Direction in which the chief ray leaves, in the sensor frame.
-    pub fn exit_direction(&self) -> Option<Unit<Vector3<f64>>> {
+    /// Direction in which the chief ray of a beam leaves, in the sensor frame.
+    pub fn exit_direction(&self, beam_azimuth: f64) -> Option<Unit<Vector3<f64>>> {
         Some(beam::spherical(
-            beam::azimuth(self.beam) + self.azimuth_rad?,
+            beam_azimuth + self.azimuth_rad?,
             self.elevation_rad?,
         ))
     }

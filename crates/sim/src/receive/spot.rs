@@ -6,7 +6,7 @@
 
 use crate::light::footprint;
 use crate::receive::reading::Sensor;
-use catoptric_model::{BoardPlane, Pose, beam};
+use catoptric_model::{BoardPlane, Pose};
 use nalgebra::Vector2;
 
 impl Sensor {
@@ -15,13 +15,17 @@ impl Sensor {
     /// `None` if part of the light misses the board's plane, or the scan has not so many beams there.
     pub fn spot(&self, sensor_from_board: &Pose, beams: usize) -> Option<[f64; 2]> {
         let plane = BoardPlane::of_pose(sensor_from_board);
-        let middle = beam::nearest(libm::atan2(plane.point.y, plane.point.x))?;
-        let first = middle
-            .checked_sub(beams / 2)
-            .filter(|first| first + beams <= beam::COUNT)?;
+        let scan = self.scan();
+        let middle = scan.nearest(libm::atan2(plane.point.y, plane.point.x))?;
+        let first = (0..beams / 2).try_fold(middle, |beam, _| scan.neighbors(beam)[0])?;
+        let next = |beam: &usize| scan.neighbors(*beam)[1];
+        let of_spot: Vec<usize> = std::iter::successors(Some(first), next).take(beams).collect();
+        if of_spot.len() < beams {
+            return None;
+        }
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for beam in first..first + beams {
-            let azimuth = beam::azimuth(beam);
+        for beam in of_spot {
+            let azimuth = scan.azimuth(beam);
             let (mut mean, mut square) = (Vector2::zeros(), Vector2::zeros());
             for sub_ray in self.bundle() {
                 let ray = footprint::ray(self.shape(), azimuth, sub_ray);
@@ -46,6 +50,7 @@ impl Sensor {
 mod tests {
     use super::*;
     use crate::scene::Scene;
+    use catoptric_model::ScanGeometry;
     use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
     fn sensor(preset: &str, sub_rays: usize) -> Sensor {
@@ -75,7 +80,8 @@ mod tests {
             for range in [0.5, 4.0] {
                 let [width, height] = sensor(preset, 61).spot(&ahead(range, 0.0), 3).expect("it is met");
                 let half = |full_mrad: f64| libm::tan(0.5e-3 * full_mrad);
-                let wide = 2.0 * range * half(shape.wide_full_mrad) + 2.0 * range * libm::tan(beam::STEP);
+                let wide = 2.0 * range * half(shape.wide_full_mrad)
+                    + 2.0 * range * libm::tan(ScanGeometry::default().step());
                 let high = 1e-3 * shape.narrow_aperture_mm + 2.0 * range * half(shape.narrow_full_mrad);
                 // The outer two beams meet the board 0.25° off its normal, and the spot turns by as much.
                 assert!(

@@ -1,13 +1,19 @@
 //! The scanner's presets: numbers from data sheets, and from Cooper's Table 1.
 
 use super::scanner::{BeamShape, HousingBox, Limits, Preset, Scanner};
+use catoptric_model::{ScanAngles, ScanDirection, ScanError, ScanGeometry};
 
-/// What the UST-20LX reports (data sheet): 40 Hz, 20 m, one echo. It vouches for 60 mm on, but reports ranges from
+/// How the UST-20LX scans and what it reports (data sheet): 270° in steps of 0.25°, 40 Hz, 20 m, one echo. It vouches for 60 mm on, but reports ranges from
 /// 21 mm on.
 const UST_20LX: Limits = Limits {
     range_min_m: 0.021,
     range_max_m: 20.0,
+    first_deg: -135.0,
+    step_deg: 0.25,
+    beams: 1081,
+    direction: ScanDirection::Ccw,
     scan_rate_hz: 40.0,
+    beam_time_us: None,
     echoes: 1,
 };
 
@@ -16,12 +22,10 @@ const UST_20LX: Limits = Limits {
 const UTM_30LX_EW: Limits = Limits {
     range_min_m: 0.1,
     range_max_m: 30.0,
-    scan_rate_hz: 40.0,
     echoes: 3,
+    // The same 270° in steps of 0.25°, and 40 Hz.
+    ..UST_20LX
 };
-
-/// Steps of a turn of which a scan takes its beams.
-const STEPS_PER_TURN: f64 = 1440.0;
 
 /// Housing of the UST-20LX in the sensor frame: the body below the window and the cap above it. It is 50 × 50 × 70 mm
 /// (data sheet); how it is divided around the scan plane is assumed.
@@ -117,12 +121,27 @@ impl Scanner {
         }
     }
 
-    /// What it can report: the scene's for a scanner of one's own, or else the preset's.
+    /// How it scans and what it can report: the scene's for a scanner of one's own, or else the preset's.
     pub fn limits(&self) -> Limits {
         match self.preset {
             Preset::Custom => self.custom.unwrap_or(UST_20LX),
             preset => preset.limits(),
         }
+    }
+
+    /// How it scans.
+    ///
+    /// # Errors
+    /// [`ScanError`] names the first number under `scanner.custom` that no scan can have.
+    pub fn scan(&self) -> Result<ScanGeometry, ScanError> {
+        let limits = self.limits();
+        let angles = ScanAngles {
+            first_deg: limits.first_deg,
+            step_deg: limits.step_deg,
+            beams: limits.beams as usize,
+            direction: limits.direction,
+        };
+        ScanGeometry::new(angles, limits.scan_rate_hz, limits.beam_time_us)
     }
 }
 
@@ -136,11 +155,6 @@ impl Limits {
     /// Time from the start of one scan to the start of the next, in seconds.
     pub fn scan_period_s(&self) -> f64 {
         1.0 / self.scan_rate_hz
-    }
-
-    /// Time between two beams of a scan, in seconds.
-    pub fn step_period_s(&self) -> f64 {
-        self.scan_period_s() / STEPS_PER_TURN
     }
 }
 
@@ -176,6 +190,22 @@ mod tests {
                     "{preset:?}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn the_presets_scan_as_the_default_does() {
+        for preset in [Preset::Ust20lx, Preset::Ust20lxCooper, Preset::Utm30lxEw] {
+            let scanner = Scanner {
+                preset,
+                sub_rays: 1,
+                beam: None,
+                custom: None,
+                housing: true,
+                housing_box: None,
+                mount: Mount::default(),
+            };
+            assert_eq!(scanner.scan(), Ok(ScanGeometry::default()), "{preset:?}");
         }
     }
 

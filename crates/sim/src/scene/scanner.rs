@@ -1,5 +1,6 @@
 //! The scanner: preset, beam, mounting and light.
 
+use catoptric_model::ScanDirection;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +17,7 @@ pub enum Preset {
     /// Hokuyo UTM-30LX-EW: up to three echoes of a beam, 30 m. Its spot is assumed to be the UST-20LX's.
     #[serde(rename = "utm-30lx-ew")]
     Utm30lxEw,
-    /// A scanner of one's own: `scanner.custom` and `scanner.beam`. Its beams are the 1081 of the others, 0.25° apart.
+    /// A scanner of one's own: `scanner.custom` and `scanner.beam`.
     Custom,
 }
 
@@ -33,7 +34,7 @@ pub struct Scanner {
     /// Shape of a beam, instead of the preset's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beam: Option<BeamShape>,
-    /// Limits of a scanner of one's own, with the preset "custom".
+    /// How a scanner of one's own scans and what it reports, with the preset "custom".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub custom: Option<Limits>,
     /// Whether the scanner's own housing stands in the way of deflected beams.
@@ -57,7 +58,7 @@ impl Scanner {
     }
 }
 
-/// What a scanner can report. The defaults are the UST-20LX's.
+/// How a scanner scans, and what it can report. The defaults are the UST-20LX's.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Limits {
@@ -67,12 +68,40 @@ pub struct Limits {
     /// Longest range that is reported, in metres; anything farther is no return.
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub range_max_m: f64,
+    /// Azimuth of beam 0, in degrees.
+    #[schemars(range(min = -360.0, max = 360.0))]
+    pub first_deg: f64,
+    /// Angle between neighboring beams, in degrees.
+    #[schemars(range(min = 0.01, max = 45.0))]
+    pub step_deg: f64,
+    /// Beams of a scan; all of them times `step_deg` make one turn at most.
+    #[schemars(range(min = 1, max = 36000))]
+    pub beams: u32,
+    /// The sense in which it turns, seen from above.
+    #[schemars(with = "ScanDirectionSchema")]
+    pub direction: ScanDirection,
     /// Scans per second.
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub scan_rate_hz: f64,
+    /// Time from one beam of a scan to the next, in microseconds; `step_deg`/(360·`scan_rate_hz`) unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.001, max = 1e6))]
+    pub beam_time_us: Option<f64>,
     /// Most echoes of one beam that can be reported.
     #[schemars(range(min = 1, max = 8))]
     pub echoes: u32,
+}
+
+/// The sense in which a scan turns, seen from above.
+#[derive(JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[schemars(rename = "ScanDirection")]
+#[allow(dead_code)] // Read by the schema generator alone: the model crate knows no schemas.
+enum ScanDirectionSchema {
+    /// Counter-clockwise: azimuths grow from beam to beam.
+    Ccw,
+    /// Clockwise: azimuths fall from beam to beam.
+    Cw,
 }
 
 /// Shape of one beam: an ellipse whose long axis is horizontal at azimuth 0.

@@ -84,7 +84,7 @@ pub enum FacetShape {
 #[serde(deny_unknown_fields)]
 pub struct Wedge {
     /// First and last azimuth, in degrees, the smaller first.
-    #[schemars(inner(range(min = -180.0, max = 180.0)))]
+    #[schemars(inner(range(min = -360.0, max = 360.0)))]
     pub azimuth_deg: [f64; 2],
     /// Distance from the sensor origin along the middle azimuth, in millimetres.
     #[schemars(range(min = 1.0, max = 10000.0))]
@@ -110,7 +110,7 @@ pub struct Plate {
     pub azimuth_deg: Option<f64>,
     /// The same beam by its index.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = 0, max = 1080))]
+    #[schemars(range(min = 0, max = 35999))]
     pub beam: Option<u32>,
     /// Distance from the sensor origin to its center, in millimetres.
     #[schemars(range(min = 1.0, max = 10000.0))]

@@ -27,7 +27,7 @@ pub struct SensorTest {
     pub direction_deg: f64,
     /// Azimuth of the beam, in degrees.
     #[serde(default)]
-    #[schemars(range(min = -135.0, max = 135.0))]
+    #[schemars(range(min = -360.0, max = 360.0))]
     pub azimuth_deg: f64,
     /// How often each setting is set up and recorded.
     #[serde(default = "once")]

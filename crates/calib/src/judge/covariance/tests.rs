@@ -2,7 +2,7 @@
 
 use super::*;
 use catoptric_model::session::*;
-use catoptric_model::{BoardPlane, PoseData, RangeBias};
+use catoptric_model::{BoardPlane, PoseData, RangeBias, ScanGeometry};
 use nalgebra::{Point3, Unit};
 
 fn session() -> Session {
@@ -11,9 +11,7 @@ fn session() -> Session {
         name: String::new(),
         scanner: ScannerSheet {
             preset: String::new(),
-            beams: 1081,
-            step_deg: 0.25,
-            scan_rate_hz: 40.0,
+            scan: ScanGeometry::default(),
             range_min_m: 0.06,
             range_max_m: 20.0,
             divergence_full_mrad: 10.0,

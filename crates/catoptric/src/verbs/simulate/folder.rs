@@ -8,7 +8,6 @@ use crate::{Control, Error, Scene};
 use catoptric_files::folder::StagedFile;
 use catoptric_files::paths::quoted;
 use catoptric_files::{DatasetWriter, IoError, Provenance, dataset, scene as scenes};
-use catoptric_model::beam;
 use catoptric_sim::{Laboratory, noise};
 use serde::Serialize;
 use std::io::Write as _;
@@ -101,7 +100,7 @@ fn record(scene: &Scene, out: &Path, recording: &Recording, control: &Control) -
     let (session, truth) = (laboratory.session()?, laboratory.truth()?);
     let mut figures = Figures {
         scans: laboratory.scans(),
-        beams: beam::COUNT,
+        beams: laboratory.sensor().scan().beams(),
         sub_rays: laboratory.sub_rays(),
         build_s: begin.elapsed().as_secs_f64(),
         threads: rayon::current_num_threads(),
@@ -138,7 +137,7 @@ fn record(scene: &Scene, out: &Path, recording: &Recording, control: &Control) -
         made = next?;
         // Those just written were there while these were made.
         let made_now: usize = made.iter().map(|m| m.scans.len()).sum();
-        figures.held = figures.held.max((scans + made_now) * beam::COUNT);
+        figures.held = figures.held.max((scans + made_now) * figures.beams);
         for m in &made {
             figures.trace_s += m.trace.as_secs_f64();
             figures.sample_s += m.sample.as_secs_f64();

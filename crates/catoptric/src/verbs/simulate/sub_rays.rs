@@ -2,7 +2,6 @@
 
 use super::tables::{Tell, field, mirror_names, role_name, way};
 use crate::Error;
-use catoptric_model::beam;
 use catoptric_sim::Laboratory;
 use catoptric_sim::laboratory::Sight;
 use catoptric_sim::light::Setting;
@@ -47,7 +46,7 @@ fn rows_of_scan(
     let mirrors = mirror_names(laboratory.scene());
     let names = setting.names();
     let named = scan.map_or(String::new(), |scan| scan.to_string());
-    let all: Vec<usize> = (0..beam::COUNT).collect();
+    let all: Vec<usize> = (0..laboratory.sensor().scan().beams()).collect();
     for beams in all.chunks(BEAMS_AT_ONCE) {
         let texts: Vec<String> = beams
             .par_iter()

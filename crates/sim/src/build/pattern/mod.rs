@@ -11,12 +11,11 @@
 
 use crate::build::layout::plate_azimuth_deg;
 use crate::scene::{Exchange, Facet, FacetShape, Pattern, Scene};
-use catoptric_model::beam;
+use catoptric_model::ScanGeometry;
 use catoptric_model::place::{Path, Problem, Segment, nearest};
 
-/// The last beam of the scan, the first's mirror image.
-const LAST_BEAM: u32 = 1080;
-const _: () = assert!(LAST_BEAM as usize + 1 == beam::COUNT);
+/// Part of a step within which a beam is another one's mirror image: what rounding leaves.
+const SAME_PART_OF_STEP: f64 = 1e-6;
 
 /// A scene without patterns, and where its facets come from.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,9 +51,11 @@ pub fn expand(scene: &Scene) -> Result<Expanded, Vec<Problem>> {
     let mut scene = scene.clone();
     let patterns = std::mem::take(&mut scene.superstructure.pattern);
     let drawn = scene.superstructure.facet.len();
+    // Of a scanner that cannot be, whoever checks the scene says so.
+    let scan = scene.scanner.scan().unwrap_or_default();
     let (mut made_by, mut problems) = (Vec::new(), Vec::new());
     for (number, pattern) in patterns.iter().enumerate() {
-        match copies(&scene.superstructure.facet, pattern, &pattern_path(number)) {
+        match copies(&scene.superstructure.facet, pattern, &scan, &pattern_path(number)) {
             Ok(copies) => {
                 made_by.extend(std::iter::repeat_n(number, copies.len()));
                 scene.superstructure.facet.extend(copies);
@@ -77,14 +78,19 @@ fn pattern_path(number: usize) -> Path {
     Path::of("superstructure").key("pattern").index(number)
 }
 
-fn copies(facets: &[Facet], pattern: &Pattern, path: &Path) -> Result<Vec<Facet>, Problem> {
+fn copies(
+    facets: &[Facet],
+    pattern: &Pattern,
+    scan: &ScanGeometry,
+    path: &Path,
+) -> Result<Vec<Facet>, Problem> {
     match pattern {
         Pattern::Ring(ring) => {
             let original = find(facets, &ring.of, &path.key("ring").key("of"))?;
             let step = ring.step_deg.unwrap_or(360.0 / f64::from(ring.count));
             let copy = |k: u32| {
                 let name = format!("{}-{}", original.name, k + 1);
-                turned(original, name, f64::from(k) * step)
+                turned(original, name, f64::from(k) * step, scan)
             };
             Ok((1..ring.count).map(copy).collect())
         }
@@ -103,15 +109,15 @@ fn copies(facets: &[Facet], pattern: &Pattern, path: &Path) -> Result<Vec<Facet>
                 let original = find(facets, of, &path.key("of").index(i))?;
                 let given = image.names.as_ref().and_then(|n| n.get(i)).cloned();
                 let name = given.unwrap_or_else(|| format!("{of}-image"));
-                Ok(mirrored(original, name, &image.across))
+                Ok(mirrored(original, name, &image.across, scan))
             };
             image.of.iter().enumerate().map(one).collect()
         }
         Pattern::List(list) => {
             let original = find(facets, &list.of, &path.key("list").key("of"))?;
             let one = |c: &crate::scene::FacetCopy| {
-                let image = mirrored(original, c.name.clone(), &c.across);
-                turned(&image, c.name.clone(), c.turn_deg)
+                let image = mirrored(original, c.name.clone(), &c.across, scan);
+                turned(&image, c.name.clone(), c.turn_deg, scan)
             };
             Ok(list.copy.iter().map(one).collect())
         }
@@ -133,9 +139,9 @@ fn find<'a>(facets: &'a [Facet], name: &str, path: &Path) -> Result<&'a Facet, P
 }
 
 /// A facet seen in a mirror, or in two one after the other.
-pub fn mirrored(facet: &Facet, name: String, across: &[Exchange]) -> Facet {
+pub fn mirrored(facet: &Facet, name: String, across: &[Exchange], scan: &ScanGeometry) -> Facet {
     let image = |shape: FacetShape, exchange: &Exchange| match exchange {
-        Exchange::LeftRight => left_right(shape),
+        Exchange::LeftRight => left_right(shape, scan),
         Exchange::UpDown => up_down(shape),
     };
     Facet {
@@ -146,7 +152,7 @@ pub fn mirrored(facet: &Facet, name: String, across: &[Exchange]) -> Facet {
 }
 
 /// A facet turned about the scanner's axis, counter-clockwise, by an angle in degrees.
-pub fn turned(facet: &Facet, name: String, turn_deg: f64) -> Facet {
+pub fn turned(facet: &Facet, name: String, turn_deg: f64, scan: &ScanGeometry) -> Facet {
     let (sin, cos) = libm::sincos(turn_deg.to_radians());
     let turn = |[x, y, z]: [f64; 3]| [cos * x - sin * y, sin * x + cos * y, z];
     let around = |azimuth: f64| {
@@ -163,7 +169,7 @@ pub fn turned(facet: &Facet, name: String, turn_deg: f64) -> Facet {
             wedge.exit_azimuth_deg = around(wedge.exit_azimuth_deg);
         }
         FacetShape::Plate(plate) => {
-            if let Some(azimuth) = plate_azimuth_deg(plate) {
+            if let Some(azimuth) = plate_azimuth_deg(plate, scan) {
                 plate.azimuth_deg = Some(around(azimuth));
                 plate.beam = None;
             }
@@ -187,7 +193,7 @@ pub fn turned(facet: &Facet, name: String, turn_deg: f64) -> Facet {
     }
 }
 
-fn left_right(mut shape: FacetShape) -> FacetShape {
+fn left_right(mut shape: FacetShape, scan: &ScanGeometry) -> FacetShape {
     match &mut shape {
         FacetShape::Wedge(wedge) => {
             let [first, last] = wedge.azimuth_deg;
@@ -196,7 +202,12 @@ fn left_right(mut shape: FacetShape) -> FacetShape {
         }
         FacetShape::Plate(plate) => {
             plate.azimuth_deg = plate.azimuth_deg.map(|a| -a);
-            plate.beam = plate.beam.map(|b| LAST_BEAM.saturating_sub(b));
+            if let Some(beam) = plate.beam {
+                plate.beam = opposite(beam, scan);
+                if plate.beam.is_none() {
+                    plate.azimuth_deg = Some(-scan.azimuth_deg(beam as usize));
+                }
+            }
             plate.exit_azimuth_deg = plate.exit_azimuth_deg.map(|a| -a);
             plate.normal_azimuth_deg = plate.normal_azimuth_deg.map(|a| -a);
         }
@@ -207,6 +218,14 @@ fn left_right(mut shape: FacetShape) -> FacetShape {
         FacetShape::Polygon(polygon) => reflect_corners(&mut polygon.corners_mm, 1),
     }
     shape
+}
+
+/// The beam whose azimuth is the opposite of another one's, if the scan has it.
+fn opposite(beam: u32, scan: &ScanGeometry) -> Option<u32> {
+    let azimuth = -scan.azimuth(beam as usize);
+    let found = scan.nearest(azimuth)?;
+    let off = (scan.place(azimuth) - found as f64).abs();
+    u32::try_from(found).ok().filter(|_| off < SAME_PART_OF_STEP)
 }
 
 fn up_down(mut shape: FacetShape) -> FacetShape {

@@ -1,10 +1,11 @@
 //! Copies against the closed form of what they are: reflected and turned corners.
 
 use super::*;
-use crate::build::layout::corners;
+use crate::build::layout;
 use crate::scene::Plate;
 use crate::scene::{CopyList, FacetCopy, MirrorImage, PolygonShape, RectangleShape, Ring, Wedge};
 use catoptric_cast::area_vector;
+use catoptric_model::beam;
 use nalgebra::{Point3, Rotation3, Vector3};
 
 fn facet(name: &str, shape: FacetShape) -> Facet {
@@ -13,6 +14,10 @@ fn facet(name: &str, shape: FacetShape) -> Facet {
         shape,
         two_sided: false,
     }
+}
+
+fn corners(shape: &FacetShape) -> Option<Vec<Point3<f64>>> {
+    layout::corners(shape, &ScanGeometry::default())
 }
 
 fn plate() -> Plate {
@@ -75,7 +80,12 @@ fn a_mirror_image_has_the_reflected_corners() {
     ] {
         for shape in shapes() {
             let own = corners(&shape).expect("it is a mirror");
-            let image = mirrored(&facet("a", shape.clone()), "b".to_owned(), &[exchange]);
+            let image = mirrored(
+                &facet("a", shape.clone()),
+                "b".to_owned(),
+                &[exchange],
+                &ScanGeometry::default(),
+            );
             let found = corners(&image.shape).expect("so is its image");
             // Seen in a mirror, what went round counter-clockwise goes round clockwise.
             let reflected = own
@@ -97,7 +107,7 @@ fn a_turned_facet_has_the_turned_corners() {
         let rotation = Rotation3::from_axis_angle(&Vector3::z_axis(), turn.to_radians());
         for shape in shapes() {
             let own = corners(&shape).expect("it is a mirror");
-            let copy = turned(&facet("a", shape), "b".to_owned(), turn);
+            let copy = turned(&facet("a", shape), "b".to_owned(), turn, &ScanGeometry::default());
             let found = corners(&copy.shape).expect("so is its copy");
             for (found, own) in found.iter().zip(&own) {
                 assert!((found - rotation * own).norm() < 1e-14, "{turn} {found} {own}");
@@ -111,7 +121,7 @@ fn a_plate_sends_its_beam_where_it_is_wanted() {
     let corners = corners(&FacetShape::Plate(plate())).expect("it is a mirror");
     let normal = nalgebra::Unit::new_normalize(area_vector(&corners));
     let plane = catoptric_model::MirrorPlane::through(corners[0], normal);
-    let azimuth = beam::azimuth(800);
+    let azimuth = ScanGeometry::default().azimuth(800);
     let deflection = plane
         .deflect(beam::direction(azimuth))
         .expect("it faces the scanner");

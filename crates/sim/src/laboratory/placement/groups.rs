@@ -3,7 +3,7 @@
 use crate::light::optics::{End, Path};
 use crate::scene::Board;
 use catoptric_cast::Ray;
-use catoptric_model::{Pose, Rectangle, beam};
+use catoptric_model::{Pose, Rectangle, ScanGeometry};
 use nalgebra::Unit;
 
 /// Part of a board's edge that no beam of its group should come near, in metres, and its growth with distance: beams
@@ -31,22 +31,26 @@ fn leaves_by(path: &Path) -> Option<usize> {
 }
 
 /// First and last beam of every facet in the drawing.
-pub fn served_beams(paths: &[Path], facets: usize) -> Vec<Option<[usize; 2]>> {
+pub fn served_beams(paths: &[Path], facets: usize, scan: &ScanGeometry) -> Vec<Option<[usize; 2]>> {
     (0..facets)
         .map(|facet| {
-            let mut served = (0..paths.len()).filter(|&b| leaves_by(&paths[b]) == Some(facet));
-            let first = served.next()?;
-            Some([first, served.next_back().unwrap_or(first)])
+            let served = (0..paths.len()).filter(|&b| leaves_by(&paths[b]) == Some(facet));
+            scan.shortest_run(&served.collect::<Vec<_>>())
         })
         .collect()
 }
 
 /// Each facet's beams, cut into equal groups no wider than the span.
-pub(super) fn facet_groups(paths: &[Path], facets: usize, span_deg: f64) -> Vec<(usize, usize, usize)> {
+pub(super) fn facet_groups(
+    paths: &[Path],
+    scan: &ScanGeometry,
+    facets: usize,
+    span_deg: f64,
+) -> Vec<(usize, usize, usize)> {
     let mut groups = Vec::new();
-    for (facet, served) in served_beams(paths, facets).into_iter().enumerate() {
-        let Some([first, last]) = served else { continue };
-        for [first, last] in cut(first, last, span_deg) {
+    for (facet, served) in served_beams(paths, facets, scan).into_iter().enumerate() {
+        let Some(served) = served else { continue };
+        for [first, last] in cut(scan, served, span_deg) {
             groups.push((facet, first, last));
         }
     }
@@ -54,66 +58,89 @@ pub(super) fn facet_groups(paths: &[Path], facets: usize, span_deg: f64) -> Vec<
 }
 
 /// A run of beams cut into the fewest equal pieces no wider than the span.
-fn cut(first: usize, last: usize, span_deg: f64) -> Vec<[usize; 2]> {
-    let beams = last - first + 1;
-    let span = span_deg.to_radians() / beam::STEP;
+fn cut(scan: &ScanGeometry, run: [usize; 2], span_deg: f64) -> Vec<[usize; 2]> {
+    let run: Vec<usize> = scan.run(run).collect();
+    let beams = run.len();
+    let span = span_deg.to_radians() / scan.step();
     // Both are small positive numbers.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let pieces = ((beams as f64 / span).ceil() as usize).clamp(1, beams);
     (0..pieces)
-        .map(|k| [first + beams * k / pieces, first + beams * (k + 1) / pieces - 1])
+        .map(|k| [run[beams * k / pieces], run[beams * (k + 1) / pieces - 1]])
         .collect()
 }
 
 /// Runs of undeflected beams around the centers at which boards are set up, spread over the free sectors.
-pub(super) fn direct_groups(paths: &[Path], count: usize, span_deg: f64) -> Vec<[usize; 2]> {
-    let free = |b: usize| matches!(paths[b].end, End::Escaped) && paths[b].facets().is_empty();
-    let mut sectors: Vec<[usize; 2]> = Vec::new();
-    for b in (0..paths.len()).filter(|&b| free(b)) {
-        match sectors.last_mut() {
-            Some(sector) if sector[1] + 1 == b => sector[1] = b,
-            _ => sectors.push([b, b]),
-        }
-    }
-    sectors.retain(|s| (s[1] - s[0]) as f64 * beam::STEP >= LEAST_SECTOR);
-    let total: usize = sectors.iter().map(|s| s[1] - s[0] + 1).sum();
+pub(super) fn direct_groups(
+    paths: &[Path],
+    scan: &ScanGeometry,
+    count: usize,
+    span_deg: f64,
+) -> Vec<[usize; 2]> {
+    let sectors = free_sectors(paths, scan);
+    let total: usize = sectors.iter().map(Vec::len).sum();
     if total == 0 {
         return Vec::new();
     }
     // Centers evenly over the free beams laid end to end. Successive poses jump by a third of the way, so that
     // neighbours in tilt are not neighbours in azimuth.
-    let half = 0.5 * span_deg.to_radians() / beam::STEP;
+    let half = 0.5 * span_deg.to_radians() / scan.step();
     (0..count)
         .map(|k| {
             let slot = (k % 3) * count.div_ceil(3) + k / 3;
             let along = (2 * (slot % count) + 1) * total / (2 * count);
             let mut rest = along;
             let sector = sectors.iter().find(|s| {
-                let beams = s[1] - s[0] + 1;
-                let here = rest < beams;
+                let here = rest < s.len();
                 if !here {
-                    rest -= beams;
+                    rest -= s.len();
                 }
                 here
             });
-            let sector = sector.copied().unwrap_or(sectors[0]);
-            let center = sector[0] + rest;
+            let sector = sector.unwrap_or(&sectors[0]);
+            let center = rest;
             // Small positive number.
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             let half = half as usize;
             [
-                center.saturating_sub(half).max(sector[0]),
-                (center + half).min(sector[1]),
+                sector[center.saturating_sub(half)],
+                sector[(center + half).min(sector.len() - 1)],
             ]
         })
         .collect()
 }
 
+/// The beams of every undeflected sector that is wide enough for a board, in the order of the scan.
+fn free_sectors(paths: &[Path], scan: &ScanGeometry) -> Vec<Vec<usize>> {
+    let free = |b: usize| matches!(paths[b].end, End::Escaped) && paths[b].facets().is_empty();
+    let mut sectors: Vec<Vec<usize>> = Vec::new();
+    for b in (0..paths.len()).filter(|&b| free(b)) {
+        match sectors.last_mut() {
+            Some(sector) if sector.last().is_some_and(|last| last + 1 == b) => sector.push(b),
+            _ => sectors.push(vec![b]),
+        }
+    }
+    // A sector that goes over the seam of a scan that closes is one.
+    let meet = |sectors: &[Vec<usize>]| {
+        let ends = sectors.first().zip(sectors.last());
+        let ends = ends.and_then(|(first, last)| first.first().zip(last.last()));
+        sectors.len() > 1 && ends.is_some_and(|(first, last)| scan.neighbors(*last)[1] == Some(*first))
+    };
+    if meet(&sectors) {
+        let first = sectors.remove(0);
+        if let Some(last) = sectors.last_mut() {
+            last.extend(first);
+        }
+    }
+    sectors.retain(|s| (s.len() - 1) as f64 * scan.step() >= LEAST_SECTOR);
+    sectors
+}
+
 impl Group {
     pub(super) fn new(
         facet: Option<usize>,
-        first: usize,
-        last: usize,
+        scan: &ScanGeometry,
+        [first, last]: [usize; 2],
         paths: &[Path],
         room_from_sensor: &Pose,
     ) -> Self {
@@ -121,8 +148,9 @@ impl Group {
             Some(_) => leaves_by(path) == facet,
             None => path.facets().is_empty() && matches!(path.end, End::Escaped),
         };
-        let rays = paths[first..=last]
-            .iter()
+        let rays = scan
+            .run([first, last])
+            .map(|beam| &paths[beam])
             .filter(|p| leaves(p))
             .map(|p| Ray {
                 origin: room_from_sensor * p.last.origin,
@@ -168,8 +196,9 @@ mod tests {
 
     #[test]
     fn groups_cover_their_run_without_overlap() {
-        let groups = cut(100, 279, 16.0);
+        let ust = ScanGeometry::default();
+        let groups = cut(&ust, [100, 279], 16.0);
         assert_eq!(groups, vec![[100, 159], [160, 219], [220, 279]]);
-        assert_eq!(cut(5, 5, 16.0), vec![[5, 5]]);
+        assert_eq!(cut(&ust, [5, 5], 16.0), vec![[5, 5]]);
     }
 }

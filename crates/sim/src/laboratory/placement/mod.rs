@@ -21,7 +21,7 @@ use crate::noise::{Draws, Purpose};
 use crate::receive::reading::Sensor;
 use crate::scene::{BoardPose, Design, Scene};
 use catoptric_model::frame::tangent_basis;
-use catoptric_model::{PoseKind, beam};
+use catoptric_model::{PoseKind, ScanGeometry};
 use groups::{Group, direct_groups, facet_groups};
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
 use planned::no_place_before;
@@ -34,7 +34,7 @@ use poses::{place, place_at_random};
 /// [`SimError::Placement`] where a board fits nowhere, [`SimError::UnknownName`] for a pose that refers to nothing.
 pub fn plan(scene: &Scene, sensor: &Sensor, seed: u64) -> Result<Vec<Planned>, SimError> {
     let mut planned = procedure(scene, sensor, seed)?;
-    let scan_period_s = scene.scanner.limits().scan_period_s();
+    let scan_period_s = sensor.scan().scan_period_s();
     planned.extend(scene.flight.iter().enumerate().map(|(index, flight)| Planned {
         kind: PoseKind::Flight,
         scans: flight.scans(scan_period_s),
@@ -53,7 +53,9 @@ fn procedure(scene: &Scene, sensor: &Sensor, seed: u64) -> Result<Vec<Planned>, 
     let structure = Structure::nominal(scene)?;
     let setting = Setting::new(scene, &structure, Mirrors::Attached, Vec::new())?;
     let room_from_sensor = room_from_rig(&scene.room) * structure::nominal_mount(scene);
-    let paths: Vec<Path> = (0..beam::COUNT).map(|b| sensor.chief_path(&setting, b)).collect();
+    let paths: Vec<Path> = (0..sensor.scan().beams())
+        .map(|b| sensor.chief_path(&setting, b))
+        .collect();
     let experiment = &scene.experiment;
     let scans = experiment.scans_per_pose as usize;
     let without_board = |kind, scans: u32| Planned {
@@ -80,20 +82,22 @@ fn procedure(scene: &Scene, sensor: &Sensor, seed: u64) -> Result<Vec<Planned>, 
     planned.extend(sensor_tests::plan(scene, &room_from_sensor)?);
     if !experiment.pose.is_empty() {
         for (index, pose) in experiment.pose.iter().enumerate() {
-            planned.push(given(scene, &paths, pose, index)?);
+            planned.push(given(scene, sensor.scan(), &paths, pose, index)?);
         }
         return Ok(planned);
     }
     if scene.board.is_empty() {
         return Ok(planned);
     }
+    let scan = sensor.scan();
     let direct = direct_groups(
         &paths,
+        scan,
         experiment.direct_poses as usize,
         experiment.group_span_deg,
     );
     for (index, [first, last]) in direct.into_iter().enumerate() {
-        let group = Group::new(None, first, last, &paths, &room_from_sensor);
+        let group = Group::new(None, scan, [first, last], &paths, &room_from_sensor);
         let board = index % scene.board.len();
         let pose = place(&scene.board[board], &group, experiment, &scene.room, index, 0)
             .map_err(|reason| no_place(scene, board, &group, reason))?;
@@ -110,13 +114,14 @@ fn procedure(scene: &Scene, sensor: &Sensor, seed: u64) -> Result<Vec<Planned>, 
     }
     for (number, (facet, first, last)) in facet_groups(
         &paths,
+        scan,
         scene.superstructure.facet.len(),
         experiment.group_span_deg,
     )
     .into_iter()
     .enumerate()
     {
-        let group = Group::new(Some(facet), first, last, &paths, &room_from_sensor);
+        let group = Group::new(Some(facet), scan, [first, last], &paths, &room_from_sensor);
         for index in 0..experiment.poses_per_group as usize {
             let board = index % scene.board.len();
             let sheet = &scene.board[board];
@@ -152,7 +157,13 @@ fn no_place(scene: &Scene, board: usize, group: &Group, reason: String) -> SimEr
 }
 
 /// A pose that the scene gives itself.
-fn given(scene: &Scene, paths: &[Path], pose: &BoardPose, index: usize) -> Result<Planned, SimError> {
+fn given(
+    scene: &Scene,
+    scan: &ScanGeometry,
+    paths: &[Path],
+    pose: &BoardPose,
+    index: usize,
+) -> Result<Planned, SimError> {
     let unknown = |what: String| SimError::UnknownName {
         by: format!("pose {index}"),
         what,
@@ -176,7 +187,7 @@ fn given(scene: &Scene, paths: &[Path], pose: &BoardPose, index: usize) -> Resul
     let level = attitude(center, &normal, tangent_basis(&normal).0.into_inner());
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), pose.turn_deg.to_radians());
     let beams = match facet {
-        Some(facet) => served_beams(paths, scene.superstructure.facet.len())[facet],
+        Some(facet) => served_beams(paths, scene.superstructure.facet.len(), scan)[facet],
         None => None,
     };
     Ok(Planned {

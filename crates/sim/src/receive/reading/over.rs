@@ -9,7 +9,6 @@ use crate::light::optics::{Rig, Run, Setting, Then, Ways};
 use crate::light::power::{self, Target};
 use crate::receive::detect::Pulse;
 use catoptric_cast::Contact;
-use catoptric_model::beam;
 use std::ops::Range;
 
 /// Sub-rays that leave the structure alike, and what is around it.
@@ -23,7 +22,7 @@ struct Group<'a> {
 impl Sensor {
     /// The structure's part in the ways of all sub-rays, for [`Sensor::observe_over`]; `bare` holds nothing else.
     pub fn compile(&self, bare: &Setting<'_>) -> Rig {
-        Rig::compile(bare, beam::COUNT, |beam| self.rays(beam))
+        Rig::compile(bare, self.scan.beams(), |beam| self.rays(beam))
     }
 
     /// What neighboring beams from `first` on bring home: the same to the last bit, with the structure's part already
@@ -120,7 +119,7 @@ impl Sensor {
             if mirror.is_some_and(|mirror| setting.reflecting(mirror, front).is_some()) {
                 // Its light may come back to the structure.
                 let sub_ray = &self.sub_rays[sub_rays.start];
-                let ray = footprint::ray(&self.shape, beam::azimuth(beam), sub_ray);
+                let ray = footprint::ray(&self.shape, self.scan.azimuth(beam), sub_ray);
                 self.illuminate_along(setting, sub_ray, &ray, &setting.trace(&ray), parts);
                 continue;
             }

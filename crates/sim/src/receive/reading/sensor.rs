@@ -9,10 +9,11 @@ use crate::receive::detect;
 use crate::receive::echo::Receiver;
 use crate::scene::{BeamShape, Detection, ErrorModel, Errors, Light, Limits, Scene};
 use catoptric_cast::Ray;
-use catoptric_model::{RangeBias, beam};
+use catoptric_model::{RangeBias, ScanGeometry};
 
 /// The scanner with everything resolved that does not depend on where it looks.
 pub struct Sensor {
+    pub(super) scan: ScanGeometry,
     pub(super) shape: BeamShape,
     pub(super) sub_rays: Vec<SubRay>,
     pub(super) light: Light,
@@ -30,7 +31,7 @@ impl Sensor {
     /// Resolves a scene's scanner.
     ///
     /// # Errors
-    /// [`SimError::UnknownColor`] never happens with the built-in white that the walk is referred to.
+    /// [`SimError::Scanner`]; [`SimError::UnknownColor`] never happens with the built-in white that the walk is referred to.
     pub fn new(scene: &Scene) -> Result<Self, SimError> {
         let pulse_sd = detect::pulse_sd(scene.detection.pulse_fwhm_ns);
         let face_on = |reflectivity: f64, range: f64| {
@@ -62,6 +63,7 @@ impl Sensor {
         };
         let biased = matches!(scene.errors.model, ErrorModel::Empirical | ErrorModel::Both);
         Ok(Self {
+            scan: scene.scanner.scan()?,
             shape: scene.scanner.beam_shape(),
             sub_rays: footprint::sub_rays(scene.scanner.sub_rays as usize),
             light: scene.light.clone(),
@@ -83,6 +85,11 @@ impl Sensor {
             },
             errors: scene.errors.clone(),
         })
+    }
+
+    /// How it scans.
+    pub fn scan(&self) -> &ScanGeometry {
+        &self.scan
     }
 
     /// The biases that act.
@@ -117,7 +124,7 @@ impl Sensor {
 
     /// A beam's sub-rays as they leave the scanner, in the order in which they are cast.
     pub fn rays(&self, beam: usize) -> impl Iterator<Item = Ray> {
-        let azimuth = beam::azimuth(beam);
+        let azimuth = self.scan.azimuth(beam);
         self.sub_rays
             .iter()
             .map(move |s| footprint::ray(&self.shape, azimuth, s))
@@ -130,7 +137,7 @@ impl Sensor {
             narrow: 0.0,
             weight: 1.0,
         };
-        footprint::ray(&self.shape, beam::azimuth(beam), &chief)
+        footprint::ray(&self.shape, self.scan.azimuth(beam), &chief)
     }
 
     /// The way of a beam's chief ray.

@@ -72,7 +72,7 @@ impl Sensor {
     /// Each sub-ray has one way of [`Light::Beam`]; those of its ghosts follow, then what the mirrors on its way scatter.
     pub fn sub_ray_ends(&self, setting: &Setting<'_>, beam: usize) -> Vec<SubRayEnd> {
         let mut ends = Vec::with_capacity(self.sub_rays.len());
-        let azimuth = catoptric_model::beam::azimuth(beam);
+        let azimuth = self.scan.azimuth(beam);
         for (number, sub_ray) in self.sub_rays.iter().enumerate() {
             let ray = footprint::ray(&self.shape, azimuth, sub_ray);
             let path = setting.trace(&ray);
