@@ -2,7 +2,7 @@
 
 use super::bodies::Bodies;
 use super::capture::{Capture, seconds_between};
-use super::messages::{self, LabelledMarker, Scan};
+use super::messages::{LabelledMarker, Scan};
 use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::frame::Pose;
 use catoptric_model::session::ScannerSheet;
@@ -62,7 +62,7 @@ impl<R: Keep> Gathering<R> {
     /// Begins with a label.
     pub(super) fn new(label: PoseLabel, label_time: u64, scanner: &ScannerSheet) -> Self {
         Self {
-            kept: R::begin(&label, scanner.beams),
+            kept: R::begin(&label, scanner.scan.beams()),
             label,
             label_time,
             first_scan: None,

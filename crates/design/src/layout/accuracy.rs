@@ -170,7 +170,7 @@ fn record(laboratory: &Laboratory, number: usize, readings: usize) -> Result<Opt
         return Ok(None);
     };
     record.label.scans = readings;
-    record.readings = Readings::in_memory(beam::COUNT, spread(&returns, readings));
+    record.readings = Readings::in_memory(record.beams(), spread(&returns, readings));
     Ok(Some(record))
 }
 
