@@ -133,7 +133,7 @@ impl Canvas {
         }
         Picture {
             size: SIZE,
-            color: png::ColorType::Rgba,
+            color: image::ExtendedColorType::Rgba8,
             bytes,
         }
     }

@@ -99,7 +99,7 @@ fn room(drawn: &Drawn, part: impl Fn(f64) -> f64) -> Vec<u8> {
     };
     Picture {
         size: [depth.columns, depth.rows].map(|s| u32::try_from(s).unwrap_or(0)),
-        color: png::ColorType::GrayscaleAlpha,
+        color: image::ExtendedColorType::La8,
         bytes: depth.room_m.iter().flat_map(pixel).collect(),
     }
     .encoded()
