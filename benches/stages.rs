@@ -80,12 +80,9 @@ fn layout(c: &mut Criterion) {
         group.bench_function(format!("{name}, one facet edited"), |b| {
             b.iter(|| known.edited(&moved).unwrap().analysis().unwrap());
         });
-        group.bench_function(
-            format!("{name}, one facet edited, without its results"),
-            |b| {
-                b.iter(|| known.edited(&moved).unwrap());
-            },
-        );
+        group.bench_function(format!("{name}, one facet edited, without its results"), |b| {
+            b.iter(|| known.edited(&moved).unwrap());
+        });
     }
     group.finish();
 }
