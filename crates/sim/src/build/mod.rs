@@ -1,4 +1,4 @@
-//! From the drawing to surfaces: mirrors, bodies, boards, walls, and the way of a flight.
+//! From the drawing to surfaces: mirrors, bodies, boards, walls; and the trajectory of a flight.
 
 pub(crate) mod board;
 pub mod color;

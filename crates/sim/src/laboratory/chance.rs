@@ -1,7 +1,7 @@
-//! What is by chance in the readings of a stretch, scan by scan.
+//! Random effects in the readings of a stretch, scan by scan.
 //!
-//! Every draw is a function of (seed, purpose, scan, beam) alone. Correlated noise begins anew with each stretch, so
-//! that scan k of a stretch follows exactly from the innovations of its scans 0 to k and from nothing else.
+//! Every draw is a function of (seed, purpose, scan, beam) alone. Correlated noise starts anew with each stretch, so
+//! scan k of a stretch depends on the innovations of its scans 0 to k and on nothing else.
 
 use super::setup::Laboratory;
 use crate::noise::{Columns, Draws, Purpose};
@@ -10,19 +10,19 @@ use crate::scene::{Correlated, ErrorModel, Scene};
 use catoptric_model::beam;
 use std::sync::Arc;
 
-/// What is by chance in all readings of a stretch, and how what is new in every scan is drawn.
+/// The random effects that all readings of a stretch share, and the source of those that are drawn in every scan.
 #[derive(Clone)]
 pub(super) struct Luck<'a> {
     scene: &'a Scene,
     seed: u64,
     drift: f64,
-    /// Constant error of every beam; empty without any.
+    /// Constant error of every beam; empty if there is none.
     elements: Arc<[f64]>,
     start_s: f64,
     first_scan: usize,
 }
 
-/// What is by chance in one scan, each kind for all beams; a kind that the scene has not is empty.
+/// Random effects of one scan, each kind for all beams; a kind that the scene does not have is empty.
 #[derive(Default)]
 pub(super) struct ScanLuck {
     drift: f64,
@@ -32,17 +32,18 @@ pub(super) struct ScanLuck {
     dropout: Vec<f64>,
     correlated: Vec<f64>,
     interference: Vec<f64>,
-    /// Whether echoes are detected, of all beams, or of those that were asked for.
+    /// Draws that decide whether echoes are detected: for all beams here, or for the requested ones in `asked`.
     detection: Columns,
     asked: Vec<(usize, [f64; MAX_ECHOES])>,
-    /// Draws in the making.
+    /// Scratch space for draws.
     columns: Columns,
 }
 
-/// A beam is drawn by itself where fewer than this part of all is: a jump costs several columns in a row.
+/// Beams are drawn individually if fewer than one in this many is requested: a jump costs as much as several
+/// consecutive columns.
 const FEW: usize = 8;
 
-/// The chances of a stretch, from its first scan on.
+/// Random effects of a stretch, from its first scan on.
 pub struct Chances<'a> {
     luck: Luck<'a>,
     /// Scans of the stretch so far.
@@ -51,14 +52,14 @@ pub struct Chances<'a> {
     scan: ScanLuck,
 }
 
-/// The AR(1) state of every beam, of unit variance, after so many scans; empty before the first.
+/// The AR(1) state of every beam, of unit variance, after some number of scans; empty before the first.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Memory {
     states: Vec<f64>,
 }
 
 impl Laboratory {
-    /// The chances of a stretch, scan after scan.
+    /// Random effects of a stretch, scan by scan.
     pub fn chances(&self, number: usize) -> Chances<'_> {
         Chances {
             luck: self.luck(number),
@@ -79,7 +80,7 @@ impl Laboratory {
         }
     }
 
-    /// Constant error of every beam in a stretch, in metres; empty where there is none.
+    /// Constant error of every beam in a stretch, in meters; empty if there is none.
     fn elements(&self, number: usize) -> Vec<f64> {
         let sd = self.scene.errors.element_sd_mm * 1e-3;
         if sd == 0.0 || self.scene.errors.model == ErrorModel::None {
@@ -94,7 +95,7 @@ impl Laboratory {
             .collect()
     }
 
-    /// What the scanner is off because it is not warm yet, in metres: a·exp(−t/τ), t seconds into the recording.
+    /// Range error of the scanner while it warms up, in meters: a·exp(−t/τ), t seconds into the recording.
     pub fn warm_up(&self, time_s: f64) -> f64 {
         warm_up(&self.scene, time_s)
     }
@@ -119,12 +120,12 @@ impl Luck<'_> {
             .filter(|_| errors.model != ErrorModel::None)
     }
 
-    /// Row of a scan's draws.
+    /// Noise row of a scan.
     fn row(&self, scan: usize) -> u64 {
         (self.first_scan + scan) as u64
     }
 
-    /// The innovations ε of a scan, for all beams; none without correlated noise.
+    /// The innovations ε of a scan, for all beams; empty without correlated noise.
     pub(super) fn innovations(&self, scan: usize, columns: &mut Columns, out: &mut Vec<f64>) {
         out.clear();
         if self.correlated().is_some() {
@@ -133,8 +134,8 @@ impl Luck<'_> {
         }
     }
 
-    /// The AR(1) step of all beams, which turns the innovations of a scan into its states: x₀ = ε₀,
-    /// xₖ = φ·xₖ₋₁ + √(1 − φ²)·εₖ.
+    /// Takes the AR(1) step of all beams, which turns the innovations of a scan into states: x₀ = ε₀, xₖ = φ·xₖ₋₁ + √(1
+    /// − φ²)·εₖ.
     pub(super) fn remember(&self, scan: usize, memory: &mut Memory, innovations: &mut [f64]) {
         let Some(law) = self.correlated() else { return };
         let period_s = self.scene.scanner.limits().scan_period_s();
@@ -153,7 +154,7 @@ impl Luck<'_> {
 
     /// Draws a scan; `states` are those of its correlated noise.
     ///
-    /// With `asked`, only those beams are told whether their echoes are detected.
+    /// With `asked`, the detection of echoes is drawn for those beams only, if they are few.
     pub(super) fn draw(&self, scan: usize, states: &[f64], asked: Option<&[usize]>, into: &mut ScanLuck) {
         let (errors, row) = (&self.scene.errors, self.row(scan));
         if errors.model != ErrorModel::None {
@@ -204,7 +205,7 @@ impl Luck<'_> {
 }
 
 impl ScanLuck {
-    /// What is by chance in a beam's reading.
+    /// Random effects of a beam's reading.
     pub(super) fn of(&self, beam: usize) -> Chance {
         let asked = self.asked.binary_search_by_key(&beam, |(asked, _)| *asked);
         let detection = match asked {
@@ -218,7 +219,7 @@ impl ScanLuck {
         }
     }
 
-    /// The same without whether its echoes are detected.
+    /// The same without the detection of its echoes.
     #[inline]
     pub(super) fn but_detection(&self, beam: usize) -> Chance {
         let of = |kind: &[f64]| kind.get(beam).copied().unwrap_or_default();
@@ -236,7 +237,7 @@ impl ScanLuck {
 }
 
 impl Chances<'_> {
-    /// Leaves scans out, keeping what later ones remember of them.
+    /// Skips scans, keeping the state that later ones depend on.
     #[must_use]
     pub fn skip_scans(mut self, scans: usize) -> Self {
         for _ in 0..scans {
@@ -245,7 +246,7 @@ impl Chances<'_> {
         self
     }
 
-    /// The states of the next scan's correlated noise.
+    /// States of the next scan's correlated noise.
     fn step(&mut self) -> Vec<f64> {
         let mut states = Vec::new();
         self.luck
@@ -265,7 +266,7 @@ impl Chances<'_> {
 }
 
 impl Iterator for Chances<'_> {
-    /// One for every beam.
+    /// One per beam.
     type Item = Vec<Chance>;
 
     fn next(&mut self) -> Option<Vec<Chance>> {

@@ -1,6 +1,6 @@
 //! The virtual laboratory: a scene and a seed become stretches of scans, the session, and the truth.
 //!
-//! Every stretch is a pure function of (scene, seed, number), so that they can be computed in any order.
+//! Every stretch is a pure function of (scene, seed, number), so stretches can be computed in any order.
 
 mod belief;
 mod chance;

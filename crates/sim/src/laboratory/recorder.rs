@@ -1,4 +1,4 @@
-//! A stretch in the making: chance is added scan by scan to what the sensor sees.
+//! Records a stretch: random effects are added, scan by scan, to what the sensor sees.
 
 use super::chance::{Chances, ScanLuck};
 use super::setup::Laboratory;
@@ -15,14 +15,14 @@ pub struct Recorder<'a> {
     readings: Readings,
 }
 
-/// The readings of scans in a row.
+/// Readings of consecutive scans.
 pub(super) struct Readings {
     pub(super) ranges: Vec<f64>,
     pub(super) echoes: Option<Vec<Vec<f64>>>,
 }
 
 impl Laboratory {
-    /// Begins to record a stretch; scan after scan is added, as many as [`Laboratory::scans_of`] says.
+    /// Starts to record a stretch, to which [`Laboratory::scans_of`] scans are added one by one.
     pub fn recorder(&self, number: usize) -> Recorder<'_> {
         Recorder {
             laboratory: self,
@@ -32,7 +32,7 @@ impl Laboratory {
         }
     }
 
-    /// Room for the readings of so many scans.
+    /// Space for the readings of a given number of scans.
     pub(super) fn readings(&self, scans: usize) -> Readings {
         let all_echoes = self.scene.detection.echo == EchoChoice::All;
         Readings {
@@ -42,11 +42,11 @@ impl Laboratory {
     }
 }
 
-/// What every beam met, ready to be read scan after scan.
+/// What every beam receives, prepared to be read scan after scan.
 #[derive(Default)]
 pub(super) struct Digest {
     beams: Vec<Reported>,
-    /// The beams of [`Reported::ByChance`].
+    /// The beams of [`Reported::AtRandom`].
     by_chance: Vec<usize>,
 }
 
@@ -55,21 +55,21 @@ pub(super) struct Digest {
 enum Reported {
     /// No echo.
     Nothing,
-    /// One echo, which is detected whatever is drawn: its range and the standard deviation of its noise, in metres.
+    /// One echo, detected whatever is drawn: its range and the standard deviation of its noise, in meters.
     Surely { range: f64, noise_sd: f64 },
-    /// One of several, or all, or perhaps none.
+    /// One of several echoes, or all, or perhaps none, depending on what is drawn.
     ByChance,
 }
 
 impl Digest {
-    /// The digest of a scan; with `all_echoes` none is simple.
+    /// The digest of a scan; with `all_echoes`, no beam with an echo is [`Reported::Surely`].
     pub(super) fn of(returns: &Returns, all_echoes: bool) -> Self {
         let mut digest = Self::default();
         digest.take(returns, all_echoes);
         digest
     }
 
-    /// Becomes the digest of another scan.
+    /// Replaces the digest with that of another scan.
     pub(super) fn take(&mut self, returns: &Returns, all_echoes: bool) {
         self.beams.clear();
         self.by_chance.clear();
@@ -86,14 +86,14 @@ impl Digest {
         self.by_chance.extend(by_chance.map(|(beam, _)| beam));
     }
 
-    /// The beams whose detection is by chance.
+    /// The beams whose detection is random.
     pub(super) fn by_chance(&self) -> &[usize] {
         &self.by_chance
     }
 }
 
 impl Readings {
-    /// Adds a scan from what every beam met and the digest of it.
+    /// Adds a scan, given what every beam receives and the digest of it.
     pub(super) fn add(&mut self, laboratory: &Laboratory, seen: &Returns, digest: &Digest, luck: &ScanLuck) {
         let sensor = &laboratory.sensor;
         let beams = digest.beams.iter().enumerate();
@@ -112,14 +112,14 @@ impl Readings {
 }
 
 impl Recorder<'_> {
-    /// Adds a scan from what [`super::Sight::returns`] found for it.
+    /// Adds a scan, given its [`super::Sight::returns`].
     pub fn add(&mut self, returns: &Returns) {
         let digest = Digest::of(returns, self.readings.echoes.is_some());
         let luck = self.chances.next_scan(Some(digest.by_chance()));
         self.readings.add(self.laboratory, returns, &digest, luck);
     }
 
-    /// The stretch, with what motion capture saw meanwhile.
+    /// The stretch, with what motion capture saw during it.
     pub fn finish(self) -> Stretch {
         let frames = 0..self.laboratory.frames_of(self.number);
         self.laboratory.stretch_of(self.number, self.readings, frames)
@@ -127,7 +127,7 @@ impl Recorder<'_> {
 }
 
 impl Laboratory {
-    /// Readings with frames and all that is noted of the stretch.
+    /// Combines readings with motion-capture frames and the label of the stretch.
     pub(super) fn stretch_of(
         &self,
         number: usize,

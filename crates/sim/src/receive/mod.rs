@@ -1,4 +1,4 @@
-//! From light that comes home to a reading: pulses, echoes, ranges.
+//! From returning light to a reading: pulses, echoes, ranges.
 
 pub mod detect;
 pub mod echo;

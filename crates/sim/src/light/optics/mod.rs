@@ -1,4 +1,4 @@
-//! The way of a ray: from the scanner over mirrors to whatever stops it.
+//! The path of a ray: from the scanner via mirrors to whatever stops it.
 
 mod clearance;
 mod edit;

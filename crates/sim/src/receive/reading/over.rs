@@ -1,5 +1,5 @@
-//! Neighboring beams over a structure whose part in their ways is known: what leaves it is cast into the room together,
-//! and sub-rays that go one way to one surface are added in a row.
+//! Observes neighboring beams with the compiled paths via the structure: what leaves it is cast into the room together,
+//! and consecutive sub-rays that take one path to one surface are added together.
 
 use super::part::{Parts, Place};
 use super::returned::Return;
@@ -12,7 +12,7 @@ use catoptric_cast::Contact;
 use catoptric_model::beam;
 use std::ops::Range;
 
-/// Sub-rays that leave the structure alike, and what is around it.
+/// Sub-rays that leave the structure identically, and what is around it.
 #[derive(Clone, Copy)]
 struct Group<'a> {
     setting: &'a Setting<'a>,
@@ -21,15 +21,16 @@ struct Group<'a> {
 }
 
 impl Sensor {
-    /// The structure's part in the ways of all sub-rays, for [`Sensor::observe_over`]; `bare` holds nothing else.
+    /// Compiles the paths of all sub-rays via the structure, for [`Sensor::observe_over`]; `bare` contains nothing
+    /// else.
     pub fn compile(&self, bare: &Setting<'_>) -> Rig {
         Rig::compile(bare, beam::COUNT, |beam| self.rays(beam))
     }
 
-    /// What neighboring beams from `first` on bring home: the same to the last bit, with the structure's part already
-    /// followed and the room's for all of them together.
+    /// What neighboring beams from `first` on receive: bit for bit the same as [`Sensor::observe`], but with the
+    /// structure's part of the paths already compiled and the room's cast for all of them together.
     ///
-    /// Every beam has a setting of its own: the same one, or what is seen of it from elsewhere; `rig` must
+    /// Every beam has a setting of its own: the same one, or what is seen of it from another pose; `rig` must
     /// [hold](Rig::holds_in) in them.
     pub fn observe_over(
         &self,
@@ -58,7 +59,7 @@ impl Sensor {
         parts.beyond = beyond;
     }
 
-    /// [`Sensor::illuminate`] from where the sub-rays depart from the structure.
+    /// [`Sensor::illuminate`] from where the sub-rays leave the structure.
     fn illuminate_over(
         &self,
         ways: &Ways<'_>,
@@ -93,7 +94,7 @@ impl Sensor {
         parts.end();
     }
 
-    /// Adds the light of sub-rays that leave alike, with what they meet in the room.
+    /// Adds the light of sub-rays that leave identically, with what they hit in the room.
     fn illuminate_room(
         &self,
         group: &Group<'_>,
@@ -106,11 +107,11 @@ impl Sensor {
         while let Some(first) = in_room.get(done) {
             let surface = first.map(|contact| setting.met_in_room(&contact));
             let mirror = surface.filter(|surface| setting.is_mirror(*surface));
-            // Mirrors are looked at ray by ray.
+            // Mirrors are handled ray by ray.
             let count = if mirror.is_some() {
                 1
             } else {
-                alike(&in_room[done..])
+                same_surface(&in_room[done..])
             };
             let contacts = &in_room[done..done + count];
             let from = run.sub_rays.start + done;
@@ -118,7 +119,7 @@ impl Sensor {
             done += count;
             let front = first.is_some_and(|contact| contact.front());
             if mirror.is_some_and(|mirror| setting.reflecting(mirror, front).is_some()) {
-                // Its light may come back to the structure.
+                // Its light may return to the structure.
                 let sub_ray = &self.sub_rays[sub_rays.start];
                 let ray = footprint::ray(&self.shape, beam::azimuth(beam), sub_ray);
                 self.illuminate_along(setting, sub_ray, &ray, &setting.trace(&ray), parts);
@@ -126,7 +127,7 @@ impl Sensor {
             }
             if let Some(surface) = surface {
                 let ends = contacts.iter().zip(&ways.lengths[sub_rays.clone()]);
-                // All of them are there.
+                // All of these contacts exist.
                 let ends = ends.map(|(contact, length)| {
                     let end = |contact: &Contact| (length + contact.distance, contact.cos_incidence());
                     contact.as_ref().map_or((f64::INFINITY, 0.0), end)
@@ -137,7 +138,7 @@ impl Sensor {
         }
     }
 
-    /// Adds sub-rays of a run that end on one surface, each at a range and under an incidence of a cosine.
+    /// Adds sub-rays of a run that end on one surface, each with its range and the cosine of its incidence.
     fn add_light(
         &self,
         group: &Group<'_>,
@@ -174,7 +175,7 @@ impl Sensor {
         }
     }
 
-    /// Adds what the mirrors on the ways of sub-rays of a run scatter themselves.
+    /// Adds the light that the mirrors on the paths of a run's sub-rays scatter themselves.
     fn add_on_mirrors(&self, group: &Group<'_>, which: Range<usize>, parts: &mut Parts) {
         let Group { setting, ways, run } = *group;
         if setting.diffuse_reflectivity() <= 0.0 {
@@ -187,16 +188,16 @@ impl Sensor {
                 let on = &arrival.on;
                 let cosines = meetings[..arrival.bounces].iter().map(|m| m.cos_incidence);
                 let (power, share) = (power::received(&self.light, on), on.share * arrival.gain);
-                let way = (arrival.surface, &facets[..arrival.bounces]);
+                let path = (arrival.surface, &facets[..arrival.bounces]);
                 let place = (on.range, on.cos_incidence);
-                parts.add(way, power, share, place, cosines, is_chief(sub_ray));
+                parts.add(path, power, share, place, cosines, is_chief(sub_ray));
             }
         }
     }
 }
 
-/// How many legs in a row, from the first on, meet the same surface, or nothing.
-fn alike(in_room: &[Option<Contact>]) -> usize {
+/// Number of consecutive legs, from the first on, that hit the same surface, or nothing.
+fn same_surface(in_room: &[Option<Contact>]) -> usize {
     let surface = |contact: &Option<Contact>| contact.as_ref().map(|contact| contact.surface);
     let met = in_room.first().and_then(surface);
     in_room
