@@ -264,7 +264,10 @@ fn a_plate_says_what_it_lacks() {
     let from = VALID.lines().find(|l| l.starts_with("shape.wedge")).unwrap();
     let problems = problems_with(&VALID.replace(from, plate), &[]);
     let said = problems.to_string();
-    assert!(said.contains("names a beam, and `azimuth_deg` names another"), "{said}");
+    assert!(
+        said.contains("names a beam, and `azimuth_deg` names another"),
+        "{said}"
+    );
     assert!(
         said.contains("needs exactly one direction, but has none, half of one, or two"),
         "{said}"

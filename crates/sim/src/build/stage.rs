@@ -4,7 +4,7 @@
 //! structure, its beams and the truth about them do not include them.
 
 use crate::build::layout;
-use crate::build::structure::{BuiltFacet, Part, mesh_shape};
+use crate::build::structure::{BuiltFacet, OpaquePart, mesh_shape};
 use crate::error::SimError;
 use crate::scene::{PlaneRectangle, PlaneShape, RoomMirror, RoomSurface, Scene, SurfaceShape};
 use catoptric_cast::{Block, Cylinder, Polygon, Shape};
@@ -18,7 +18,7 @@ pub struct Stage {
     /// The mirrors.
     pub mirrors: Vec<BuiltFacet>,
     /// The surfaces.
-    pub surfaces: Vec<Part>,
+    pub surfaces: Vec<OpaquePart>,
 }
 
 impl Stage {
@@ -31,7 +31,7 @@ impl Stage {
         let surfaces = scene.room.surface.iter().map(|s| {
             let frame_from_surface =
                 frame_from_room * pose(s.position_m, [s.yaw_deg, s.pitch_deg, s.roll_deg]);
-            Ok(Part {
+            Ok(OpaquePart {
                 name: s.name.clone(),
                 shape: surface(scene, s, &frame_from_surface)?,
                 color: s.color.clone(),

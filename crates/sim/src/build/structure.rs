@@ -48,7 +48,7 @@ pub enum Back {
 
 /// An opaque part in the sensor frame.
 #[derive(Debug, Clone)]
-pub struct Part {
+pub struct OpaquePart {
     /// Name.
     pub name: String,
     /// Its shape.
@@ -65,7 +65,7 @@ pub struct Structure {
     /// The mirrors.
     pub facets: Vec<BuiltFacet>,
     /// Posts and housing.
-    pub parts: Vec<Part>,
+    pub parts: Vec<OpaquePart>,
 }
 
 /// Slope of a facet's surface relative to its plane: the gradient of a cubic height field over the facet.
@@ -363,15 +363,15 @@ pub(crate) fn mesh_shape(
     frame_from_mesh: &Pose,
 ) -> Result<Shape, SimError> {
     let mesh = scene.meshes.get(&shape.file)?;
-    let triangles = Triangles::new(mesh, shape.units.in_metres(), frame_from_mesh);
+    let triangles = Triangles::new(mesh, shape.units.in_meters(), frame_from_mesh);
     Ok(Shape::Mesh(Arc::new(triangles)))
 }
 
-fn parts(scene: &Scene, sensor_from_drawing: &Pose) -> Result<Vec<Part>, SimError> {
+fn parts(scene: &Scene, sensor_from_drawing: &Pose) -> Result<Vec<OpaquePart>, SimError> {
     let posts = scene.superstructure.post.iter();
-    let mut parts: Vec<Part> = posts
+    let mut parts: Vec<OpaquePart> = posts
         .map(|p| {
-            Ok(Part {
+            Ok(OpaquePart {
                 name: p.name.clone(),
                 shape: post_shape(scene, p, sensor_from_drawing)?,
                 color: p.color.clone(),
@@ -383,7 +383,7 @@ fn parts(scene: &Scene, sensor_from_drawing: &Pose) -> Result<Vec<Part>, SimErro
             Translation3::from(Vector3::from(part.center_mm) * 1e-3),
             UnitQuaternion::identity(),
         );
-        Part {
+        OpaquePart {
             name: "housing".to_owned(),
             shape: Shape::Block(Block::new(
                 sensor_from_drawing * place,

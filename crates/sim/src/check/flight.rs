@@ -100,7 +100,9 @@ fn check_scans(scene: &Scene, flight: &Flight, path: &Path, found: &mut Findings
 
 /// Checks that the rig, the sensor and the mirrors stay inside the walls during the whole flight.
 fn check_trajectory(scene: &Scene, flight: &Flight, path: &Path, found: &mut Findings) {
-    let Some(trajectory) = Trajectory::of(flight) else { return };
+    let Some(trajectory) = Trajectory::of(flight) else {
+        return;
+    };
     let rig_from_sensor = structure::nominal_mount(scene);
     let mut parts = vec![("rig".to_owned(), Point3::origin())];
     parts.push(("sensor".to_owned(), rig_from_sensor * Point3::origin()));

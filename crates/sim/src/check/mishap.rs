@@ -62,10 +62,6 @@ fn check_kind(mishap: &Mishap, path: &Path, found: &mut Findings) {
     }
     let still = |by: Option<[f64; 3]>| by.is_none_or(|by| by == [0.0; 3]);
     if mishap.moves() && still(mishap.moved_mm) && still(mishap.moved_deg) {
-        found.add(
-            path,
-            "moves the board by zero",
-            "set how far it moves".to_owned(),
-        );
+        found.add(path, "moves the board by zero", "set how far it moves".to_owned());
     }
 }

@@ -4,12 +4,12 @@
 //! its innovations are drawn with each excerpt, and the excerpts of a stretch are linked in order between drawing and
 //! recording, which costs one multiplication and one addition per reading.
 
-use super::chance::{Luck, Memory, ScanLuck};
+use super::effects::{EffectSource, Memory, ScanEffects};
 use super::recorder::{Digest, Readings};
 use super::setup::Laboratory;
 use super::sight::Returns;
 use crate::noise::Columns;
-use crate::receive::reading::Chance;
+use crate::receive::reading::RandomEffects;
 use catoptric_model::dataset::nanoseconds;
 use catoptric_model::{Excerpt, Pose, beam};
 use std::ops::Range;
@@ -27,10 +27,10 @@ pub struct Drawn {
 pub struct ExcerptRecorder<'a> {
     laboratory: &'a Laboratory,
     drawn: &'a Drawn,
-    luck: Luck<'a>,
+    source: EffectSource<'a>,
     readings: Readings,
     digest: Digest,
-    scan_luck: ScanLuck,
+    scan_effects: ScanEffects,
     /// The next scan to add.
     next: usize,
 }
@@ -59,11 +59,11 @@ impl ExcerptRecorder<'_> {
             self.digest.take(returns, self.readings.echoes.is_some());
         }
         let states = self.drawn.states(self.next);
-        let asked = Some(self.digest.by_chance());
-        self.luck.draw(self.next, states, asked, &mut self.scan_luck);
+        let asked = Some(self.digest.at_random());
+        self.source.draw(self.next, states, asked, &mut self.scan_effects);
         let known = self.readings.ranges.len();
         self.readings
-            .add(self.laboratory, returns, &self.digest, &self.scan_luck);
+            .add(self.laboratory, returns, &self.digest, &self.scan_effects);
         self.next += 1;
         &self.readings.ranges[known..]
     }
@@ -84,13 +84,13 @@ impl ExcerptRecorder<'_> {
 impl Laboratory {
     /// Draws the innovations of some scans of a stretch.
     pub fn draw(&self, number: usize, scans: Range<usize>) -> Drawn {
-        let luck = self.luck(number);
+        let source = self.effect_source(number);
         let mut columns = Columns::default();
         let states = scans
             .clone()
             .map(|scan| {
                 let mut innovations = Vec::new();
-                luck.innovations(scan, &mut columns, &mut innovations);
+                source.innovations(scan, &mut columns, &mut innovations);
                 innovations
             })
             .collect();
@@ -104,9 +104,9 @@ impl Laboratory {
     /// Carries the state of correlated noise through scans. Earlier scans must have been linked with the same memory;
     /// before the first scan of a stretch its content is ignored.
     pub fn link(&self, drawn: &mut Drawn, memory: &mut Memory) {
-        let luck = self.luck(drawn.number);
+        let source = self.effect_source(drawn.number);
         for (scan, states) in drawn.scans.clone().zip(&mut drawn.states) {
-            luck.remember(scan, memory, states);
+            source.remember(scan, memory, states);
         }
     }
 
@@ -115,20 +115,20 @@ impl Laboratory {
         ExcerptRecorder {
             laboratory: self,
             drawn,
-            luck: self.luck(drawn.number),
+            source: self.effect_source(drawn.number),
             readings: self.readings(drawn.scans.len()),
             digest: Digest::default(),
-            scan_luck: ScanLuck::default(),
+            scan_effects: ScanEffects::default(),
             next: drawn.scans.start,
         }
     }
 
     /// Random effects of one of the linked scans, one per beam.
-    pub fn scan_chances(&self, drawn: &Drawn, scan: usize) -> Vec<Chance> {
-        let mut scan_luck = ScanLuck::default();
-        self.luck(drawn.number)
-            .draw(scan, drawn.states(scan), None, &mut scan_luck);
-        (0..beam::COUNT).map(|beam| scan_luck.of(beam)).collect()
+    pub fn scan_effects(&self, drawn: &Drawn, scan: usize) -> Vec<RandomEffects> {
+        let mut scan_effects = ScanEffects::default();
+        self.effect_source(drawn.number)
+            .draw(scan, drawn.states(scan), None, &mut scan_effects);
+        (0..beam::COUNT).map(|beam| scan_effects.of(beam)).collect()
     }
 
     /// Time and pose at which each body of a stretch is solved for the first time.

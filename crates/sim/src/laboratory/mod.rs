@@ -3,7 +3,7 @@
 //! Every stretch is a pure function of (scene, seed, number), so stretches can be computed in any order.
 
 mod belief;
-mod chance;
+mod effects;
 mod excerpt;
 mod knowledge;
 mod label;
@@ -19,7 +19,7 @@ mod tracks;
 mod true_values;
 pub mod truth;
 
-pub use chance::{Chances, Memory};
+pub use effects::{Memory, StretchEffects};
 pub use excerpt::{Drawn, ExcerptRecorder};
 pub use recorder::Recorder;
 pub use setup::Laboratory;

@@ -1,6 +1,6 @@
 //! Records a stretch: random effects are added, scan by scan, to what the sensor sees.
 
-use super::chance::{Chances, ScanLuck};
+use super::effects::{ScanEffects, StretchEffects};
 use super::setup::Laboratory;
 use super::sight::Returns;
 use crate::scene::EchoChoice;
@@ -11,7 +11,7 @@ use catoptric_model::{Stretch, beam};
 pub struct Recorder<'a> {
     laboratory: &'a Laboratory,
     number: usize,
-    chances: Chances<'a>,
+    effects: StretchEffects<'a>,
     readings: Readings,
 }
 
@@ -27,7 +27,7 @@ impl Laboratory {
         Recorder {
             laboratory: self,
             number,
-            chances: self.chances(number),
+            effects: self.effects(number),
             readings: self.readings(self.planned[number].scans),
         }
     }
@@ -47,7 +47,7 @@ impl Laboratory {
 pub(super) struct Digest {
     beams: Vec<Reported>,
     /// The beams of [`Reported::AtRandom`].
-    by_chance: Vec<usize>,
+    at_random: Vec<usize>,
 }
 
 /// What a beam reports.
@@ -58,7 +58,7 @@ enum Reported {
     /// One echo, detected whatever is drawn: its range and the standard deviation of its noise, in meters.
     Surely { range: f64, noise_sd: f64 },
     /// One of several echoes, or all, or perhaps none, depending on what is drawn.
-    ByChance,
+    AtRandom,
 }
 
 impl Digest {
@@ -72,41 +72,47 @@ impl Digest {
     /// Replaces the digest with that of another scan.
     pub(super) fn take(&mut self, returns: &Returns, all_echoes: bool) {
         self.beams.clear();
-        self.by_chance.clear();
+        self.at_random.clear();
         self.beams.extend(returns.iter().map(|found| match found {
             None => Reported::Nothing,
             Some(found) if found.probability >= 1.0 && !all_echoes => Reported::Surely {
                 range: found.range(),
                 noise_sd: found.noise_sd,
             },
-            Some(_) => Reported::ByChance,
+            Some(_) => Reported::AtRandom,
         }));
         let beams = self.beams.iter().enumerate();
-        let by_chance = beams.filter(|(_, reported)| matches!(reported, Reported::ByChance));
-        self.by_chance.extend(by_chance.map(|(beam, _)| beam));
+        let at_random = beams.filter(|(_, reported)| matches!(reported, Reported::AtRandom));
+        self.at_random.extend(at_random.map(|(beam, _)| beam));
     }
 
     /// The beams whose detection is random.
-    pub(super) fn by_chance(&self) -> &[usize] {
-        &self.by_chance
+    pub(super) fn at_random(&self) -> &[usize] {
+        &self.at_random
     }
 }
 
 impl Readings {
     /// Adds a scan, given what every beam receives and the digest of it.
-    pub(super) fn add(&mut self, laboratory: &Laboratory, seen: &Returns, digest: &Digest, luck: &ScanLuck) {
+    pub(super) fn add(
+        &mut self,
+        laboratory: &Laboratory,
+        seen: &Returns,
+        digest: &Digest,
+        effects: &ScanEffects,
+    ) {
         let sensor = &laboratory.sensor;
         let beams = digest.beams.iter().enumerate();
         self.ranges.extend(beams.map(|(beam, reported)| match *reported {
             Reported::Nothing => NO_RETURN,
             Reported::Surely { range, noise_sd } => {
-                sensor.read_echo(range, noise_sd, &luck.but_detection(beam))
+                sensor.read_echo(range, noise_sd, &effects.without_detection(beam))
             }
-            Reported::ByChance => sensor.read(seen[beam].as_ref(), &luck.of(beam)),
+            Reported::AtRandom => sensor.read(seen[beam].as_ref(), &effects.of(beam)),
         }));
         if let Some(echoes) = &mut self.echoes {
             let beams = seen.iter().enumerate();
-            echoes.extend(beams.map(|(beam, found)| sensor.read_all(found.as_ref(), &luck.of(beam))));
+            echoes.extend(beams.map(|(beam, found)| sensor.read_all(found.as_ref(), &effects.of(beam))));
         }
     }
 }
@@ -115,8 +121,8 @@ impl Recorder<'_> {
     /// Adds a scan, given its [`super::Sight::returns`].
     pub fn add(&mut self, returns: &Returns) {
         let digest = Digest::of(returns, self.readings.echoes.is_some());
-        let luck = self.chances.next_scan(Some(digest.by_chance()));
-        self.readings.add(self.laboratory, returns, &digest, luck);
+        let effects = self.effects.next_scan(Some(digest.at_random()));
+        self.readings.add(self.laboratory, returns, &digest, effects);
     }
 
     /// The stretch, with what motion capture saw during it.

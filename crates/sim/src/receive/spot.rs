@@ -23,7 +23,7 @@ impl Sensor {
         for beam in first..first + beams {
             let azimuth = beam::azimuth(beam);
             let (mut mean, mut square) = (Vector2::zeros(), Vector2::zeros());
-            for sub_ray in self.bundle() {
+            for sub_ray in self.sub_ray_list() {
                 let ray = footprint::ray(self.shape(), azimuth, sub_ray);
                 let distance = plane.distance_along(&ray.origin, &ray.direction)?;
                 let point = sensor_from_board

@@ -18,7 +18,7 @@ pub enum MeshUnits {
 
 impl MeshUnits {
     /// One unit, in meters.
-    pub fn in_metres(self) -> f64 {
+    pub fn in_meters(self) -> f64 {
         match self {
             Self::M => 1.0,
             Self::Mm => 1e-3,

@@ -11,6 +11,6 @@ mod together;
 pub use edit::{Edit, Trail};
 pub use path::{Bounce, Course, End, MAX_BOUNCES, Meeting, Path};
 pub use rig::Rig;
-pub(crate) use rig::{Run, Then, Ways};
+pub(crate) use rig::{BeamPaths, Run, Then};
 pub(crate) use setting::Beyond;
 pub use setting::{Mirrors, Role, Setting, Target};

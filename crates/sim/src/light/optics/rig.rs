@@ -27,7 +27,7 @@ pub struct Rig {
 
 /// The paths of a beam's sub-rays via the structure, in the order in which they are cast.
 #[derive(Debug, Clone)]
-pub(crate) struct Ways<'a> {
+pub(crate) struct BeamPaths<'a> {
     /// How the sub-rays leave the structure or end on it, in order.
     pub(crate) runs: &'a [Run],
     /// Path lengths of all sub-rays, in meters: to the end on the structure, or to where the last leg begins.
@@ -79,7 +79,7 @@ pub(crate) struct Run {
 /// What a sub-ray does after the last mirror of the structure.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Then {
-    /// It leaves, by the next of [`Ways::leaving`].
+    /// It leaves, by the next of [`BeamPaths::leaving`].
     Leaves,
     /// It ends on a surface of the structure, with this cosine of the incidence.
     EndsOn(usize, f64),
@@ -119,9 +119,9 @@ impl Rig {
     }
 
     /// The paths of a beam.
-    pub(crate) fn ways(&self, beam: usize) -> Ways<'_> {
+    pub(crate) fn paths(&self, beam: usize) -> BeamPaths<'_> {
         let (from, to, all) = (&self.starts[beam], &self.starts[beam + 1], &self.all);
-        Ways {
+        BeamPaths {
             runs: &all.runs[from.runs..to.runs],
             lengths: &all.lengths[from.lengths..to.lengths],
             leaving: from.leaving..to.leaving,
@@ -150,7 +150,7 @@ impl Compiled {
     /// The paths of a beam, how far from the sensor they go before they leave, and whether glass on them makes ghosts.
     fn of(bare: &Setting<'_>, rays: impl Iterator<Item = Ray>) -> (Self, f64, bool) {
         let rays: Vec<Ray> = rays.collect();
-        let mut ways = Self::default();
+        let mut compiled = Self::default();
         let mut bounces: Vec<(usize, usize, Meeting)> = Vec::new();
         let mut reach: f64 = 0.0;
         let courses = bare.follow_beam(&rays, bare.contents.max_bounces, |ray, bounce| {
@@ -172,7 +172,7 @@ impl Compiled {
             }
             let then = match course.end {
                 End::Escaped => {
-                    ways.leaving.push(course.last);
+                    compiled.leaving.push(course.last);
                     Then::Leaves
                 }
                 End::Hit(hit) => {
@@ -187,12 +187,13 @@ impl Compiled {
             };
             let own = met..met + course.count;
             met = own.end;
-            ways.lengths.push(course.length);
-            ways.depart(course, then, own.clone().map(|i| bounces[i].1));
-            ways.meetings
+            compiled.lengths.push(course.length);
+            compiled.depart(course, then, own.clone().map(|i| bounces[i].1));
+            compiled
+                .meetings
                 .extend(bounces[own].iter().map(|(.., meeting)| *meeting));
         }
-        (ways, reach, ghosts)
+        (compiled, reach, ghosts)
     }
 
     fn start(&self) -> Start {
@@ -239,7 +240,7 @@ impl Compiled {
     }
 }
 
-impl<'a> Ways<'a> {
+impl<'a> BeamPaths<'a> {
     /// The mirrors that a run's sub-rays hit.
     pub(crate) fn facets(&self, run: &Run) -> &'a [usize] {
         &self.facets[run.facets.clone()]

@@ -8,7 +8,7 @@ use super::clearance::Extent;
 use super::path::MAX_BOUNCES;
 use crate::build::color::{self, Paint};
 use crate::build::stage::Stage;
-use crate::build::structure::{Back, BuiltFacet, Part, Structure};
+use crate::build::structure::{Back, BuiltFacet, OpaquePart, Structure};
 use crate::error::SimError;
 use crate::scene::Scene;
 use catoptric_cast::Ray;
@@ -483,7 +483,7 @@ impl List {
         facets: &mut Vec<Cow<'a, BuiltFacet>>,
         targets: Vec<Target>,
         mirrors: impl Iterator<Item = Cow<'a, BuiltFacet>>,
-        parts: &[Part],
+        parts: &[OpaquePart],
     ) -> Result<(), SimError> {
         let dull = color::paint(scene, "structure")?;
         for target in targets {

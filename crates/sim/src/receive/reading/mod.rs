@@ -15,7 +15,7 @@ mod sub_ray;
 pub use class::{BeamClass, class};
 pub use observe::Share;
 pub use part::Parts;
-pub use report::Chance;
+pub use report::RandomEffects;
 pub use returned::{MAX_ECHOES, Return};
 pub use sensor::Sensor;
 pub use sub_ray::{Light as SubRayLight, Stop, SubRayEnd};

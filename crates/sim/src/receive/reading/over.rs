@@ -5,7 +5,7 @@ use super::part::{Parts, Place};
 use super::returned::Return;
 use super::sensor::{Sensor, is_chief};
 use crate::light::footprint;
-use crate::light::optics::{Rig, Run, Setting, Then, Ways};
+use crate::light::optics::{BeamPaths, Rig, Run, Setting, Then};
 use crate::light::power::{self, Target};
 use crate::receive::detect::Pulse;
 use catoptric_cast::Contact;
@@ -14,9 +14,9 @@ use std::ops::Range;
 
 /// Sub-rays that leave the structure identically, and what is around it.
 #[derive(Clone, Copy)]
-struct Group<'a> {
+struct RunContext<'a> {
     setting: &'a Setting<'a>,
-    ways: &'a Ways<'a>,
+    paths: &'a BeamPaths<'a>,
     run: &'a Run,
 }
 
@@ -43,17 +43,17 @@ impl Sensor {
         let mut beyond = std::mem::take(&mut parts.beyond);
         beyond.clear();
         for (setting, beam) in settings.iter().zip(first..) {
-            setting.leave(rig.leaving(), rig.ways(beam).leaving, &mut beyond);
+            setting.leave(rig.leaving(), rig.paths(beam).leaving, &mut beyond);
         }
         if let Some(any) = settings.first() {
             any.cast_into_room(&mut beyond);
         }
         let mut in_room = beyond.contacts.as_slice();
         for ((setting, beam), place) in settings.iter().zip(first..).zip(returns) {
-            let ways = rig.ways(beam);
-            let (own, others) = in_room.split_at(ways.leaving.len());
+            let paths = rig.paths(beam);
+            let (own, others) = in_room.split_at(paths.leaving.len());
             in_room = others;
-            self.illuminate_over(&ways, setting, beam, own, parts);
+            self.illuminate_over(&paths, setting, beam, own, parts);
             *place = self.receive(setting, parts.as_slice());
         }
         parts.beyond = beyond;
@@ -62,7 +62,7 @@ impl Sensor {
     /// [`Sensor::illuminate`] from where the sub-rays leave the structure.
     fn illuminate_over(
         &self,
-        ways: &Ways<'_>,
+        paths: &BeamPaths<'_>,
         setting: &Setting<'_>,
         beam: usize,
         in_room: &[Option<Contact>],
@@ -70,22 +70,22 @@ impl Sensor {
     ) {
         parts.begin();
         let mut left = 0;
-        for run in ways.runs {
-            let group = Group { setting, ways, run };
+        for run in paths.runs {
+            let context = RunContext { setting, paths, run };
             let all = run.sub_rays.clone();
             match run.then {
                 Then::Leaves => {
                     let legs = left..left + all.len();
                     left = legs.end;
-                    self.illuminate_room(&group, beam, &in_room[legs], parts);
+                    self.illuminate_room(&context, beam, &in_room[legs], parts);
                 }
                 Then::EndsOn(surface, cos_incidence) => {
                     let end = |length| (length, cos_incidence);
-                    let ends = ways.lengths[all.clone()].iter().copied().map(end);
-                    self.add_light(&group, all.clone(), surface, ends, parts);
-                    self.add_on_mirrors(&group, all, parts);
+                    let ends = paths.lengths[all.clone()].iter().copied().map(end);
+                    self.add_light(&context, all.clone(), surface, ends, parts);
+                    self.add_on_mirrors(&context, all, parts);
                 }
-                Then::Trapped => self.add_on_mirrors(&group, all, parts),
+                Then::Trapped => self.add_on_mirrors(&context, all, parts),
             }
         }
         if self.lacks_chief() {
@@ -97,12 +97,12 @@ impl Sensor {
     /// Adds the light of sub-rays that leave identically, with what they hit in the room.
     fn illuminate_room(
         &self,
-        group: &Group<'_>,
+        context: &RunContext<'_>,
         beam: usize,
         in_room: &[Option<Contact>],
         parts: &mut Parts,
     ) {
-        let Group { setting, ways, run } = *group;
+        let RunContext { setting, paths, run } = *context;
         let mut done = 0;
         while let Some(first) = in_room.get(done) {
             let surface = first.map(|contact| setting.met_in_room(&contact));
@@ -126,31 +126,31 @@ impl Sensor {
                 continue;
             }
             if let Some(surface) = surface {
-                let ends = contacts.iter().zip(&ways.lengths[sub_rays.clone()]);
+                let ends = contacts.iter().zip(&paths.lengths[sub_rays.clone()]);
                 // All of these contacts exist.
                 let ends = ends.map(|(contact, length)| {
                     let end = |contact: &Contact| (length + contact.distance, contact.cos_incidence());
                     contact.as_ref().map_or((f64::INFINITY, 0.0), end)
                 });
-                self.add_light(group, sub_rays.clone(), surface, ends, parts);
+                self.add_light(context, sub_rays.clone(), surface, ends, parts);
             }
-            self.add_on_mirrors(group, sub_rays, parts);
+            self.add_on_mirrors(context, sub_rays, parts);
         }
     }
 
     /// Adds sub-rays of a run that end on one surface, each with its range and the cosine of its incidence.
     fn add_light(
         &self,
-        group: &Group<'_>,
+        context: &RunContext<'_>,
         which: Range<usize>,
         surface: usize,
         ends: impl Iterator<Item = (f64, f64)>,
         parts: &mut Parts,
     ) {
-        let Group { setting, ways, run } = *group;
+        let RunContext { setting, paths, run } = *context;
         let reflectivity = setting.paint(surface).reflectivity;
         let target = Target::new(&self.light, reflectivity, self.mirrors[run.silvered] * run.gain);
-        let facets = ways.facets(run);
+        let facets = paths.facets(run);
         let part = parts.of(surface, facets);
         let known = part.pulses.len();
         let mut chief = None;
@@ -166,7 +166,7 @@ impl Sensor {
                     (Pulse { range, power }, sub_ray.weight * run.gain, cos_incidence)
                 }),
         );
-        let cosines = |number| ways.meetings(run, number).iter().map(|m| m.cos_incidence);
+        let cosines = |number| paths.meetings(run, number).iter().map(|m| m.cos_incidence);
         if !facets.is_empty() {
             part.add_cosines(known, which.map(cosines));
         }
@@ -176,14 +176,14 @@ impl Sensor {
     }
 
     /// Adds the light that the mirrors on the paths of a run's sub-rays scatter themselves.
-    fn add_on_mirrors(&self, group: &Group<'_>, which: Range<usize>, parts: &mut Parts) {
-        let Group { setting, ways, run } = *group;
+    fn add_on_mirrors(&self, context: &RunContext<'_>, which: Range<usize>, parts: &mut Parts) {
+        let RunContext { setting, paths, run } = *context;
         if setting.diffuse_reflectivity() <= 0.0 {
             return;
         }
-        let facets = ways.facets(run);
+        let facets = paths.facets(run);
         for number in which {
-            let (sub_ray, meetings) = (&self.sub_rays[number], ways.meetings(run, number));
+            let (sub_ray, meetings) = (&self.sub_rays[number], paths.meetings(run, number));
             for arrival in self.on_mirrors(setting, sub_ray, meetings.iter().copied()) {
                 let on = &arrival.on;
                 let cosines = meetings[..arrival.bounces].iter().map(|m| m.cos_incidence);

@@ -6,7 +6,7 @@ use crate::scene::ErrorModel;
 
 /// The random effects in one reading, each contribution separately.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Chance {
+pub struct RandomEffects {
     /// Constant of the pose, in meters.
     pub drift: f64,
     /// Constant of the beam in the pose, in meters.
@@ -49,35 +49,35 @@ impl Sensor {
     /// A reading of one scan, in meters: the beam's range with its random effects, rounded, or a code.
     ///
     /// Noise is never applied to a code.
-    pub fn read(&self, found: Option<&Return>, chance: &Chance) -> f64 {
+    pub fn read(&self, found: Option<&Return>, effects: &RandomEffects) -> f64 {
         use catoptric_model::range::NO_RETURN;
-        let detected = self.detected(found, chance).next();
+        let detected = self.detected(found, effects).next();
         detected.map_or(NO_RETURN, |found| {
-            self.read_echo(found.range(), found.noise_sd, chance)
+            self.read_echo(found.range(), found.noise_sd, effects)
         })
     }
 
     /// The reading of an echo that is detected, by its [`Return::range`] and the standard deviation of its noise, in
     /// meters.
     #[inline]
-    pub fn read_echo(&self, range: f64, noise_sd: f64, chance: &Chance) -> f64 {
+    pub fn read_echo(&self, range: f64, noise_sd: f64, effects: &RandomEffects) -> f64 {
         use catoptric_model::range::INVALID;
-        if self.errors.model != ErrorModel::None && chance.dropout < self.errors.dropout {
+        if self.errors.model != ErrorModel::None && effects.dropout < self.errors.dropout {
             return INVALID;
         }
-        self.report(range, noise_sd, chance)
+        self.report(range, noise_sd, effects)
     }
 
     /// All echoes of a reading that are reported, in meters, nearest first; none if the reading is lost.
     ///
     /// The random effects of a reading are common to its echoes.
-    pub fn read_all(&self, found: Option<&Return>, chance: &Chance) -> Vec<f64> {
-        if self.errors.model != ErrorModel::None && chance.dropout < self.errors.dropout {
+    pub fn read_all(&self, found: Option<&Return>, effects: &RandomEffects) -> Vec<f64> {
+        if self.errors.model != ErrorModel::None && effects.dropout < self.errors.dropout {
             return Vec::new();
         }
-        self.detected(found, chance)
+        self.detected(found, effects)
             .take(self.limits.echoes as usize)
-            .map(|echo| self.report(echo.range(), echo.noise_sd, chance))
+            .map(|echo| self.report(echo.range(), echo.noise_sd, effects))
             .collect()
     }
 
@@ -85,18 +85,18 @@ impl Sensor {
     fn detected<'a>(
         &self,
         found: Option<&'a Return>,
-        chance: &'a Chance,
+        effects: &'a RandomEffects,
     ) -> impl Iterator<Item = &'a Return> + use<'a> {
         let echoes = found.into_iter().flat_map(Return::echoes);
         echoes
-            .zip(chance.detection)
-            .filter(|(echo, chance)| *chance < echo.probability)
+            .zip(effects.detection)
+            .filter(|(echo, draw)| *draw < echo.probability)
             .map(|(echo, _)| echo)
     }
 
     /// The range of an echo as reported, in meters, or the code of one that cannot be reported.
     #[inline]
-    fn report(&self, range: f64, noise_sd: f64, chance: &Chance) -> f64 {
+    fn report(&self, range: f64, noise_sd: f64, effects: &RandomEffects) -> f64 {
         use catoptric_model::range::{NO_RETURN, TOO_CLOSE};
         if self.errors.model == ErrorModel::None {
             return if range < self.limits.range_min_m {
@@ -105,8 +105,8 @@ impl Sensor {
                 range
             };
         }
-        let white = range + chance.drift + noise_sd * chance.noise;
-        let range = white + (chance.warm_up + chance.correlated + chance.interference + chance.element);
+        let white = range + effects.drift + noise_sd * effects.noise;
+        let range = white + (effects.warm_up + effects.correlated + effects.interference + effects.element);
         let step = self.errors.quantization_mm * 1e-3;
         let range = if step > 0.0 {
             rounded(range / step) * step

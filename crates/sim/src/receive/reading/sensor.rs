@@ -101,7 +101,7 @@ impl Sensor {
     }
 
     /// The sub-rays of a beam.
-    pub fn bundle(&self) -> &[SubRay] {
+    pub fn sub_ray_list(&self) -> &[SubRay] {
         &self.sub_rays
     }
 

@@ -5,14 +5,14 @@
 
 use super::setup::Laboratory;
 use crate::noise::{Columns, Draws, Purpose};
-use crate::receive::reading::{Chance, MAX_ECHOES};
+use crate::receive::reading::{MAX_ECHOES, RandomEffects};
 use crate::scene::{Correlated, ErrorModel, Scene};
 use catoptric_model::beam;
 use std::sync::Arc;
 
 /// The random effects that all readings of a stretch share, and the source of those that are drawn in every scan.
 #[derive(Clone)]
-pub(super) struct Luck<'a> {
+pub(super) struct EffectSource<'a> {
     scene: &'a Scene,
     seed: u64,
     drift: f64,
@@ -24,7 +24,7 @@ pub(super) struct Luck<'a> {
 
 /// Random effects of one scan, each kind for all beams; a kind that the scene does not have is empty.
 #[derive(Default)]
-pub(super) struct ScanLuck {
+pub(super) struct ScanEffects {
     drift: f64,
     warm_up: f64,
     elements: Arc<[f64]>,
@@ -44,12 +44,12 @@ pub(super) struct ScanLuck {
 const FEW: usize = 8;
 
 /// Random effects of a stretch, from its first scan on.
-pub struct Chances<'a> {
-    luck: Luck<'a>,
+pub struct StretchEffects<'a> {
+    source: EffectSource<'a>,
     /// Scans of the stretch so far.
     done: usize,
     memory: Memory,
-    scan: ScanLuck,
+    scan: ScanEffects,
 }
 
 /// The AR(1) state of every beam, of unit variance, after some number of scans; empty before the first.
@@ -60,17 +60,17 @@ pub struct Memory {
 
 impl Laboratory {
     /// Random effects of a stretch, scan by scan.
-    pub fn chances(&self, number: usize) -> Chances<'_> {
-        Chances {
-            luck: self.luck(number),
+    pub fn effects(&self, number: usize) -> StretchEffects<'_> {
+        StretchEffects {
+            source: self.effect_source(number),
             done: 0,
             memory: Memory::default(),
-            scan: ScanLuck::default(),
+            scan: ScanEffects::default(),
         }
     }
 
-    pub(super) fn luck(&self, number: usize) -> Luck<'_> {
-        Luck {
+    pub(super) fn effect_source(&self, number: usize) -> EffectSource<'_> {
+        EffectSource {
             scene: &self.scene,
             seed: self.seed,
             drift: self.drift(number),
@@ -110,7 +110,7 @@ fn warm_up(scene: &Scene, time_s: f64) -> f64 {
     }
 }
 
-impl Luck<'_> {
+impl EffectSource<'_> {
     /// The law of the correlated noise, if there is any.
     fn correlated(&self) -> Option<&Correlated> {
         let errors = &self.scene.errors;
@@ -155,7 +155,7 @@ impl Luck<'_> {
     /// Draws a scan; `states` are those of its correlated noise.
     ///
     /// With `asked`, the detection of echoes is drawn for those beams only, if they are few.
-    pub(super) fn draw(&self, scan: usize, states: &[f64], asked: Option<&[usize]>, into: &mut ScanLuck) {
+    pub(super) fn draw(&self, scan: usize, states: &[f64], asked: Option<&[usize]>, into: &mut ScanEffects) {
         let (errors, row) = (&self.scene.errors, self.row(scan));
         if errors.model != ErrorModel::None {
             let time_s = self.start_s + scan as f64 * self.scene.scanner.limits().scan_period_s();
@@ -204,26 +204,26 @@ impl Luck<'_> {
     }
 }
 
-impl ScanLuck {
+impl ScanEffects {
     /// Random effects of a beam's reading.
-    pub(super) fn of(&self, beam: usize) -> Chance {
+    pub(super) fn of(&self, beam: usize) -> RandomEffects {
         let asked = self.asked.binary_search_by_key(&beam, |(asked, _)| *asked);
         let detection = match asked {
             Ok(place) => self.asked[place].1,
             Err(_) if self.detection.is_empty() => Default::default(),
             Err(_) => std::array::from_fn(|echo| self.detection.uniform(beam, echo)),
         };
-        Chance {
+        RandomEffects {
             detection,
-            ..self.but_detection(beam)
+            ..self.without_detection(beam)
         }
     }
 
     /// The same without the detection of its echoes.
     #[inline]
-    pub(super) fn but_detection(&self, beam: usize) -> Chance {
+    pub(super) fn without_detection(&self, beam: usize) -> RandomEffects {
         let of = |kind: &[f64]| kind.get(beam).copied().unwrap_or_default();
-        Chance {
+        RandomEffects {
             drift: self.drift,
             element: of(&self.elements),
             warm_up: self.warm_up,
@@ -236,7 +236,7 @@ impl ScanLuck {
     }
 }
 
-impl Chances<'_> {
+impl StretchEffects<'_> {
     /// Skips scans, keeping the state that later ones depend on.
     #[must_use]
     pub fn skip_scans(mut self, scans: usize) -> Self {
@@ -249,27 +249,27 @@ impl Chances<'_> {
     /// States of the next scan's correlated noise.
     fn step(&mut self) -> Vec<f64> {
         let mut states = Vec::new();
-        self.luck
+        self.source
             .innovations(self.done, &mut self.scan.columns, &mut states);
-        self.luck.remember(self.done, &mut self.memory, &mut states);
+        self.source.remember(self.done, &mut self.memory, &mut states);
         self.done += 1;
         states
     }
 
-    /// Draws the next scan; `asked` as for [`Luck::draw`].
-    pub(super) fn next_scan(&mut self, asked: Option<&[usize]>) -> &ScanLuck {
+    /// Draws the next scan; `asked` as for [`EffectSource::draw`].
+    pub(super) fn next_scan(&mut self, asked: Option<&[usize]>) -> &ScanEffects {
         let scan = self.done;
         let states = self.step();
-        self.luck.draw(scan, &states, asked, &mut self.scan);
+        self.source.draw(scan, &states, asked, &mut self.scan);
         &self.scan
     }
 }
 
-impl Iterator for Chances<'_> {
+impl Iterator for StretchEffects<'_> {
     /// One per beam.
-    type Item = Vec<Chance>;
+    type Item = Vec<RandomEffects>;
 
-    fn next(&mut self) -> Option<Vec<Chance>> {
+    fn next(&mut self) -> Option<Vec<RandomEffects>> {
         let scan = self.next_scan(None);
         Some((0..beam::COUNT).map(|beam| scan.of(beam)).collect())
     }
