@@ -128,9 +128,9 @@ fn correlated_noise_forgets_as_it_is_told_and_is_recomputed_alone() {
         "{first}"
     );
     assert!(lagged(&z, 1).abs() < bound);
-    let mut in_turn = laboratory.chances(ROOM);
+    let mut in_turn = laboratory.effects(ROOM);
     let scan_5 = in_turn.nth(5).expect("endless");
-    let alone = laboratory.chances(ROOM).skip_scans(5).next().expect("endless");
+    let alone = laboratory.effects(ROOM).skip_scans(5).next().expect("endless");
     assert_eq!(scan_5, alone);
 }
 

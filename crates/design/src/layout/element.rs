@@ -181,7 +181,7 @@ pub(crate) fn trace_one(sensor: &Sensor, bare: &Setting<'_>, scene: &Scene, beam
     let rays: Vec<Ray> = sensor.rays(beam).chain([sensor.chief_ray(beam)]).collect();
     let (paths, trail) = bare.trace_with_trail(&rays);
     let chief = paths[paths.len() - 1];
-    let paths = || sensor.bundle().iter().zip(&paths);
+    let paths = || sensor.sub_ray_list().iter().zip(&paths);
     let (status, chief_energy) = class(&chief, paths());
     let along = paths().filter(|(_, p)| exit(p).is_some() && p.facets() == chief.facets());
     let light = along.map(|(s, p)| {

@@ -1,4 +1,4 @@
-//! From a facet as a person describes it to its corners in the nominal sensor frame.
+//! Computes the corners of a facet, in the nominal sensor frame, from its description in the scene.
 
 use crate::scene::{FacetShape, Plate, RectangleShape, Wedge};
 use catoptric_cast::area_vector;
@@ -6,10 +6,10 @@ use catoptric_model::beam;
 use catoptric_model::mirror;
 use nalgebra::{Point3, Unit, Vector3};
 
-/// Corners of a facet as drawn, in metres, counter-clockwise seen from the reflecting side.
+/// Corners of a facet as drawn, in meters, counter-clockwise seen from the reflecting side.
 ///
-/// `None` if the description spans no mirror: a beam that is not deflected, a plane that one of the two azimuths
-/// does not meet, a normal of zero length.
+/// `None` if the description spans no mirror: the beam is not deflected, the plane does not cross one of the two
+/// azimuths, or the normal has zero length.
 pub fn corners(shape: &FacetShape) -> Option<Vec<Point3<f64>>> {
     match shape {
         FacetShape::Wedge(wedge) => wedge_corners(wedge),
@@ -25,7 +25,7 @@ pub fn corners(shape: &FacetShape) -> Option<Vec<Point3<f64>>> {
     }
 }
 
-/// The plane mirror that sends the middle beam where it is wanted, cut where the two azimuths and heights meet it.
+/// The plane mirror that sends the middle beam in the requested direction, cut at the two azimuths and heights.
 fn wedge_corners(wedge: &Wedge) -> Option<Vec<Point3<f64>>> {
     let [first, last] = wedge.azimuth_deg.map(f64::to_radians);
     let u = beam::direction(0.5 * (first + last));
@@ -53,13 +53,13 @@ fn wedge_corners(wedge: &Wedge) -> Option<Vec<Point3<f64>>> {
     Some(corners)
 }
 
-/// Azimuth of the beam that a plate is drawn about, in degrees.
+/// Azimuth of the beam around which a plate is drawn, in degrees.
 pub(crate) fn plate_azimuth_deg(plate: &Plate) -> Option<f64> {
     let of_beam = |b: u32| beam::azimuth(b as usize).to_degrees();
     plate.azimuth_deg.or(plate.beam.map(of_beam))
 }
 
-/// The rectangle about the point where the beam meets it.
+/// A rectangle centered on the point where the beam hits it.
 fn plate_corners(plate: &Plate) -> Option<Vec<Point3<f64>>> {
     let u = beam::direction(plate_azimuth_deg(plate)?.to_radians());
     let toward = |azimuth: f64, elevation: f64| beam::spherical(azimuth.to_radians(), elevation.to_radians());
@@ -86,14 +86,14 @@ fn rectangle_corners(shape: &RectangleShape) -> Option<Vec<Point3<f64>>> {
     )
 }
 
-/// Corners of a rectangle whose width runs horizontally, in metres; `None` for a normal of no length.
+/// Corners of a rectangle whose width is horizontal, in meters; `None` for a zero-length normal.
 pub(crate) fn rectangle(
     center: Point3<f64>,
     normal: Vector3<f64>,
     [width, height]: [f64; 2],
 ) -> Option<Vec<Point3<f64>>> {
     let m = Unit::try_new(normal, f64::MIN_POSITIVE)?;
-    // A mirror parallel to the scan plane has no horizontal side of its own; x will do.
+    // A mirror parallel to the scan plane has no distinguished horizontal side; use x.
     let across = Unit::try_new(Vector3::z().cross(&m), 1e-9).unwrap_or(Vector3::x_axis());
     let along = m.cross(&across);
     let (x, y) = (across.into_inner() * (0.5 * width), along * (0.5 * height));
@@ -111,7 +111,7 @@ mod tests {
     use catoptric_model::MirrorPlane;
 
     #[test]
-    fn a_wedge_sends_its_middle_beam_where_it_is_wanted() {
+    fn a_wedge_sends_its_middle_beam_in_the_requested_direction() {
         let wedge = Wedge {
             azimuth_deg: [62.0, 77.0],
             distance_mm: 70.0,
