@@ -1,16 +1,16 @@
-//! Pictures as PNG files.
+//! Encoding of pictures as PNG files.
 
-/// Bytes of a picture, row by row from the top.
+/// A picture, stored row by row from the top.
 pub(super) struct Picture {
-    /// Columns and rows.
+    /// Number of columns and rows.
     pub(super) size: [u32; 2],
-    /// What the bytes of a pixel are.
+    /// What the bytes of a pixel mean.
     pub(super) color: png::ColorType,
     pub(super) bytes: Vec<u8>,
 }
 
 impl Picture {
-    /// The PNG file.
+    /// Encodes the picture as PNG.
     pub(super) fn encoded(&self) -> Vec<u8> {
         let mut file = Vec::new();
         let mut encoder = png::Encoder::new(&mut file, self.size[0], self.size[1]);
@@ -20,7 +20,7 @@ impl Picture {
         let written = encoder
             .write_header()
             .and_then(|mut writer| writer.write_image_data(&self.bytes));
-        // Writing to memory, of the size the picture has, cannot fail.
+        // Writing a picture of the stated size to memory cannot fail.
         if written.is_err() {
             file.clear();
         }
