@@ -156,7 +156,7 @@ fn spots(found: &Characterization) -> Picture {
     });
     Picture {
         svg: draw(
-            "Extent of the spot over the distance",
+            "Spot extent over distance",
             ["distance (m)", "extent (mm)"],
             &marks,
             &strokes,
@@ -187,7 +187,7 @@ fn distances(found: &Characterization) -> Picture {
     }
     Picture {
         svg: draw(
-            "Mean error over the distance",
+            "Mean error over distance",
             ["distance (m)", "error (mm)"],
             &marks,
             &strokes,
@@ -223,7 +223,7 @@ fn angles(found: &Characterization) -> Picture {
     let law = |degrees: f64| found.bias.angle.error(libm::cos(degrees.to_radians())) * 1e3;
     Picture {
         svg: draw(
-            "Error over the incidence",
+            "Error over incidence",
             ["incidence (°)", "E_a (mm)"],
             &marks,
             &[curve(&(-widest..widest), fitted, law)],
@@ -264,7 +264,7 @@ fn noise(found: &Characterization) -> Picture {
     }
     Picture {
         svg: draw(
-            "Standard deviation of a reading over the distance, by color",
+            "Standard deviation of a reading over distance, by color",
             ["distance (m)", "standard deviation (mm)"],
             &marks,
             &strokes,

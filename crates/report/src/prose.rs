@@ -46,7 +46,7 @@ pub(super) fn experiment(dataset: &Dataset, truth: Option<&Truth>) -> String {
         );
         let bounced = class(BeamClass::MultiBounce);
         text += &if bounced > 0 {
-            format!(", {bounced} meet more than one mirror.")
+            format!(", {bounced} hit more than one mirror.")
         } else {
             ".".to_owned()
         };
@@ -180,7 +180,7 @@ fn honesty(score: &Score) -> String {
         };
     }
     if score.nees_mean.is_finite() {
-        let judgement = match score.honesty {
+        let judgment = match score.honesty {
             Some(Honesty::OverConfident) => {
                 let times = number(score.nees_mean.sqrt(), 1);
                 format!("smaller than the actual errors, which are {times} times as large")
@@ -189,7 +189,7 @@ fn honesty(score: &Score) -> String {
             Some(Honesty::Honest) | None => "consistent with the actual errors".to_owned(),
         };
         text += &format!(
-            " The stated uncertainty is {judgement}: {} % of them are inside their 95 % ellipses.",
+            " The stated uncertainty is {judgment}: {} % of them are inside their 95 % ellipses.",
             number(score.coverage_95 * 100.0, 0)
         );
     }

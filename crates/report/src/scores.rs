@@ -78,10 +78,10 @@ pub(super) fn scores(results: &[(Calibration, Score)]) -> String {
     row("Inside the stated 95 % ellipse (%)", &|s| {
         number(s.coverage_95 * 100.0, 1)
     });
-    row("Points off the boards: mean / rms (mm)", &|s| {
+    row("Distance of points from the boards: mean / rms (mm)", &|s| {
         format!("{} / {}", number(s.boards_mm.mean, 2), number(s.boards_mm.rms, 2))
     });
-    row("Points off the walls of the empty room: mean / rms (mm)", &|s| {
+    row("Distance of points from the walls of the empty room: mean / rms (mm)", &|s| {
         format!("{} / {}", number(s.walls_mm.mean, 2), number(s.walls_mm.rms, 2))
     });
     row("Split elements: solved / all", &|s| match s.split.elements {
