@@ -17,6 +17,7 @@ pub(crate) use row::Scope;
 
 use crate::error::CalibError;
 use crate::joint::Extent;
+use catoptric_model::place::nearest;
 use row::Row;
 use std::str::FromStr;
 
@@ -102,6 +103,7 @@ impl FromStr for Method {
             .ok_or_else(|| CalibError::UnknownMethod {
                 name: name.to_owned(),
                 known: Self::ALL.map(Self::name).join(", "),
+                nearest: nearest(name, Self::ALL.map(Self::name)),
             })
     }
 }
@@ -115,6 +117,9 @@ mod tests {
         for method in Method::ALL {
             assert_eq!(method.name().parse(), Ok(method));
         }
-        assert!("beems".parse::<Method>().is_err());
+        let refused = "beems".parse::<Method>().expect_err("it is no method's");
+        assert_eq!(refused.help().as_deref(), Some("did you mean \"beam\"?"));
+        let refused = "annealing".parse::<Method>().expect_err("it is no method's");
+        assert_eq!(refused.help(), None);
     }
 }
