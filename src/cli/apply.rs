@@ -2,12 +2,13 @@
 
 use super::Context;
 use super::error::CliError;
+use super::one_of::one_of;
 use super::output::{counted, print};
 use catoptric::files;
 use catoptric::files::IoError;
 use catoptric::files::cloud::{CloudFormat, cloud_bytes};
 use catoptric::{CloudFrame, Error, apply, read_calibration, read_dataset};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use std::path::PathBuf;
 
 /// Arguments of `apply`.
@@ -21,21 +22,15 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "cloud.ply|cloud.pcd")]
     out: PathBuf,
     /// Frame of the points; Eqs. 9 and 10 are in the sensor's.
-    #[arg(long, value_enum, default_value_t = FrameName::Sensor)]
-    frame: FrameName,
+    #[arg(
+        long,
+        value_parser = one_of(&CloudFrame::ALL, CloudFrame::word, CloudFrame::about),
+        default_value = CloudFrame::Sensor.word()
+    )]
+    frame: CloudFrame,
     /// The pose whose scans are taken; those of the empty room by default.
     #[arg(long, value_name = "N")]
     pose: Option<usize>,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum FrameName {
-    /// The laser base frame
-    Sensor,
-    /// The marker body on the superstructure
-    Rig,
-    /// The frame of motion capture
-    Room,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
@@ -43,12 +38,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let format = CloudFormat::of_path(path).map_err(|e| CliError::invalid(e.to_string(), None))?;
     let dataset = read_dataset(&arguments.dataset)?;
     let calibration = read_calibration(&arguments.calibration)?;
-    let frame = match arguments.frame {
-        FrameName::Sensor => CloudFrame::Sensor,
-        FrameName::Rig => CloudFrame::Rig,
-        FrameName::Room => CloudFrame::Room,
-    };
-    let cloud = apply(&dataset, &calibration, arguments.pose, frame).map_err(Error::from)?;
+    let cloud = apply(&dataset, &calibration, arguments.pose, arguments.frame).map_err(Error::from)?;
     let bytes = cloud_bytes(format, &cloud).map_err(|e| IoError::write(path, e))?;
     files::write_file(path, &bytes)?;
     if cloud.mount_is_nominal {
@@ -59,7 +49,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
          next: open {} in a viewer such as CloudCompare or Open3D\n",
         path.display(),
         counted(cloud.points.len(), "point"),
-        frame.word(),
+        arguments.frame.word(),
         cloud.pose,
         counted(cloud.without_range, "reading"),
         counted(cloud.without_direction, "reading"),

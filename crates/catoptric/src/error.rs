@@ -71,6 +71,7 @@ impl Error {
         match self {
             Self::Invalid { help, .. } => help.clone(),
             Self::Study(StudyError::Invalid { help, .. }) => Some(help.clone()),
+            Self::Calibration(error) => error.help(),
             #[cfg(feature = "design")]
             Self::Optimize(error) => error.help(),
             #[cfg(feature = "design")]
@@ -78,7 +79,6 @@ impl Error {
             Self::Scene(_)
             | Self::Setup(_)
             | Self::File(_)
-            | Self::Calibration(_)
             | Self::Apply(_)
             | Self::Study(_)
             | Self::Stopped(_)

@@ -3,7 +3,7 @@
 use crate::element::solve::{BareDistance, Element, Solution};
 use crate::judge::covariance::{self, Budget, MountUncertainty};
 use crate::judge::observability::{self, Weakness};
-use crate::options::{Method, Options};
+use crate::options::Options;
 use crate::readings::bare::Bare;
 use crate::readings::observations::{BoardInSensor, BoardView, Observation, azimuth};
 use crate::readings::spread;
@@ -22,7 +22,6 @@ pub(crate) struct Workspace<'a> {
     pub(crate) boards: &'a [Option<BoardInSensor>],
     pub(crate) rig_from_sensor: Pose,
     pub(crate) mount: &'a MountUncertainty,
-    pub(crate) method: Method,
     pub(crate) options: &'a Options,
 }
 
