@@ -2,10 +2,11 @@
 
 use super::Context;
 use super::error::CliError;
+use super::one_of::one_of;
 use super::output::{counted, print};
 use catoptric::files::cloud::CloudFormat;
 use catoptric::{CloudFrame, apply_into, read_calibration_for, read_dataset};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use std::path::PathBuf;
 
 /// Arguments of `apply`.
@@ -19,21 +20,15 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "cloud.ply|cloud.pcd")]
     out: PathBuf,
     /// Frame of the points; Eqs. 9 and 10 are in the sensor's.
-    #[arg(long, value_enum, default_value_t = FrameName::Sensor)]
-    frame: FrameName,
+    #[arg(
+        long,
+        value_parser = one_of(&CloudFrame::ALL, CloudFrame::word, CloudFrame::about),
+        default_value = CloudFrame::Sensor.word()
+    )]
+    frame: CloudFrame,
     /// The pose whose scans are taken; those of the empty room by default.
     #[arg(long, value_name = "N")]
     pose: Option<usize>,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum FrameName {
-    /// The laser base frame
-    Sensor,
-    /// The marker body on the superstructure
-    Rig,
-    /// The frame of motion capture
-    Room,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
@@ -42,12 +37,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     CloudFormat::of_path(path).map_err(|e| CliError::invalid(e.to_string(), None))?;
     let dataset = read_dataset(&arguments.dataset)?;
     let calibration = read_calibration_for(&arguments.calibration, &dataset.session)?;
-    let frame = match arguments.frame {
-        FrameName::Sensor => CloudFrame::Sensor,
-        FrameName::Rig => CloudFrame::Rig,
-        FrameName::Room => CloudFrame::Room,
-    };
-    let cloud = apply_into(&dataset, &calibration, arguments.pose, frame, path)?;
+    let cloud = apply_into(&dataset, &calibration, arguments.pose, arguments.frame, path)?;
     if cloud.mount_is_nominal {
         context.say("the calibration has no mounting: the drawing's was taken");
     }
@@ -56,7 +46,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
          next: open {} in a viewer such as CloudCompare or Open3D\n",
         path.display(),
         counted(cloud.points, "point"),
-        frame.word(),
+        arguments.frame.word(),
         cloud.pose,
         counted(cloud.without_range, "reading"),
         counted(cloud.without_direction, "reading"),

@@ -2,11 +2,12 @@
 
 use super::Context;
 use super::error::CliError;
+use super::one_of::one_of;
 use super::output::{counted, print, quoted};
 use catoptric::calib::{JacobianForm, Options};
 use catoptric::model::Status;
 use catoptric::{Calibration, Method, calibrate_with, read_characterization, read_dataset, write_json};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -16,8 +17,12 @@ pub(crate) struct Arguments {
     /// The dataset.
     dataset: PathBuf,
     /// How the angles of an element are estimated.
-    #[arg(long, value_enum, default_value_t = MethodName::Joint)]
-    method: MethodName,
+    #[arg(
+        long,
+        value_parser = one_of(&Method::ALL, Method::name, Method::about),
+        default_value = Method::default().name()
+    )]
+    method: Method,
     /// The calibration to write.
     #[arg(long, value_name = "calibration.json")]
     out: PathBuf,
@@ -28,48 +33,12 @@ pub(crate) struct Arguments {
     #[arg(long)]
     cross_validate: bool,
     /// How derivatives are formed; both end at the same answer.
-    #[arg(long, value_enum, default_value_t = JacobianName::Analytic)]
-    jacobian: JacobianName,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum MethodName {
-    /// Facets, mounting, boards, drifts and biases at once, beams free to depart from their facet's plane
-    Joint,
-    /// One plane per facet, each facet by itself
-    Facet,
-    /// Each element by itself, weighted by the covariance of all errors
-    BeamGls,
-    /// Each element by itself, all readings alike, Eqs. 7 and 8
-    Beam,
-    /// The same, one reading after the other: recursive least squares
-    Recursive,
-    /// Each element by itself, without iteration
-    ClosedForm,
-    /// The drawing
-    Prior,
-}
-
-impl From<MethodName> for Method {
-    fn from(name: MethodName) -> Self {
-        match name {
-            MethodName::Joint => Self::Joint,
-            MethodName::Facet => Self::Facet,
-            MethodName::BeamGls => Self::BeamGls,
-            MethodName::Beam => Self::Beam,
-            MethodName::Recursive => Self::Recursive,
-            MethodName::ClosedForm => Self::ClosedForm,
-            MethodName::Prior => Self::Prior,
-        }
-    }
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum JacobianName {
-    /// By differentiating Eq. 6
-    Analytic,
-    /// By the central differences of Eq. 7
-    Central,
+    #[arg(
+        long,
+        value_parser = one_of(&JacobianForm::ALL, JacobianForm::name, JacobianForm::about),
+        default_value = JacobianForm::default().name()
+    )]
+    jacobian: JacobianForm,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
@@ -79,8 +48,8 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         let found = read_characterization(path)?;
         dataset.session.believed = dataset.session.believed.after(&found);
     }
-    let method = Method::from(arguments.method);
-    if arguments.cross_validate && method != Method::Joint {
+    let method = arguments.method;
+    if arguments.cross_validate && !method.cross_validates() {
         let message = format!(
             "--cross-validate goes with --method joint, not with {}",
             method.name()
@@ -88,10 +57,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         return Err(CliError::invalid(message, None));
     }
     let options = Options {
-        jacobian: match arguments.jacobian {
-            JacobianName::Analytic => JacobianForm::Analytic,
-            JacobianName::Central => JacobianForm::CentralDifference,
-        },
+        jacobian: arguments.jacobian,
         cross_validation: arguments.cross_validate,
         ..Options::default()
     };

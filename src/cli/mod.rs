@@ -13,6 +13,7 @@ mod interrupt;
 mod layout;
 mod man;
 mod new;
+mod one_of;
 mod optimize;
 mod output;
 mod plan;

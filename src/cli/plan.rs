@@ -2,13 +2,14 @@
 
 use super::Context;
 use super::error::CliError;
+use super::one_of::one_of;
 use super::output::{counted, print, print_json, quoted};
 use catoptric::calib::plan::{Criterion, FacetPlan, Open, Plan, PlannedPose, Request, Standing};
 use catoptric::files::{self, dataset};
 use catoptric::{
     Dataset, PlanStart, Scene, completed_scene, plan, planned_scene, read_dataset, report, write_planned,
 };
-use clap::{Args, ValueEnum};
+use clap::Args;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -28,8 +29,12 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "NAME")]
     facet: Vec<String>,
     /// What is to be small over the elements of a facet.
-    #[arg(long, value_enum, default_value_t = CriterionName::D)]
-    criterion: CriterionName,
+    #[arg(
+        long,
+        value_parser = one_of(&Criterion::ALL, Criterion::name, Criterion::about),
+        default_value = Criterion::default().name()
+    )]
+    criterion: Criterion,
     /// Least and greatest way from mirror to board, in metres.
     #[arg(
         long,
@@ -56,14 +61,6 @@ pub(crate) struct Arguments {
     /// Print the plan as JSON.
     #[arg(long)]
     json: bool,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum CriterionName {
-    /// The area of the error ellipse: mean log det of the covariance
-    D,
-    /// The mean square error: mean trace of the covariance
-    A,
 }
 
 /// Where the plan starts from.
@@ -114,10 +111,7 @@ fn request(arguments: &Arguments, readings: usize) -> Result<Request, CliError> 
     };
     Ok(Request {
         poses: arguments.poses.into(),
-        criterion: match arguments.criterion {
-            CriterionName::D => Criterion::D,
-            CriterionName::A => Criterion::A,
-        },
+        criterion: arguments.criterion,
         seed: arguments.seed,
         range_m: [least, greatest],
         max_incidence_deg: arguments.max_incidence_deg,

@@ -139,7 +139,7 @@ fn contestants(arguments: &StudyArguments) -> Result<Vec<Contestant>, CliError> 
     let mut all: Vec<Contestant> = Vec::new();
     for name in &arguments.methods {
         let contestant = Contestant::named(name)
-            .map_err(|error| CliError::invalid(format!("--methods: {error}, and oracle"), None))?;
+            .map_err(|error| CliError::invalid(format!("--methods: {error}, and oracle"), error.help()))?;
         if let (Contestant::Method(method), true) = (&contestant, arguments.uncorrected) {
             let uncorrected = Contestant::Uncorrected(*method);
             all.extend([contestant, uncorrected]);

@@ -280,7 +280,7 @@ fn a_laboratory_needs_walls_and_a_mirror_no_more_light_than_it_gets() {
     );
     let text = format!("{VALID}\n[superstructure.mirror]\nreflectivity = 0.9\ndiffuse_reflectivity = 0.2\n");
     assert!(
-        said(&text).contains("returns no more light than it gets"),
+        said(&text).contains("a mirror cannot return more light than it receives"),
         "{}",
         said(&text)
     );

@@ -218,45 +218,66 @@ fn files_that_documents_name_exist() {
 }
 
 #[test]
-fn the_code_map_is_the_tree() {
+fn the_architecture_names_every_crate() {
     let text = read("ARCHITECTURE.md");
-    let sources = |folder: &str| {
-        files_below(folder)
-            .into_iter()
-            .filter(|p| p.ends_with(".rs"))
-            .map(PathBuf::from)
-    };
-    let mut folders: BTreeSet<PathBuf> = BTreeSet::new();
-    for crate_sources in ["src", "crates/model/src", "crates/sim/src", "crates/calib/src"] {
-        folders.extend(sources(crate_sources).map(|p| p.parent().unwrap().to_owned()));
+    let named = first_column(&text, "## The crates");
+    let mut there: BTreeSet<String> = files_below("crates")
+        .into_iter()
+        .filter(|path| path.ends_with("/Cargo.toml"))
+        .chain(["Cargo.toml".to_owned()])
+        .map(|path| package_name(&read(&path)))
+        .collect();
+    there.remove("");
+    assert_eq!(named, there, "ARCHITECTURE.md (left) and the workspace (right)");
+}
+
+/// The name that a Cargo.toml gives its package.
+fn package_name(manifest: &str) -> String {
+    let mut lines = manifest
+        .lines()
+        .skip_while(|line| *line != "[package]")
+        .filter_map(|line| line.strip_prefix("name = "));
+    lines.next().unwrap_or_default().trim_matches('"').to_owned()
+}
+
+#[test]
+fn every_source_file_says_first_what_it_is() {
+    for folder in ["src", "crates", "tests", "benches", "examples"] {
+        for path in files_below(folder).into_iter().filter(|p| p.ends_with(".rs")) {
+            let text = read(&path);
+            let first = text.lines().next().unwrap_or_default();
+            assert!(first.starts_with("//!") || path.ends_with("/build.rs"), "{path} begins with {first:?}");
+        }
     }
-    for folder in folders {
-        let folder = folder.to_str().unwrap();
-        // A module split into a folder says itself what its parts are; the crates and the folders that hold many ideas
-        // have a table.
-        let is_crate = folder == "src" || folder.starts_with("crates/") && folder.ends_with("/src");
-        if !is_crate && !text.contains(&format!("### `{folder}` ")) {
-            continue;
-        }
-        let named = first_column(&text, &format!("### `{folder}` "));
-        let is_own = |path: &PathBuf| path.parent() == Some(Path::new(folder));
-        let mut there: BTreeSet<String> = BTreeSet::new();
-        for path in sources(folder) {
-            let stem = path.file_stem().unwrap().to_str().unwrap().to_owned();
-            // Modules in folders of their own are known by the folder; lib.rs is the crate itself.
-            let module = if is_own(&path) {
-                stem
-            } else {
-                let inner = path.strip_prefix(folder).unwrap();
-                inner.iter().next().unwrap().to_str().unwrap().to_owned()
-            };
-            there.insert(module);
-        }
-        there.remove("mod");
-        if folder != "src" {
-            there.remove("lib");
-        }
-        assert_eq!(named, there, "ARCHITECTURE.md (left) and {folder} (right)");
+}
+
+/// Packages that a user compiles beside our own crates' dependencies, ours counted.
+fn packages(arguments: &[&str]) -> BTreeSet<String> {
+    let output = Command::new(env!("CARGO"))
+        .args(["tree", "--locked", "--offline", "--prefix", "none", "--format", "{p}"])
+        .args(["-e", "normal"])
+        .args(arguments)
+        .current_dir(root())
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let words = |line: &str| line.split(' ').take(2).collect::<Vec<_>>().join(" ");
+    stdout(&output).lines().map(words).collect()
+}
+
+#[test]
+fn who_only_tests_a_calibration_compiles_little() {
+    let with = packages(&["-p", "catoptric", "--features", "testing"]);
+    let without = packages(&["-p", "catoptric", "--no-default-features", "--features", "testing"]);
+    assert!(with.len() <= 125, "{}: {with:?}", with.len());
+    assert!(without.len() <= 95, "{}: {without:?}", without.len());
+    for foreign in ["clap", "indicatif", "plotters", "image", "argmin"] {
+        let has = |names: &BTreeSet<String>| names.iter().any(|n| n.split(' ').next() == Some(foreign));
+        assert!(!has(&with) && !has(&without), "{foreign}");
     }
 }
 

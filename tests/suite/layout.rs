@@ -707,10 +707,10 @@ fn bad_requirements_are_refused() {
     for (requirement, said) in [
         ("field_of_regrad>=0.3", "did you mean field_of_regard?"),
         ("facets.*.margin_m>=0.3", "did you mean facets.*.margin_mm?"),
-        ("field_of_regard", "is no requirement"),
-        ("field_of_regard>=much", "is no requirement"),
-        (">=1", "is no requirement"),
-        ("field_of_regard>=inf", "is no requirement"),
+        ("field_of_regard", "is not a requirement"),
+        ("field_of_regard>=much", "is not a requirement"),
+        (">=1", "is not a requirement"),
+        ("field_of_regard>=inf", "is not a requirement"),
         ("wings>=2", "every number of --json has a name"),
     ] {
         let output = run(

@@ -230,12 +230,12 @@ fn what_makes_no_search_is_said() {
     refuse(
         &["--goal", "feild_of_regard"],
         2,
-        &["is no goal", "did you mean field_of_regard?"],
+        &["is not a goal", "did you mean field_of_regard?"],
     );
     refuse(
         &["--goal", "szie.height_mm:up"],
         2,
-        &["is no figure", "did you mean size.height_mm?"],
+        &["is not a figure", "did you mean size.height_mm?"],
     );
     refuse(&["--goal", "directions"], 2, &["need one another"]);
     refuse(
@@ -246,10 +246,10 @@ fn what_makes_no_search_is_said() {
     refuse(
         &["--goal", "directions", "--direction", "90,-100"],
         2,
-        &["is no direction"],
+        &["is not a direction"],
     );
     refuse(&["--goal", "size", "--goal", "size"], 2, &["given twice"]);
-    refuse(&["--goal", "size", "--require", "lots<=3"], 2, &["is no figure"]);
+    refuse(&["--goal", "size", "--require", "lots<=3"], 2, &["is not a figure"]);
     refuse(
         &["--goal", "size", "--require", "size.diameter_mm<=10"],
         1,

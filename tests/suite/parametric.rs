@@ -226,7 +226,7 @@ fn a_wrong_pattern_is_shown_where_it_is_wrong() {
         "\"right-3\", \"right-4\"]",
         "\"right-3\", \"left-1\"]",
         "[[superstructure.pattern]]",
-        &["in the copy \"left-1\"", "every name may be used once"],
+        &["in the copy \"left-1\"", "names must be unique"],
     );
     expect_one(
         "\"left_right\", \"up_down\"",
@@ -269,9 +269,12 @@ fn a_plate_says_what_it_lacks() {
     let from = VALID.lines().find(|l| l.starts_with("shape.wedge")).unwrap();
     let problems = problems_with(&VALID.replace(from, plate), &[]);
     let said = problems.to_string();
-    assert!(said.contains("names a beam, and `azimuth_deg` another"), "{said}");
     assert!(
-        said.contains("needs one direction, and has none, half of one, or two"),
+        said.contains("names a beam, and `azimuth_deg` names another"),
+        "{said}"
+    );
+    assert!(
+        said.contains("needs exactly one direction, but has none, half of one, or two"),
         "{said}"
     );
     assert_eq!(problems.list.len(), 2, "{said}");

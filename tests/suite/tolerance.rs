@@ -346,8 +346,8 @@ fn requirements_decide_the_exit_code() {
             "did you mean facets.*.direction_deg.rms?",
         ),
         ("wings<1", "every number of --json has a name"),
-        ("bound.per_axis_deg<1", "is no figure"),
-        ("direction_deg.p95", "is no requirement"),
+        ("bound.per_axis_deg<1", "is not a figure"),
+        ("direction_deg.p95", "is not a requirement"),
     ] {
         let (code, said) = with(requirement, &[]);
         assert_eq!(code, Some(2), "{requirement}: {said}");

@@ -1,9 +1,10 @@
 //! The procedure on one dataset, step by step.
 
-use crate::element::{self, attempt::Workspace, facet_plane};
+use crate::element::{self, facet_plane};
 use crate::error::CalibError;
 use crate::joint;
-use crate::options::{Method, Options};
+use crate::method::{BATCH, GENERALIZED, Method, Scope};
+use crate::options::Options;
 use crate::prepare::{believable, prepare};
 use crate::screen;
 use catoptric_model::{Calibration, Dataset, Stop, calibration};
@@ -49,12 +50,8 @@ pub fn calibrate_until(
     // Step 4: which elements a mirror deflects.
     let candidates = screen::candidates(dataset, &prepared.summaries, mount, &prepared.boards);
     // The drawing decides which boards an element can hit only until its neighbors tell how the facet was built.
-    let work = prepared.workspace(dataset, method, options);
-    let by_batch = Workspace {
-        method: Method::Beam,
-        ..work
-    };
-    let first = element::estimates(&by_batch, &candidates, drawn)?;
+    let work = prepared.workspace(dataset, options);
+    let first = element::estimates(&work, &BATCH, &candidates, drawn)?;
     stop.check()?;
     let built = facet_plane::as_built(&dataset.session, drawn, &first);
     let mut calibration = Calibration {
@@ -71,23 +68,19 @@ pub fn calibrate_until(
         assessment: None,
     };
     // Steps 11 to 13: the angles, and whether they are to be believed.
-    match method {
-        Method::Prior => {
+    match method.scope() {
+        Scope::Drawing => {
             calibration.beams = element::as_drawn(&dataset.session, &prepared.bare, &candidates, drawn);
         }
-        Method::Joint | Method::Facet => {
-            // An element by itself decides whether its readings are of use, and which boards it hits.
-            let alone = Workspace {
-                method: Method::BeamGls,
-                ..work
-            };
-            calibration.beams = element::estimates(&alone, &candidates, &built)?;
-            stop.check()?;
-            let assigned = joint::assigned(&alone, &candidates, &built, &calibration.beams);
-            joint::together(&work, mount, &built, &assigned, &mut calibration);
+        Scope::Element(solver) => {
+            calibration.beams = element::estimates(&work, solver, &candidates, &built)?;
         }
-        Method::Beam | Method::Recursive | Method::BeamGls | Method::ClosedForm => {
-            calibration.beams = element::estimates(&work, &candidates, &built)?;
+        Scope::Together(extent) => {
+            // Each element is solved separately first, which decides whether its readings are usable and which boards it hits.
+            calibration.beams = element::estimates(&work, &GENERALIZED, &candidates, &built)?;
+            stop.check()?;
+            let assigned = joint::assigned(&work, &candidates, &built, &calibration.beams);
+            joint::together(*extent, &work, mount, &built, &assigned, &mut calibration);
         }
     }
     stop.check()?;

@@ -1,7 +1,8 @@
 //! What calibrates: one interface for our methods and for anybody's.
 
 use crate::error::CalibError;
-use crate::options::{Method, Options};
+use crate::method::Method;
+use crate::options::Options;
 use catoptric_model::{Calibration, Dataset};
 
 /// Something that turns a dataset into a calibration, and sees nothing else.

@@ -69,5 +69,24 @@ pub enum CalibError {
         name: String,
         /// The names there are.
         known: String,
+        /// The one that was probably meant.
+        nearest: Option<&'static str>,
     },
+}
+
+impl CalibError {
+    /// What to do about it, where that is known.
+    pub fn help(&self) -> Option<String> {
+        match self {
+            Self::UnknownMethod { nearest, .. } => nearest.map(|name| format!("did you mean {name:?}?")),
+            Self::Dataset(_)
+            | Self::Session { .. }
+            | Self::Facet { .. }
+            | Self::Characterization { .. }
+            | Self::UnknownFacet { .. }
+            | Self::NoPlace { .. }
+            | Self::Foreign { .. }
+            | Self::Stopped(_) => None,
+        }
+    }
 }

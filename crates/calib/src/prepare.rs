@@ -5,7 +5,7 @@ use crate::element::attempt::Workspace;
 use crate::element::facet_plane::plane_as_drawn;
 use crate::error::CalibError;
 use crate::mount::pose::{self, Mount};
-use crate::options::{Method, Options};
+use crate::options::Options;
 use crate::readings::bare::Bare;
 use crate::readings::locate;
 use crate::readings::observations::BoardInSensor;
@@ -54,12 +54,7 @@ pub(crate) fn prepare(dataset: &Dataset) -> Result<Prepared, CalibError> {
 }
 
 impl Prepared {
-    pub(crate) fn workspace<'a>(
-        &'a self,
-        dataset: &'a Dataset,
-        method: Method,
-        options: &'a Options,
-    ) -> Workspace<'a> {
+    pub(crate) fn workspace<'a>(&'a self, dataset: &'a Dataset, options: &'a Options) -> Workspace<'a> {
         Workspace {
             dataset,
             summaries: &self.summaries,
@@ -67,7 +62,6 @@ impl Prepared {
             boards: &self.boards,
             rig_from_sensor: self.mount.rig_from_sensor,
             mount: &self.mount.uncertainty,
-            method,
             options,
             columns: None,
         }

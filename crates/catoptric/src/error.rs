@@ -74,6 +74,7 @@ impl Error {
         match self {
             Self::Invalid { help, .. } => help.clone(),
             Self::Study(StudyError::Invalid { help, .. }) => Some(help.clone()),
+            Self::Calibration(error) => error.help(),
             #[cfg(feature = "design")]
             Self::Optimize(error) => error.help(),
             #[cfg(feature = "design")]
@@ -81,7 +82,6 @@ impl Error {
             Self::Scene(_)
             | Self::Setup(_)
             | Self::File(_)
-            | Self::Calibration(_)
             | Self::Apply(_)
             | Self::Unreadable(_)
             | Self::Study(_)

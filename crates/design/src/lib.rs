@@ -1,6 +1,6 @@
-//! What a mirror layout is worth: what it sees, loses and allows ([`layout`]), better ones ([`optimize`]), what
-//! manufacturing errors do to it ([`tolerance`]), where its boards should stand ([`plan`]), and files for making it
-//! ([`export`]).
+//! Design of mirror layouts: what a layout sees, loses and allows ([`layout`]), the search for better ones
+//! ([`optimize`]), the effect of manufacturing errors ([`tolerance`]), where to place its boards ([`plan`]), and files
+//! for making it ([`export`]).
 
 pub mod export;
 pub mod layout;

@@ -1,6 +1,8 @@
-//! From a scene to what its experimenter knows, and from planned poses to a scene that records them.
+//! Connects scenes with the planning of board poses: from a scene to what its experimenter knows, and from planned
+//! poses to a scene that records them.
 //!
-//! What is planned, and why, is [`calib::plan`](catoptric_calib::plan)'s affair; only here do scene and estimator meet.
+//! How poses are planned is documented in [`calib::plan`](catoptric_calib::plan); only here do scene and estimator
+//! meet.
 //!
 //! ```
 //! use catoptric_calib::plan::{self, Request};
@@ -26,7 +28,7 @@ use catoptric_sim::receive::Sensor;
 use catoptric_sim::scene::BoardPose;
 use catoptric_sim::{Laboratory, Scene, SimError};
 
-/// Why nothing can be planned from a scene.
+/// Why nothing can be planned for a scene.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
     /// The scene cannot be set up.
@@ -37,10 +39,10 @@ pub enum PlanError {
     Plan(#[from] CalibError),
 }
 
-/// What the experimenter of a scene knows before anything is recorded.
+/// Returns what the experimenter of a scene knows before anything is recorded.
 ///
-/// The boards that the scene lists one by one are taken as recorded; those it would choose by its rules are not, but for
-/// boards before undeflected beams, which place the sensor.
+/// Boards that the scene lists individually count as recorded. Boards that its rules would place do not, except those
+/// in front of undeflected beams, which determine the pose of the sensor.
 ///
 /// # Errors
 /// [`PlanError`] if the scene cannot be set up, or a facet has no plane.
@@ -64,12 +66,12 @@ pub fn situation(scene: &Scene) -> Result<Situation, PlanError> {
     Ok(Situation::drawn(&session, &room_from_rig, &placed)?)
 }
 
-/// The scene with its poses one by one and the planned ones behind them.
+/// Returns the scene with its poses listed individually, followed by the planned ones.
 ///
-/// Before facets that the plan is not about, and before undeflected beams, boards stand where the scene's rules put them.
+/// In front of facets that are not in the plan, and of undeflected beams, boards are placed by the scene's rules.
 ///
 /// # Errors
-/// [`SimError`] if those rules find no place.
+/// [`SimError`] if those rules find no pose.
 pub fn with_poses(scene: &Scene, plan: &Plan) -> Result<Scene, SimError> {
     let mut poses = scene.experiment.pose.clone();
     if poses.is_empty() {
@@ -77,7 +79,7 @@ pub fn with_poses(scene: &Scene, plan: &Plan) -> Result<Scene, SimError> {
             let name = &scene.superstructure.facet[facet].name;
             plan.facets.iter().any(|f| f.facet == *name)
         };
-        // Where every facet is planned the rules need not find places before any.
+        // If every facet is planned, the rules need not find poses for any.
         let all = (0..scene.superstructure.facet.len()).all(is_planned);
         let rules = if all {
             without_rules_for_facets(scene)
@@ -95,7 +97,7 @@ pub fn with_poses(scene: &Scene, plan: &Plan) -> Result<Scene, SimError> {
     Ok(appended(scene, poses, plan))
 }
 
-/// The scene of a dataset with the dataset's poses as they were tracked and the planned ones behind them.
+/// Returns the scene of a dataset with the dataset's poses as tracked, followed by the planned ones.
 pub fn completed(scene: &Scene, dataset: &Dataset, plan: &Plan) -> Scene {
     let boards = dataset.poses.iter().filter(|pose| {
         let kind = pose.label.kind;

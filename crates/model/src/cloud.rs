@@ -27,6 +27,15 @@ impl CloudFrame {
             Self::Room => "room",
         }
     }
+
+    /// What it is, in a line.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Sensor => "The laser base frame",
+            Self::Rig => "The marker body on the superstructure",
+            Self::Room => "The frame of motion capture",
+        }
+    }
 }
 
 /// A point and the reading it comes from.

@@ -5,7 +5,7 @@ use crate::frame::Pose;
 use nalgebra::{Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 /// Parts of a stretch in which markers are averaged, at most.
-pub const MOST_PARTS: usize = 8;
+const MOST_PARTS: usize = 8;
 
 /// Frames of a part, at least.
 const LEAST_FRAMES: usize = 2;

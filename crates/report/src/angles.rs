@@ -1,4 +1,4 @@
-//! θ_a and φ of one mirror's elements in every trial, with corrections and without, as in the paper's Figure 10.
+//! θ_a and φ of one mirror's elements in every trial, with and without corrections, as in the paper's Figure 10.
 
 use super::figure::{Axes, Stroke, color, css, laws};
 use super::page::{figure, number};
@@ -8,13 +8,14 @@ use std::collections::BTreeMap;
 
 const SIZE: (u32, u32) = (640, 360);
 
-/// Names of the two angles.
+/// Symbols of the two angles.
 pub(super) const NAMES: [&str; 2] = ["θ_a", "φ"];
 
-/// With corrections, and without.
+/// Palette indices for angles with corrections, and without.
 const COLORS: [usize; 2] = [0, 1];
 
-/// Two plots for each contestant of a cell that is there uncorrected too. `single` says whether to draw every trial.
+/// Returns two plots for each contestant of a cell that also ran uncorrected. `single` tells whether to draw every
+/// trial.
 pub(super) fn angles(spreads: &[&Spread], elements: &[&ElementAngles], single: bool) -> String {
     let mut methods: Vec<&str> = spreads.iter().map(|s| s.method.as_str()).collect();
     methods.dedup();
@@ -58,7 +59,7 @@ fn both(method: &str, spreads: &[Vec<&Spread>; 2], trials: &[Vec<&ElementAngles>
     figure(
         &plots,
         &format!(
-            "θ_a and φ of every element by “{}”, with the biases corrected and without: each trial faint, their mean thick.",
+            "θ_a and φ of every element by “{}”, with and without bias corrections: each trial as a faint line, their mean as a thick line.",
             method
         ),
         &legend,
@@ -72,7 +73,7 @@ fn truth(s: &Spread, i: usize) -> f64 {
     s.mean[i] - s.error_mean[i]
 }
 
-/// One angle over the beams.
+/// Plots one angle over the beams.
 fn plot(method: &str, i: usize, spreads: &[Vec<&Spread>; 2], trials: &[Vec<&ElementAngles>; 2]) -> String {
     let mut strokes = Vec::new();
     for ((spreads, trials), c) in spreads.iter().zip(trials).zip(COLORS) {
@@ -80,7 +81,7 @@ fn plot(method: &str, i: usize, spreads: &[Vec<&Spread>; 2], trials: &[Vec<&Elem
         let mut lines: BTreeMap<u64, Vec<(f64, f64)>> = BTreeMap::new();
         for e in trials {
             let mean = means.get(&e.beam).copied().unwrap_or(e.estimate[i]);
-            // Beside the mean, so that ±180° is no seam.
+            // Within 180° of the mean, so that lines do not jump at ±180°.
             let from_mean = e.estimate[i] - mean;
             let angle = mean + from_mean - 360.0 * (from_mean / 360.0).round();
             lines.entry(e.seed).or_default().push((e.beam as f64, angle));
@@ -110,7 +111,7 @@ fn plot(method: &str, i: usize, spreads: &[Vec<&Spread>; 2], trials: &[Vec<&Elem
         x_label: "beam".to_owned(),
         y_label: format!("{} (°)", NAMES[i]),
     };
-    let title = format!("{} by {method}, with corrections and without", NAMES[i]);
+    let title = format!("{} by {method}, with and without corrections", NAMES[i]);
     laws(SIZE, &axes, &title, &[], &strokes)
 }
 
@@ -130,7 +131,7 @@ mod tests {
     use catoptric_assess::study::spread;
 
     #[test]
-    fn angles_are_drawn_where_there_is_something_to_compare() {
+    fn angles_are_drawn_only_where_both_runs_exist() {
         let element = |seed: u64, method: &str, beam: usize, azimuth: f64| ElementAngles {
             cell: 0,
             seed,

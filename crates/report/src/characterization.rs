@@ -1,4 +1,4 @@
-//! The page beside `characterization.json`: a picture and a table for each of Tables 1 to 4, and the fitted numbers.
+//! The page next to `characterization.json`: a plot and a table for each of Tables 1 to 4, and the fitted numbers.
 
 use super::figure::{Axes, Mark, Stroke, color, css, laws};
 use super::page::{escape, figure, page};
@@ -10,10 +10,10 @@ use std::ops::Range;
 
 const SIZE: (u32, u32) = (640, 360);
 
-/// The page about a characterized sensor, as HTML; `injected` is what a simulation put in, where that is known.
+/// Returns the page on a characterized sensor, as HTML; `injected` is the simulated bias, where it is known.
 pub fn characterization(found: &Characterization, injected: Option<&RangeBias>) -> String {
     let mut html = format!(
-        "<header>\n<h1>{}</h1>\n<p class=\"subtitle\">What the ranges of the bare sensor are off by</p>\n</header>\n",
+        "<header>\n<h1>{}</h1>\n<p class=\"subtitle\">Range errors of the bare sensor</p>\n</header>\n",
         escape(&found.name)
     );
     for table in tables(found, injected) {
@@ -27,7 +27,7 @@ pub fn characterization(found: &Characterization, injected: Option<&RangeBias>) 
         html += &section(&table, &picture);
     }
     if !found.not_observed.is_empty() {
-        html += "<h2>What the boards do not tell</h2>\n<ul>\n";
+        html += "<h2>Not determined by the boards</h2>\n<ul>\n";
         for open in &found.not_observed {
             let of = open.color.as_ref().map_or(String::new(), |c| format!(" of {c}"));
             html += &format!(
@@ -37,13 +37,13 @@ pub fn characterization(found: &Characterization, injected: Option<&RangeBias>) 
         }
         html += "</ul>\n";
     }
-    html += "<footer>Errors are measured less true, in millimetres; bars are ±1σ of single readings in the picture of \
+    html += "<footer>Errors are measured minus true, in millimeters; bars are ±1σ of single readings in the plot of \
              Table 2 and ±2σ of the fit in that of Table 3. Rings are the paper's values (Cooper, Raquet, Patton 2018).\
              </footer>\n";
     page(&format!("{} – catoptric characterization", found.name), &html)
 }
 
-/// A picture with its legend.
+/// A plot with its legend.
 #[derive(Default)]
 struct Picture {
     svg: String,
@@ -86,7 +86,7 @@ fn legend(entries: &[(RGBColor, &str)]) -> Vec<(String, String)> {
     entries.iter().map(entry).collect()
 }
 
-/// Limits that hold all marks and strokes, with some air.
+/// Returns limits that hold all marks and strokes, with a margin.
 fn limits(values: impl Iterator<Item = f64>, from_zero: bool) -> Range<f64> {
     let (mut low, mut high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
         (l.min(v), h.max(v))
@@ -105,7 +105,7 @@ fn limits(values: impl Iterator<Item = f64>, from_zero: bool) -> Range<f64> {
     }
 }
 
-/// Steps in which a law is drawn.
+/// Number of segments in which a law is drawn.
 const STEPS: u32 = 120;
 
 fn curve(over: &Range<f64>, color: RGBColor, law: impl Fn(f64) -> f64) -> Stroke {
@@ -156,7 +156,7 @@ fn spots(found: &Characterization) -> Picture {
     });
     Picture {
         svg: draw(
-            "Extent of the spot over the distance",
+            "Spot extent over distance",
             ["distance (m)", "extent (mm)"],
             &marks,
             &strokes,
@@ -187,7 +187,7 @@ fn distances(found: &Characterization) -> Picture {
     }
     Picture {
         svg: draw(
-            "Mean error over the distance",
+            "Mean error over distance",
             ["distance (m)", "error (mm)"],
             &marks,
             &strokes,
@@ -204,7 +204,7 @@ fn distances(found: &Characterization) -> Picture {
 fn angles(found: &Characterization) -> Picture {
     let (ours, fitted, printed) = (color(0), color(1), color(2));
     let tested = || found.stretches.iter().filter(|s| s.test == Some(TestKind::Angle));
-    // What is not of the angle is taken off, so that boards at different distances lie on one curve.
+    // All errors but that of incidence are subtracted, so that boards at different distances fall on one curve.
     let mut marks: Vec<Mark> = tested()
         .map(|s| {
             let terms = found.bias.terms(s.distance_m, 1.0, &s.color);
@@ -223,17 +223,17 @@ fn angles(found: &Characterization) -> Picture {
     let law = |degrees: f64| found.bias.angle.error(libm::cos(degrees.to_radians())) * 1e3;
     Picture {
         svg: draw(
-            "Error over the incidence",
+            "Error over incidence",
             ["incidence (°)", "E_a (mm)"],
             &marks,
             &[curve(&(-widest..widest), fitted, law)],
             [false, false],
         ),
         legend: legend(&[
-            (ours, "means less E_r and E_c"),
+            (ours, "means minus E_r and E_c"),
             (fitted, "E_a as fitted"),
             (BLACK, "the table of incidences, ±2σ"),
-            (printed, "the paper's means, nothing taken off"),
+            (printed, "the paper's means, uncorrected"),
         ]),
     }
 }
@@ -264,7 +264,7 @@ fn noise(found: &Characterization) -> Picture {
     }
     Picture {
         svg: draw(
-            "Standard deviation of a reading over the distance, by color",
+            "Standard deviation of a reading over distance, by color",
             ["distance (m)", "standard deviation (mm)"],
             &marks,
             &strokes,

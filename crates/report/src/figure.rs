@@ -1,4 +1,5 @@
-//! The plots, as inline SVG without a color scheme of their own: black follows the page's ink, [`GRID`] its grid.
+//! The plots, as inline SVG without colors of their own for ink and grid: the style sheet maps black and [`GRID`] to
+//! the page's colors.
 
 #[cfg(feature = "design")]
 mod fine;
@@ -13,12 +14,12 @@ use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use std::ops::Range;
 
-/// Lines that stand behind the data; the style sheet gives them the page's grid color.
+/// Color of lines behind the data; the style sheet maps it to the page's grid color.
 pub(super) const GRID: RGBColor = RGBColor(0xC8, 0xC8, 0xC8);
 
 const FONT: &str = "sans-serif";
 const LABEL_SIZE: i32 = 13;
-/// Room for axis labels, the same on both axes so that square figures stay square.
+/// Space for axis labels, in pixels; the same on both axes so that square figures stay square.
 const AXIS_ROOM: u32 = 52;
 const MARGIN: u32 = 10;
 
@@ -26,13 +27,13 @@ type Sheet<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Chart<'a> = ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 type Failure = Box<dyn std::error::Error>;
 
-/// The color of the facet of a given number.
+/// Returns the color of the facet of a given number.
 pub(crate) fn color(facet: usize) -> RGBColor {
     let [red, green, blue] = facet_color(facet);
     RGBColor(red, green, blue)
 }
 
-/// A color as style sheets write it.
+/// Formats a color for style sheets.
 pub(super) fn css(color: RGBColor) -> String {
     format!("#{:02X}{:02X}{:02X}", color.0, color.1, color.2)
 }
@@ -45,14 +46,14 @@ pub(super) struct Stroke {
     pub(super) opacity: f64,
 }
 
-/// A word beside the data.
-pub(super) struct Word {
+/// A text next to the data.
+pub(super) struct Label {
     pub(super) at: (f64, f64),
     pub(super) text: String,
     pub(super) color: RGBColor,
 }
 
-/// What a plot shows and where its axes run.
+/// Limits and labels of the axes of a plot.
 pub(super) struct Axes {
     pub(super) x: Range<f64>,
     pub(super) y: Range<f64>,
@@ -60,7 +61,7 @@ pub(super) struct Axes {
     pub(super) y_label: String,
 }
 
-/// A value over an azimuth, with the band it should be in.
+/// A value at an azimuth, with its uncertainty band.
 #[derive(Debug, Clone)]
 pub(super) struct Dot {
     pub(super) x: f64,
@@ -76,35 +77,35 @@ pub(super) struct Mark {
     /// Half the length of its bar; 0 for none.
     pub(super) half_bar: f64,
     pub(super) color: RGBColor,
-    /// Drawn as a ring: it is somebody else's.
+    /// Drawn as a ring: a value from the literature.
     pub(super) hollow: bool,
 }
 
-/// A stretch of a strip: from one azimuth to another, in one row.
+/// A bar of a strip: from one azimuth to another, in one row.
 pub(super) struct Bar {
     pub(super) x: Range<f64>,
     pub(super) row: usize,
     pub(super) color: RGBColor,
 }
 
-/// A plan of lines and words, as wide as high in units if the axes are.
-pub(super) fn plan(size: (u32, u32), axes: &Axes, title: &str, strokes: &[Stroke], words: &[Word]) -> String {
+/// Plots lines and labels in a plane, to scale if both axes have the same length.
+pub(super) fn plan(size: (u32, u32), axes: &Axes, title: &str, strokes: &[Stroke], labels: &[Label]) -> String {
     draw(size, title, |area| {
         let mut chart = frame(area, axes, true)?;
         draw_strokes(&mut chart, strokes)?;
-        for w in words {
-            let style = (FONT, LABEL_SIZE).into_font().color(&w.color);
+        for label in labels {
+            let style = (FONT, LABEL_SIZE).into_font().color(&label.color);
             let anchor = plotters::style::text_anchor::Pos::new(
                 plotters::style::text_anchor::HPos::Center,
                 plotters::style::text_anchor::VPos::Center,
             );
-            chart.draw_series([Text::new(w.text.clone(), w.at, style.pos(anchor))])?;
+            chart.draw_series([Text::new(label.text.clone(), label.at, style.pos(anchor))])?;
         }
         Ok(())
     })
 }
 
-/// Points of a cloud and lines around them.
+/// Plots the points of a cloud, and lines around them.
 pub(super) fn scatter(
     size: (u32, u32),
     axes: &Axes,
@@ -121,7 +122,7 @@ pub(super) fn scatter(
     })
 }
 
-/// Marks over a quantity, and the laws through them.
+/// Plots measured values, and curves through them.
 pub(super) fn laws(size: (u32, u32), axes: &Axes, title: &str, marks: &[Mark], strokes: &[Stroke]) -> String {
     draw(size, title, |area| {
         let mut chart = frame(area, axes, true)?;
@@ -172,7 +173,7 @@ pub(super) fn per_beam(size: (u32, u32), axes: &Axes, title: &str, step_deg: f64
     })
 }
 
-/// Rows of colored bars over azimuth; row 0 on top.
+/// Plots rows of colored bars over azimuth; row 0 is at the top.
 pub(super) fn strip(size: (u32, u32), axes: &Axes, title: &str, bars: &[Bar], rows: usize) -> String {
     draw(size, title, |area| {
         let mut chart = frame(area, axes, false)?;
@@ -193,7 +194,7 @@ fn draw_strokes(chart: &mut Chart, strokes: &[Stroke]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Coordinate frame with grid and axis labels.
+/// Draws the axes with grid and labels.
 fn frame<'a>(area: &Sheet<'a>, axes: &Axes, y_labels: bool) -> Result<Chart<'a>, Failure> {
     let mut chart = ChartBuilder::on(area)
         .margin(MARGIN)
@@ -218,9 +219,9 @@ fn frame<'a>(area: &Sheet<'a>, axes: &Axes, y_labels: bool) -> Result<Chart<'a>,
     Ok(chart)
 }
 
-/// A number at an axis: no more digits than it needs, a true minus, and one zero only.
+/// Formats the number at a tick: no more digits than needed, a true minus sign, and no negative zero.
 pub(super) fn tick(value: f64) -> String {
-    // Ticks are round numbers; what is beyond the sixth decimal is rounding.
+    // Ticks are round numbers; anything beyond the sixth decimal is rounding error.
     let text = format!("{value:.6}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     match text.strip_prefix('-') {
@@ -230,7 +231,7 @@ pub(super) fn tick(value: f64) -> String {
     }
 }
 
-/// An SVG for inlining: without a name space, which HTML supplies, with a title, and as wide as the page lets it.
+/// Returns an SVG for inlining: without a namespace, which HTML supplies, with a title, and as wide as the page allows.
 fn draw(size: (u32, u32), title: &str, content: impl FnOnce(&Sheet) -> Result<(), Failure>) -> String {
     let mut svg = String::new();
     let outcome = {
@@ -252,7 +253,7 @@ fn draw(size: (u32, u32), title: &str, content: impl FnOnce(&Sheet) -> Result<()
     )
 }
 
-/// An SVG that stands by itself as a file: with its name space, on white.
+/// Turns an inline SVG into a file: with its namespace, on white.
 #[cfg(feature = "design")]
 pub(super) fn standalone(svg: &str) -> String {
     svg.replacen("<svg ", "<svg xmlns=\"http://www.w3.org/2000/svg\" ", 1)
@@ -263,9 +264,9 @@ pub(super) fn standalone(svg: &str) -> String {
         )
 }
 
-/// Limits around zero that hold the values, save for a few that are far beyond the others; −1…1 for nothing.
+/// Returns limits around zero that hold the values, except a few far outliers; −1…1 without values.
 pub(super) fn around_zero(values: impl Iterator<Item = f64>) -> Range<f64> {
-    // What is beyond four times the 95th percentile would press all others onto the axis.
+    // Values beyond four times the 95th percentile would squeeze all others onto the axis.
     const FAR: f64 = 4.0;
     let sizes: Vec<f64> = values.filter(|v| v.is_finite()).map(f64::abs).collect();
     let largest = percentile(&sizes, 1.0);
@@ -307,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_off_the_axes_is_drawn_at_their_end() {
+    fn values_off_the_axes_are_drawn_at_their_end() {
         let dot = |y| Dot {
             x: 0.0,
             y,

@@ -1,8 +1,8 @@
-//! Self-contained pages: `report.html` about an experiment, its calibrations and their scores, and the page beside
-//! `characterization.json`.
+//! Self-contained HTML pages: `report.html` on an experiment, its calibrations and their scores; the page next to
+//! `characterization.json`; pages on plans, studies, layouts, searches and tolerances.
 //!
-//! No scripts, nothing fetched, no clock: the same input gives the same bytes. Every plot carries its numbers in a
-//! table.
+//! No scripts, nothing fetched, no clock: the same input gives the same bytes. Every plot comes with a table of its
+//! numbers.
 
 mod angles;
 mod characterization;
@@ -21,7 +21,7 @@ mod study;
 mod tolerance;
 mod trials;
 mod verdict;
-mod words;
+mod prose;
 
 pub use characterization::characterization;
 #[cfg(feature = "design")]
@@ -42,10 +42,10 @@ use catoptric_sim::Truth;
 use page::escape;
 use scores::scores;
 
-/// The report of an experiment and the calibrations made from it, as HTML.
+/// Returns the report on an experiment and the calibrations made from it, as HTML.
 ///
-/// The first calibration is the one whose fans are drawn. `cloud` is a sketch, of [`MOST_POINTS`], of
-/// what [`apply`](fn@catoptric_assess::apply) makes of the empty room.
+/// The fans are drawn for the first calibration. `cloud` is the point cloud that [`apply`](fn@catoptric_assess::apply)
+/// made of the empty room.
 pub fn report(
     dataset: &Dataset,
     truth: Option<&Truth>,
@@ -54,13 +54,13 @@ pub fn report(
 ) -> String {
     let name = &dataset.session.name;
     let mut html = format!(
-        "<header>\n<h1>{}</h1>\n<p class=\"subtitle\">Calibration report of a 2D LiDAR that sees in 3D through mirrors</p>\n</header>\n",
+        "<header>\n<h1>{}</h1>\n<p class=\"subtitle\">Calibration report for a 2D LiDAR that sees in 3D through mirrors</p>\n</header>\n",
         escape(name)
     );
-    html += &format!("<p>{}</p>\n", escape(&words::experiment(dataset, truth)));
+    html += &format!("<p>{}</p>\n", escape(&prose::experiment(dataset, truth)));
     html += &verdict::verdicts(&dataset.session.scanner.scan, results);
     if results.is_empty() {
-        html += "<p>No calibration was given to this report.</p>\n";
+        html += "<p>This report includes no calibration.</p>\n";
     }
     if !results.is_empty() {
         html += &format!("<h2>Scores</h2>\n{}", scores(results));
@@ -87,12 +87,12 @@ pub fn report(
     if let Some(cloud) = cloud {
         let calibration = results.first().map(|(c, _)| c);
         html += &format!(
-            "<h2>The room as the mirrors show it</h2>\n{}",
+            "<h2>The room as seen through the mirrors</h2>\n{}",
             plots::cloud(dataset, calibration, cloud)
         );
     }
     html += "<footer>Angles are in degrees per axis: the root mean square of the two components of a direction's error, \
-             cos φ·δθ across and δφ up, in the sensor frame unless “room” is said. φ is elevation, θ azimuth, d the \
+             cos φ·δθ across and δφ up, in the sensor frame unless marked “room”. φ is elevation, θ azimuth, d the \
              distance from the scanner to the mirror.</footer>\n";
     page::page(&format!("{name} – catoptric report"), &html)
 }

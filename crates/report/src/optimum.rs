@@ -1,19 +1,19 @@
-//! The page about a search: what the goals cost one another, what the best layout is, and why.
+//! The page on a layout search: the trade-off between the goals, the best layout, and why it is better.
 
 use super::figure::{self, Axes, GRID, Mark, Stroke, color, css};
 use super::page::{escape, figure as block, page, table};
 use catoptric_design::optimize::{Better, Candidate, Optimum, Stated};
 use std::ops::Range;
 
-/// Size of the picture, in pixels.
+/// Size of the plot, in pixels.
 const SIZE: (u32, u32) = (640, 480);
 
-/// Colors of the front, the drawing and the best.
+/// Palette indices of the front, the drawing and the best layout.
 const FRONT: usize = 0;
 const START: usize = 1;
 const BEST: usize = 2;
 
-/// A value of a goal for people: six significant places and no more.
+/// Formats the value of a goal with at most six significant digits.
 pub fn goal_value(value: f64) -> String {
     let size = value.abs();
     let decimals = match size {
@@ -26,19 +26,19 @@ pub fn goal_value(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
-/// The front over the first two goals as a file of its own; `None` with one goal or nothing to show.
+/// Returns the front over the first two goals as a standalone SVG file; `None` with one goal or nothing to show.
 pub fn front_picture(found: &Optimum) -> Option<String> {
     picture(found).map(|svg| figure::standalone(&svg))
 }
 
-/// The page, as HTML.
+/// Returns the page, as HTML.
 pub fn optimum(found: &Optimum) -> String {
     let mut html = format!(
         "<header>\n<h1>{}</h1>\n<p class=\"subtitle\">A search for better layouts</p>\n</header>\n<p>{}</p>\n",
         escape(&found.name),
         escape(&summary(found))
     );
-    html += "<h2>What the goals cost one another</h2>\n";
+    html += "<h2>Trade-off between the goals</h2>\n";
     let mut headings = vec!["layout"];
     let names: Vec<String> = found.goals.iter().map(heading).collect();
     headings.extend(names.iter().map(String::as_str));
@@ -55,7 +55,7 @@ pub fn optimum(found: &Optimum) -> String {
     );
     rows.extend(found.front.iter().map(|c| row(format!("no. {}", c.number), c)));
     let legend = [
-        (GRID, "looked at"),
+        (GRID, "evaluated"),
         (color(FRONT), "front"),
         (color(START), "as drawn"),
         (color(BEST), "best"),
@@ -64,8 +64,8 @@ pub fn optimum(found: &Optimum) -> String {
     html += &match picture(found) {
         Some(svg) => block(
             &svg,
-            "Every layout that keeps the requirements. None is better in both goals than those on the front; the best is \
-             the one that gains most, in shares of how far the front reaches, in the goal in which it gains least.",
+            "Every layout that meets the requirements. None is better in both goals than those on the front; the best \
+             is the one whose smallest gain in any goal is largest, gains being relative to the spread of the front.",
             &legend,
             &headings,
             &rows,
@@ -73,15 +73,15 @@ pub fn optimum(found: &Optimum) -> String {
         None => table(&headings, &rows),
     };
     html += &best(found);
-    html += "<footer>Found by swarms of particles, each along one direction of the front, with one generator of draws: the \
-             same seed gives the same layouts on any number of threads. The best layouts stand beside this page as \
-             scenes.</footer>\n";
+    html += "<footer>Found by particle swarms, each along one direction of the front, with one random number generator: \
+             the same seed gives the same layouts on any number of threads. The best layouts are stored next to this \
+             page as scenes.</footer>\n";
     page(&format!("{} – catoptric optimize", found.name), &html)
 }
 
 fn summary(found: &Optimum) -> String {
     let beats = match (&found.best, found.beats_start_in_every_goal) {
-        (None, _) => "None that was looked at keeps every requirement.",
+        (None, _) => "No evaluated layout meets every requirement.",
         (Some(_), true) => "The best is better than the drawing in every goal.",
         (Some(_), false) => "None is better than the drawing in every goal.",
     };
@@ -91,8 +91,8 @@ fn summary(found: &Optimum) -> String {
         format!(" Required: {}.", found.requirements.join(", "))
     };
     format!(
-        "{} layouts were looked at under seed {}, {} of them keep the requirements, and no other beats {} of those in all \
-         goals. {beats}{requirements}{}",
+        "{} layouts were evaluated under seed {}; {} of them meet the requirements, and {} of those are not beaten in \
+         all goals by any other. {beats}{requirements}{}",
         found.evaluations,
         found.seed,
         found.tried.len(),
@@ -105,7 +105,7 @@ fn summary(found: &Optimum) -> String {
     )
 }
 
-/// The best layout: its parameters, and why it is better.
+/// Describes the best layout: its parameters, and why it is better.
 fn best(found: &Optimum) -> String {
     let Some(best) = &found.best else {
         return String::new();
@@ -126,7 +126,7 @@ fn best(found: &Optimum) -> String {
         .collect();
     html += &table(&["parameter", "as drawn", "best", "limits"], &rows);
     let Some(why) = &found.why else { return html };
-    html += "<h2>Why it is better</h2>\n<p>What becomes of the elements:</p>\n";
+    html += "<h2>Why it is better</h2>\n<p>Elements by class:</p>\n";
     let pair = |name: String, [start, best]: [usize; 2]| vec![name, start.to_string(), best.to_string()];
     let mut rows: Vec<Vec<String>> = why
         .elements
@@ -139,7 +139,7 @@ fn best(found: &Optimum) -> String {
             .map(|(facet, counts)| pair(format!("by {facet} alone"), *counts)),
     );
     html += &table(&["elements", "as drawn", "best"], &rows);
-    html += "<p>What each change is worth: the best layout with one parameter left as it was drawn, what costs most \
+    html += "<p>The effect of each change: the best layout with one parameter left as drawn, the costliest \
              first.</p>\n";
     let mut headings = vec!["left as drawn", "drawn", "best"];
     let names: Vec<String> = found.goals.iter().map(heading).collect();
@@ -169,11 +169,11 @@ fn best(found: &Optimum) -> String {
 
 fn heading(goal: &Stated) -> String {
     let unit = goal.unit.map_or_else(String::new, |unit| format!(" ({unit})"));
-    let way = match goal.better {
+    let direction = match goal.better {
         Better::Up => "more is better",
         Better::Down => "less is better",
     };
-    format!("{}{unit}, {way}", goal.name)
+    format!("{}{unit}, {direction}", goal.name)
 }
 
 fn value(candidate: &Candidate, goal: &str) -> String {
@@ -210,7 +210,7 @@ fn picture(found: &Optimum) -> Option<String> {
     if front.is_empty() {
         return None;
     }
-    // What is far worse than the drawing would press the front into a corner.
+    // Layouts far worse than the drawing would squeeze the front into a corner.
     let shown = || marks.iter().filter(|m| m.color != GRID);
     let axes = Axes {
         x: reach(shown().map(|m| m.x)),
@@ -230,7 +230,7 @@ fn picture(found: &Optimum) -> Option<String> {
     Some(figure::laws(SIZE, &axes, &title, &marks, &[line]))
 }
 
-/// From the least to the greatest, with room on either side.
+/// The range from minimum to maximum, with a margin on either side.
 fn reach(values: impl Iterator<Item = f64> + Clone) -> Range<f64> {
     let low = values.clone().fold(f64::INFINITY, f64::min);
     let high = values.fold(f64::NEG_INFINITY, f64::max);

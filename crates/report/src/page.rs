@@ -1,8 +1,8 @@
-//! The pieces of an HTML page: escaping, tables, figures, numbers, the style sheet.
+//! Building blocks of an HTML page: escaping, tables, figures, numbers, the style sheet.
 
 use catoptric_assess::tables::fixed;
 
-/// Text as HTML.
+/// Escapes text for HTML.
 pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
@@ -10,7 +10,7 @@ pub(super) fn escape(text: &str) -> String {
         .replace('"', "&quot;")
 }
 
-/// A number with some decimals; a dash where there is none. The minus sign is a true one.
+/// Formats a number with the given decimals and a true minus sign; NaN becomes a dash.
 pub(super) fn number(value: f64, decimals: usize) -> String {
     if value.is_finite() {
         let text = fixed(value, decimals);
@@ -23,12 +23,12 @@ pub(super) fn number(value: f64, decimals: usize) -> String {
     }
 }
 
-/// A count; a dash where there is none.
+/// Formats a count; `None` becomes a dash.
 pub(super) fn count(value: Option<usize>) -> String {
     value.map_or_else(|| "–".to_owned(), |c| c.to_string())
 }
 
-/// A table; columns of words are set to the left, columns of numbers to the right.
+/// Returns a table; columns of text are aligned left, columns of numbers right.
 pub(super) fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
     let is_word = |cell: &String| cell.starts_with(char::is_alphabetic);
     let class = |column: usize| {
@@ -55,10 +55,10 @@ pub(super) fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
     html + "</tbody></table></div>\n"
 }
 
-/// Rows beyond which a table is folded away.
+/// Number of rows beyond which a table is collapsed.
 const LONG_TABLE: usize = 12;
 
-/// Colors with their names; nothing for none.
+/// Returns a legend of colors and names; empty without entries.
 pub(super) fn legend(entries: &[(String, String)]) -> String {
     if entries.is_empty() {
         return String::new();
@@ -75,7 +75,7 @@ pub(super) fn legend(entries: &[(String, String)]) -> String {
     )
 }
 
-/// Plots, what to see in them, and their numbers.
+/// Returns plots with their caption, legend and table of numbers.
 pub(super) fn figure(
     plots: &str,
     caption: &str,
@@ -97,7 +97,7 @@ pub(super) fn figure(
     html + "</figure>\n"
 }
 
-/// The whole page around its content.
+/// Returns the whole page around its content.
 pub(super) fn page(title: &str, content: &str) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn long_tables_are_folded() {
+    fn long_tables_are_collapsed() {
         let rows = |n: usize| vec![vec!["1".to_owned()]; n];
         assert!(!figure("", "", &[], &["a"], &rows(LONG_TABLE)).contains("<details>"));
         assert!(figure("", "", &[], &["a"], &rows(LONG_TABLE + 1)).contains("<details>"));

@@ -1,6 +1,6 @@
-//! The page about planned board poses: for each facet the room from above and from the side, and a table.
+//! The page on planned board poses: for each facet the room from above and from the side, and a table.
 
-use super::figure::{self, Axes, GRID, Stroke, Word, color};
+use super::figure::{self, Axes, GRID, Stroke, Label, color};
 use super::page::{escape, figure as block, number, page};
 use catoptric_calib::plan::{FacetPlan, Plan, PlannedPose, Situation, Standing};
 use catoptric_model::frame::yaw_pitch_roll;
@@ -11,13 +11,13 @@ use std::ops::Range;
 /// Size of a view, in pixels.
 const SQUARE: (u32, u32) = (500, 500);
 
-/// Rays drawn of each fan, about.
+/// Approximate number of rays drawn of each fan.
 const RAYS: usize = 12;
 
-/// Margin around the room, as a share of its extent.
+/// Margin around the room, as a fraction of its extent.
 const MARGIN: f64 = 0.04;
 
-/// A view: its title, the two axes of the room and what they are called.
+/// A view: its title, the two axes of the room, and their labels.
 type View = (&'static str, [usize; 2], [&'static str; 2]);
 
 const VIEWS: [View; 2] = [
@@ -25,7 +25,7 @@ const VIEWS: [View; 2] = [
     ("From the side", [0, 2], ["x (m)", "z, up (m)"]),
 ];
 
-/// The page, as HTML.
+/// Returns the page, as HTML.
 pub fn plan(situation: &Situation, plan: &Plan) -> String {
     let session = situation.session();
     let mut html = format!(
@@ -48,22 +48,22 @@ pub fn plan(situation: &Situation, plan: &Plan) -> String {
             html += "</ul>\n";
         }
     }
-    html += "<footer>The bound is the root mean square, over the beams that are determined, of the least error that any \
-             unbiased estimate of a beam by itself can have under the errors believed in, in degrees per axis, the mounting \
-             taken as known. ψ is the direction to which a board's normal leans, seen along the beam it is aimed at: 0° to \
-             growing azimuth, 90° up.</footer>\n";
+    html += "<footer>The bound is the root mean square, over the beams that are determined, of the smallest error that \
+             any unbiased estimate of a beam by its own boards can have under the believed errors, in degrees per axis, \
+             with the mounting known. ψ is the direction in which a board's normal is tilted, seen along the beam it is \
+             aimed at: 0° toward growing azimuth, 90° up.</footer>\n";
     page(&format!("{} – catoptric plan", session.name), &html)
 }
 
 fn summary(facet: &FacetPlan) -> String {
-    let said = |standing: &Standing| match standing.bound_deg {
+    let text = |standing: &Standing| match standing.bound_deg {
         Some(bound) => format!(
             "{} beams determined to {bound:.4}° per axis, {} open",
             standing.determined, standing.open
         ),
         None => format!("{} beams open", standing.open),
     };
-    format!("Before: {}. After: {}.", said(&facet.before), said(&facet.after))
+    format!("Before: {}. After: {}.", text(&facet.before), text(&facet.after))
 }
 
 fn section(situation: &Situation, facet: &FacetPlan) -> String {
@@ -74,8 +74,8 @@ fn section(situation: &Situation, facet: &FacetPlan) -> String {
     }
     svgs += "</div>";
     let caption = format!(
-        "The room with the fan of {}, as far as it is known, and the boards planned, numbered with the most informative \
-         first. A board seen on edge is a line. Rays end where the farthest board is.",
+        "The room with the fan of {}, as far as it is known, and the planned boards, numbered with the most informative \
+         first. A board seen edge-on is a line. Rays end at the distance of the farthest board.",
         facet.facet
     );
     let rows: Vec<Vec<String>> = (facet.poses.iter().enumerate())
@@ -148,12 +148,12 @@ fn view(
         let end = origin + direction.into_inner() * wall.unwrap_or(farthest).min(farthest);
         strokes.push(line(vec![flat(&sensor), flat(origin), flat(&end)], GRID, 1, 1.0));
     }
-    let mut words: Vec<Word> = Vec::new();
+    let mut labels: Vec<Label> = Vec::new();
     let (x, y) = extents(session, facet, &sensor, [i, j]);
     for (place, pose) in facet.poses.iter().enumerate() {
         let mut corners: Vec<(f64, f64)> = corners(session, pose).iter().map(flat).collect();
         corners.extend(corners.first().copied());
-        // A corner is less often on another board than the center.
+        // A corner is hidden by another board less often than the center.
         let at = corners.first().map_or((0.0, 0.0), |corner| {
             let center = flat(&Point3::from(Vector3::from(pose.center_m)));
             (
@@ -162,7 +162,7 @@ fn view(
             )
         });
         strokes.push(line(corners, color(place), 2, 1.0));
-        words.push(Word {
+        labels.push(Label {
             at,
             text: (place + 1).to_string(),
             color: color(place),
@@ -175,10 +175,10 @@ fn view(
         y_label: y_label.to_owned(),
     };
     let title = format!("{title}: facet {}", facet.facet);
-    figure::plan(SQUARE, &axes, &title, &strokes, &words)
+    figure::plan(SQUARE, &axes, &title, &strokes, &labels)
 }
 
-/// Limits of both axes, of the same length, around room, sensor and boards.
+/// Returns limits of both axes, of equal length, around room, sensor and boards.
 fn extents(
     session: &Session,
     facet: &FacetPlan,
@@ -200,7 +200,7 @@ fn extents(
     (around(limits[0]), around(limits[1]))
 }
 
-/// Corners of a planned board in the room; none for a board that the session does not hold.
+/// Returns the corners of a planned board in the room; none for a board that is not in the session.
 fn corners(session: &Session, pose: &PlannedPose) -> Vec<Point3<f64>> {
     let [yaw, pitch, roll] = pose.yaw_pitch_roll_deg.map(f64::to_radians);
     let room_from_board = Pose::from_parts(

@@ -1,10 +1,10 @@
-//! The table of scores: a figure a row, a method a column.
+//! The table of scores: one row per figure, one column per method.
 
 use super::page::{self, count, number};
 use catoptric_assess::score::{PointError, Score, Spread};
 use catoptric_model::Calibration;
 
-/// The scores side by side, a method a column.
+/// Returns the scores side by side, one column per method.
 pub(super) fn scores(results: &[(Calibration, Score)]) -> String {
     let mut headings = vec!["Figure"];
     headings.extend(results.iter().map(|(c, _)| c.method.as_str()));
@@ -39,10 +39,10 @@ pub(super) fn scores(results: &[(Calibration, Score)]) -> String {
     row("– missed", &|s| count(s.beams.missed));
     row("False: solved but not deflected", &|s| count(s.beams.wrong));
     row("Per-axis error (°)", &|s| number(s.per_axis_rms_deg, 4));
-    row("– bound on it for each element by itself (°)", &|s| {
+    row("– bound, each element separately (°)", &|s| {
         number(s.alone_crlb_per_axis_deg, 4)
     });
-    row("– bound on it for any method (°)", &|s| {
+    row("– bound, any method (°)", &|s| {
         number(s.crlb_per_axis_deg, 4)
     });
     row("– efficiency, 1 is best", &|s| number(s.efficiency, 2));
@@ -72,26 +72,26 @@ pub(super) fn scores(results: &[(Calibration, Score)]) -> String {
         points(&s.point_mm)
     });
     row("– the same in the room (mm)", &|s| points(&s.point_room_mm));
-    row("Normalised squared error, 1 is honest", &|s| {
+    row("Normalized squared error, 1 is honest", &|s| {
         number(s.nees_mean, 2)
     });
     row("Inside the stated 95 % ellipse (%)", &|s| {
         number(s.coverage_95 * 100.0, 1)
     });
-    row("Points off the boards: mean / rms (mm)", &|s| {
+    row("Distance of points from the boards: mean / rms (mm)", &|s| {
         format!("{} / {}", number(s.boards_mm.mean, 2), number(s.boards_mm.rms, 2))
     });
-    row("Points off the walls of the empty room: mean / rms (mm)", &|s| {
+    row("Distance of points from the walls of the empty room: mean / rms (mm)", &|s| {
         format!("{} / {}", number(s.walls_mm.mean, 2), number(s.walls_mm.rms, 2))
     });
-    row("Split elements: solved of all", &|s| match s.split.elements {
+    row("Split elements: solved / all", &|s| match s.split.elements {
         0 => "–".to_owned(),
         all => format!("{} of {all}", s.split.solved),
     });
-    row("– their per-axis error (°)", &|s| {
+    row("– per-axis error of split elements (°)", &|s| {
         number(s.split.per_axis_rms_deg, 4)
     });
-    // A row without a single figure, as all accuracies are without a truth, says nothing.
+    // A row without any figure, such as an accuracy without a truth, is omitted.
     let is_empty = |cell: &String| cell.chars().all(|c| matches!(c, '–' | '/' | ' '));
     rows.retain(|row| !row.iter().skip(1).all(is_empty));
     page::table(&headings, &rows)

@@ -1,5 +1,5 @@
-//! The page about a study: its table, errors and efficiency over every axis of numbers, and the trials one by one where
-//! they are known.
+//! The page on a study: its table, error and efficiency over every numeric axis, and the individual trials where
+//! available.
 
 use super::figure::{Axes, Mark, Stroke, color, css, laws};
 use super::page::{escape, figure, number, page, table};
@@ -9,7 +9,7 @@ use plotters::style::BLACK;
 
 const SIZE: (u32, u32) = (640, 360);
 
-/// The page, as HTML. `elements` are those of all runs, or none.
+/// Returns the page, as HTML. `elements` holds the elements of all runs, or is empty.
 pub fn study(name: &str, study: &Study, summary: &Summary, elements: &[ElementAngles]) -> String {
     let mut html = format!(
         "<header>\n<h1>{}</h1>\n<p class=\"subtitle\">A study over {} seeds</p>\n</header>\n",
@@ -40,9 +40,10 @@ pub fn study(name: &str, study: &Study, summary: &Summary, elements: &[ElementAn
     let rows: Vec<Vec<String>> = summary.methods.iter().map(|m| row(m, &names)).collect();
     html += &table(&headings, &rows);
     html += &trials(study, elements);
-    html += "<footer>Errors are per axis of the tangent plane. The limit is that of any estimate from these boards; \
-             efficiency is the mean over runs of error² over limit², inverted. ANEES and coverage take one element of each \
-             run, since those of one run share their errors; bounds are those of an honest covariance at 99.9 %.</footer>\n";
+    html += "<footer>Errors are per axis of the tangent plane. The limit is that of any unbiased estimate from these \
+             boards; efficiency is the inverse of the mean of error² over limit² over runs. ANEES and coverage use one \
+             element of each run, since the elements of a run share their errors; bounds are those of an honest \
+             covariance at 99.9 %.</footer>\n";
     page(&format!("{name} – catoptric study"), &html)
 }
 
@@ -81,7 +82,7 @@ fn axis_names(summary: &Summary) -> Vec<String> {
         .map_or_else(Vec::new, |m| m.axes.keys().cloned().collect())
 }
 
-/// The values of an axis that are numbers.
+/// Returns the numeric values of an axis.
 fn points(summary: &Summary, axis: &str) -> Vec<f64> {
     let mut values: Vec<f64> = summary
         .methods
@@ -93,10 +94,10 @@ fn points(summary: &Summary, axis: &str) -> Vec<f64> {
     values
 }
 
-/// What is drawn over an axis: a contestant, at the same values of all other axes.
+/// What is drawn over an axis: one contestant, with the values of all other axes fixed.
 struct Series {
     name: String,
-    /// Value of the axis, and the figures there.
+    /// Values of the axis, and the figures at each.
     at: Vec<(f64, MethodSummary)>,
 }
 
@@ -127,7 +128,7 @@ fn series(summary: &Summary, axis: &str) -> Vec<Series> {
     all
 }
 
-/// Error and efficiency over an axis, a line for each contestant, and the limit in black.
+/// Plots error and efficiency over an axis, one line per contestant, and the limit in black.
 fn over(summary: &Summary, axis: &str) -> String {
     let all = series(summary, axis);
     let drawn = |of: fn(&MethodSummary) -> f64, s: &Series| -> Vec<(f64, f64)> {
@@ -224,7 +225,7 @@ mod tests {
     use super::*;
     use catoptric_assess::study::{Contestant, from_csv, summarize, to_csv};
 
-    /// Two axes of two values each, the oracle's errors as given.
+    /// Two axes with two values each, and the oracle's errors as given.
     fn summary(errors: [f64; 4]) -> (Study, Summary) {
         let scene =
             toml::from_str(include_str!("../../../scenes/reference-facet.toml")).expect("it is valid");
@@ -251,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn every_axis_is_drawn_with_the_others_apart() {
+    fn every_axis_is_drawn_for_each_value_of_the_others() {
         let (study_of, summary) = summary([1e-4, 2e-4, 3e-4, 4e-4]);
         let lines = series(&summary, "a_mm");
         let names: Vec<&str> = lines.iter().map(|s| s.name.as_str()).collect();

@@ -1,4 +1,4 @@
-//! The page as a whole: its tags close, its plots have tables, and it says what the scores say.
+//! Tests of the whole page: its tags nest, its plots have tables, and its verdict agrees with the scores.
 
 use super::*;
 use catoptric_assess::apply::Lift;
@@ -21,7 +21,7 @@ fn html(with_truth: bool) -> String {
     report(&s.dataset, truth, &results, Some(&cloud))
 }
 
-/// Checks that tags close in the order they open; void elements of HTML and self-closed ones of SVG do not open.
+/// Checks that tags nest; void elements of HTML and self-closing ones of SVG open nothing.
 fn check_nesting(html: &str) {
     let mut open = Vec::new();
     let body = html.replace("<!DOCTYPE html>", "");
@@ -62,9 +62,9 @@ fn every_plot_has_a_table_and_nothing_is_fetched() {
 }
 
 #[test]
-fn the_verdict_is_in_words() {
+fn the_verdict_is_written_out() {
     let with = html(true);
-    assert!(with.contains("PASS") && with.contains("What all elements have in common dominates"));
+    assert!(with.contains("PASS") && with.contains("The common mode dominates"));
     let blind = html(false);
     assert!(blind.contains("BLIND") && blind.contains("there is no truth"));
     assert!(!blind.contains("cos φ·δθ (°)"));
@@ -76,7 +76,7 @@ fn the_same_input_gives_the_same_bytes() {
 }
 
 #[test]
-fn a_report_of_nothing_is_a_page_too() {
+fn a_report_without_calibrations_is_a_page() {
     let s = sample();
     check_nesting(&report(&s.dataset, None, &[], None));
 }

@@ -1,13 +1,13 @@
-//! The page about manufacturing errors, and its plot.
+//! The page on manufacturing errors, with its plot.
 
-use super::figure::{Area, Axes, Shapes, Stroke, Word, color, fine, round_numbers, standalone};
+use super::figure::{Area, Axes, Shapes, Stroke, Label, color, fine, round_numbers, standalone};
 use super::page::{count, escape, figure, number, page, table};
 use catoptric_design::tolerance::{Distribution, Tolerance};
 use plotters::style::BLACK;
 
 const SIZE: (u32, u32) = (720, 340);
 
-/// The page, as HTML.
+/// Returns the page, as HTML.
 pub fn tolerance(found: &Tolerance) -> String {
     let mut html = format!(
         "<header>\n<h1>{}</h1>\n<p class=\"subtitle\">What manufacturing errors do to this mirror layout</p>\n</header>\n",
@@ -16,14 +16,14 @@ pub fn tolerance(found: &Tolerance) -> String {
     html += &format!("<p>{}</p>\n", escape(&errors(found)));
     html += "<h2>Before and after calibration</h2>\n";
     html += &table(
-        &["Direction, off by (°)", "rms", "median", "95 %", "at most"],
+        &["Direction, off by (°)", "rms", "median", "95 %", "maximum"],
         &stages(found),
     );
     html += "<h2>How far directions are off before calibration</h2>\n";
     html += &figure(
         &plot(found),
-        "Every deflected element of every structure, by the angle between where it looks and where the drawing says. The \
-         lines are the root mean square and what 95 % keep within.",
+        "Every deflected element of every structure, by the angle between its direction as built and as drawn. The \
+         lines mark the root mean square and the 95th percentile.",
         &[],
         &["From (°)", "to (°)", "elements", "share (%)"],
         &bars(found),
@@ -36,14 +36,14 @@ pub fn tolerance(found: &Tolerance) -> String {
             "rms (°)",
             "median (°)",
             "95 % (°)",
-            "at most (°)",
+            "maximum (°)",
             "at 4 m, rms (mm)",
             "95 % (mm)",
-            "at most (mm)",
+            "maximum (mm)",
         ],
         &facets(found),
     );
-    html += "<h2>Which error does how much</h2>\n";
+    html += "<h2>Contribution of each kind of error</h2>\n";
     let sources: Vec<Vec<String>> = found
         .sources
         .iter()
@@ -56,24 +56,24 @@ pub fn tolerance(found: &Tolerance) -> String {
         })
         .collect();
     html += &table(
-        &["Alone", "direction, rms (°)", "point at 4 m, rms (mm)"],
+        &["Only this error", "direction, rms (°)", "point at 4 m, rms (mm)"],
         &sources,
     );
-    html += "<h2>Elements that are lost</h2>\n";
+    html += "<h2>Lost elements</h2>\n";
     html += &table(
         &["Elements", "as drawn", "as built, mean", "as built, worst"],
         &lost(found),
     );
     html += &format!(
-        "<footer>Structures are built from the drawing under the seeds from {} on; {} loses most. Errors are in the sensor \
-         frame, over the elements that one facet deflects alone in the drawing and as built. Elements without a \
-         direction are split, blocked, trapped or too faint.</footer>\n",
+        "<footer>Structures are built from the drawing under consecutive seeds from {}; {} loses the most elements. \
+         Errors are in the sensor frame, over the elements that the same facet alone deflects in the drawing and as \
+         built. Elements without a direction are split, blocked, trapped or too faint.</footer>\n",
         found.seed, found.worst_seed
     );
     page(&format!("{} – catoptric tolerance", found.name), &html)
 }
 
-/// The plot as a file.
+/// Returns the plot as a standalone SVG file.
 pub fn tolerance_plot(found: &Tolerance) -> String {
     standalone(&plot(found))
 }
@@ -85,8 +85,9 @@ fn some(value: Option<f64>, decimals: usize) -> String {
 fn errors(found: &Tolerance) -> String {
     let e = &found.errors;
     format!(
-        "{} structures. Facets are turned by {}° and shifted by {} mm along every axis, and thicker or thinner by {} mm, each \
-         1σ; their slope is uneven by {} mrad. The scanner sits within {}° of yaw, {}° of tilt and {} mm in its housing.",
+        "{} structures. Facets are turned by {}° and shifted by {} mm along every axis, and mirrors are thicker or \
+         thinner by {} mm, all 1σ; their slope error is {} mrad rms. The scanner is within {}° of yaw, {}° of tilt and \
+         {} mm of its nominal pose.",
         found.draws,
         e.tilt_sd_deg,
         e.shift_sd_mm,
@@ -174,7 +175,7 @@ fn lost(found: &Tolerance) -> Vec<Vec<String>> {
             found.lost_worst,
         ),
         row(
-            "No longer their facet's",
+            "No longer on their facet",
             0,
             found.changed_mean,
             found.changed_worst,
@@ -188,7 +189,7 @@ fn plot(found: &Tolerance) -> String {
     let total = counts.iter().sum::<usize>().max(1) as f64;
     let share = |c: usize| 100.0 * c as f64 / total;
     let highest = counts.iter().map(|c| share(*c)).fold(1e-6, f64::max);
-    // Room above the bars for two words, one below the other.
+    // Room above the bars for two labels, one below the other.
     let top = 1.25 * highest;
     let x = 0.0..width * counts.len().max(1) as f64;
     let areas = counts.iter().enumerate().filter(|(_, c)| **c > 0);
@@ -218,7 +219,7 @@ fn plot(found: &Tolerance) -> String {
             width: 2,
             opacity: 0.8,
         });
-        shapes.words.push(Word {
+        shapes.labels.push(Label {
             at: (at, (height + 0.05) * highest),
             text: format!("{name} {}°", number(at, 2)),
             color: BLACK,
@@ -227,7 +228,7 @@ fn plot(found: &Tolerance) -> String {
     let axes = Axes {
         x,
         y: 0.0..top,
-        x_label: "direction off by (°)".to_owned(),
+        x_label: "error of direction (°)".to_owned(),
         y_label: "share of elements (%)".to_owned(),
     };
     fine(

@@ -1,5 +1,5 @@
-//! The trials of a study one by one, as in the paper's Figure 10: θ and φ of every element in each, their mean and how
-//! they spread.
+//! The individual trials of a study, as in the paper's Figure 10: θ and φ of every element in each trial, their mean
+//! and their scatter.
 
 use super::angles::{NAMES, angles};
 use super::figure::{Axes, Stroke, around_zero, color, css, laws};
@@ -9,13 +9,13 @@ use std::collections::BTreeMap;
 
 const SIZE: (u32, u32) = (640, 360);
 
-/// Trials beyond which only their mean and spread are drawn.
-const MOST_TRIALS: u64 = 30;
+/// Number of trials beyond which only their mean and scatter are drawn.
+const MAX_TRIALS: u64 = 30;
 
-/// The paper's colors, blue for θ and magenta for φ, as near as the palette has them.
+/// The paper's colors, blue for θ and magenta for φ, or the closest of the palette.
 const COLORS: [usize; 2] = [0, 3];
 
-/// A section for every cell, with a figure for every contestant; nothing without elements.
+/// Returns a section for every cell with a figure for every contestant; empty without elements.
 pub(super) fn trials(study: &Study, elements: &[ElementAngles]) -> String {
     let spreads = spread(elements);
     let mut html = String::new();
@@ -35,8 +35,8 @@ pub(super) fn trials(study: &Study, elements: &[ElementAngles]) -> String {
         methods.dedup();
         html += &overall(&of_cell, &methods);
         let in_cell: Vec<&ElementAngles> = elements.iter().filter(|e| e.cell == index).collect();
-        html += &angles(&of_cell, &in_cell, study.seeds <= MOST_TRIALS);
-        // The same for all contestants, so that they can be compared by eye.
+        html += &angles(&of_cell, &in_cell, study.seeds <= MAX_TRIALS);
+        // The same limits for all contestants, so that they can be compared by eye.
         let limits = around_zero(
             elements
                 .iter()
@@ -45,7 +45,7 @@ pub(super) fn trials(study: &Study, elements: &[ElementAngles]) -> String {
         );
         for method in methods {
             let of_method: Vec<&Spread> = of_cell.iter().copied().filter(|s| s.method == method).collect();
-            let lines = if study.seeds <= MOST_TRIALS {
+            let lines = if study.seeds <= MAX_TRIALS {
                 single(elements.iter().filter(|e| e.cell == index && e.method == method))
             } else {
                 Vec::new()
@@ -56,7 +56,7 @@ pub(super) fn trials(study: &Study, elements: &[ElementAngles]) -> String {
     html
 }
 
-/// One row for each contestant: means over its elements.
+/// One row per contestant: means over its elements.
 fn overall(spreads: &[&Spread], methods: &[&str]) -> String {
     let row = |method: &&str| {
         let of_method: Vec<&&Spread> = spreads.iter().filter(|s| s.method == **method).collect();
@@ -144,8 +144,8 @@ fn of_contestant(method: &str, spreads: &[&Spread], lines: Vec<Stroke>, y: std::
     figure(
         &svg,
         &format!(
-            "“{method}”: errors of every element, each trial faint, their mean thick between lines one standard deviation \
-             away."
+            "“{method}”: errors of every element, each trial as a faint line, their mean as a thick line between lines \
+             one standard deviation away.",
         ),
         &legend,
         &[
@@ -190,7 +190,7 @@ mod tests {
     use catoptric_assess::study::Contestant;
 
     #[test]
-    fn trials_are_drawn_where_they_are_known() {
+    fn trials_are_drawn_where_available() {
         let scene =
             toml::from_str(include_str!("../../../scenes/reference-facet.toml")).expect("it is valid");
         let study = Study::of_scene(scene, 2, vec![Contestant::Oracle]);
@@ -216,7 +216,7 @@ mod tests {
             html.contains("Trials of a &amp; b") && html.contains("<td>10.2000</td><td>0.1414</td>"),
             "{html}"
         );
-        // Four faint lines, two means, four lines beside them.
+        // Four faint lines, two means, and four lines one standard deviation away.
         assert_eq!(html.matches("<polyline").count() - html_frame(), 10);
         assert!(
             html.contains("<td>0.3000</td><td>0.1414</td><td>−0.3000</td>"),
@@ -224,7 +224,7 @@ mod tests {
         );
     }
 
-    /// Polylines of an empty plot: its frame.
+    /// Number of polylines in an empty plot, those of its frame.
     fn html_frame() -> usize {
         let axes = Axes {
             x: 6.0..9.0,

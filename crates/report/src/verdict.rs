@@ -1,7 +1,7 @@
-//! The verdict on each calibration: a badge and what was found, told once where two come to the same.
+//! The verdict on each calibration: a badge and the findings, which calibrations with the same result share.
 
 use super::page::{escape, number};
-use super::words::findings;
+use super::prose::findings;
 use catoptric_assess::score::{Score, Verdict};
 use catoptric_model::{Calibration, ScanGeometry, beam};
 use std::collections::BTreeMap;
@@ -12,28 +12,28 @@ pub(super) fn verdicts(scan: &ScanGeometry, results: &[(Calibration, Score)]) ->
     let mut above: Option<(&Calibration, Verdict, String)> = None;
     for (calibration, score) in results {
         let method = escape(&calibration.method);
-        let said = findings(calibration, score);
-        if let Some((first, verdict, words)) = &above
+        let text = findings(calibration, score);
+        if let Some((first, verdict, above_text)) = &above
             && *verdict == score.verdict
-            && *words == said
+            && *above_text == text
             && let Some(difference) = largest_difference_deg(scan, first, calibration)
         {
-            // More digits than the figures of the report have would say nothing.
+            // More digits than the report's other figures have would not be meaningful.
             let size = if difference < 1e-4 {
                 "less than 0.0001".to_owned()
             } else {
                 number(difference, 4)
             };
             html +=
-                &format!("<p>Method “{method}” ends at the same answer (largest difference {size}°).</p>\n");
+                &format!("<p>Method “{method}” gives the same result (largest difference {size}°).</p>\n");
             continue;
         }
         let class = score.verdict.word();
         let badge = class.to_uppercase();
         html += &format!(
-            "<section class=\"verdict {class}\">\n<h3><span class=\"badge\">{badge}</span> – method “{method}”</h3>\n{said}</section>\n"
+            "<section class=\"verdict {class}\">\n<h3><span class=\"badge\">{badge}</span> – method “{method}”</h3>\n{text}</section>\n"
         );
-        above = Some((calibration, score.verdict, said));
+        above = Some((calibration, score.verdict, text));
     }
     html
 }
@@ -62,7 +62,7 @@ mod tests {
     use catoptric_fixtures::{noisy, sample, turned};
 
     #[test]
-    fn the_same_answer_is_told_once() {
+    fn equal_results_share_a_verdict() {
         let s = sample();
         let first = noisy(&s.truth, 1e-3, 1);
         let verdicts_with = |change: &dyn Fn(&mut Calibration)| {
@@ -77,14 +77,14 @@ mod tests {
                 }),
             )
         };
-        let same = "<p>Method “a &lt; b” ends at the same answer (largest difference";
-        let told = verdicts_with(&|_| {});
+        let same = "<p>Method “a &lt; b” gives the same result (largest difference";
+        let equal = verdicts_with(&|_| {});
         assert!(
-            told.contains(&format!("{same} less than 0.0001°).</p>")),
-            "{told}"
+            equal.contains(&format!("{same} less than 0.0001°).</p>")),
+            "{equal}"
         );
-        assert_eq!(told.matches("<section").count(), 1);
-        // One element off by a fifth of a millidegree: too little for any figure in the words.
+        assert_eq!(equal.matches("<section").count(), 1);
+        // One element off by a fifth of a millidegree: too little to change any figure of the findings.
         let solved = first
             .beams
             .iter()
@@ -96,6 +96,6 @@ mod tests {
         });
         assert!(nudged.contains(&format!("{same} 0.0002°).</p>")), "{nudged}");
         let turned = verdicts_with(&|c| *c = turned(c.clone(), 5e-3));
-        assert!(!turned.contains("same answer") && turned.matches("<section").count() == 2);
+        assert!(!turned.contains("same result") && turned.matches("<section").count() == 2);
     }
 }

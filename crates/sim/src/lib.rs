@@ -1,8 +1,8 @@
 //! The virtual laboratory: a 2D LiDAR with mirrors, target boards and motion capture, simulated ray by ray.
 //!
-//! The folders stand in the order in which a scene becomes data: what a person writes ([`scene`], [`check`]), surfaces
-//! ([`build`]), light on its way ([`light`]), the reading it makes ([`receive`]), the experiment ([`laboratory`]). Each
-//! uses those before it, and none that comes later.
+//! The modules are listed here in the order in which a scene becomes data: what a person writes ([`scene`], [`check`]),
+//! surfaces ([`build`]), paths of light ([`light`]), the resulting readings ([`receive`]), the experiment
+//! ([`laboratory`]). Each uses the ones before it, and none that comes later.
 
 pub mod build;
 pub mod check;

@@ -82,6 +82,7 @@ const ROOMS: [Room; 16] = [
         "element",
         "prepare",
         "joint",
+        "method",
         "calibrate",
         "plan",
         "characterize",

@@ -372,7 +372,7 @@ fn flights_that_cannot_be_are_refused_where_they_stand() {
         (
             two.replace("[1, 0, 1] }", "[1, 0, 1], yaw_deg = 180 }"),
             "flight[0].waypoint[1]",
-            "which way round",
+            "the direction of the turn is ambiguous",
         ),
         (
             two.replace("[1, 0, 1]", "[7, 0, 1]"),

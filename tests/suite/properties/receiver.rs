@@ -7,7 +7,7 @@ use catoptric::sim::light::Role;
 use catoptric::sim::receive::detect::{self, Pulse};
 use catoptric::sim::receive::echo::{Echo, Receiver};
 use catoptric::sim::receive::phase;
-use catoptric::sim::receive::{Chance, Return, Sensor};
+use catoptric::sim::receive::{RandomEffects, Return, Sensor};
 use catoptric::sim::scene::{Detector, ErrorModel};
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -190,7 +190,7 @@ proptest! {
             others: Vec::new(),
         };
         let [drift, warm_up, correlated, interference] = offsets;
-        let chance = Chance {
+        let effects = RandomEffects {
             drift,
             element: 0.0,
             warm_up,
@@ -200,7 +200,7 @@ proptest! {
             dropout,
             detection: [0.5; 8],
         };
-        let reading = sensor.read(Some(&found), &chance);
+        let reading = sensor.read(Some(&found), &effects);
         let exact = range + offsets.iter().sum::<f64>() + noise_sd * noise;
         let step = step_mm * 1e-3;
         if dropout < 0.1 {
@@ -216,10 +216,10 @@ proptest! {
             prop_assert!(beyond, "{} for {}", reading, exact);
         }
         // One echo or no echo: both outputs say the same.
-        let all = sensor.read_all(Some(&found), &chance);
+        let all = sensor.read_all(Some(&found), &effects);
         prop_assert_eq!(all.first().copied().unwrap_or(f64::NAN).to_bits(), reading.to_bits());
         // Nothing by chance makes a range of what is none.
-        prop_assert_eq!(sensor.read(None, &chance), f64::INFINITY);
-        prop_assert!(sensor.read_all(None, &chance).is_empty());
+        prop_assert_eq!(sensor.read(None, &effects), f64::INFINITY);
+        prop_assert!(sensor.read_all(None, &effects).is_empty());
     }
 }

@@ -3,7 +3,7 @@
 use crate::element::solve::{BareDistance, Element, Solution};
 use crate::judge::covariance::{self, Budget, MountUncertainty};
 use crate::judge::observability::{self, Weakness};
-use crate::options::{Method, Options};
+use crate::options::Options;
 use crate::readings::bare::Bare;
 use crate::readings::columns::Columns;
 use crate::readings::locate;
@@ -24,7 +24,6 @@ pub(crate) struct Workspace<'a> {
     pub(crate) boards: &'a [Option<BoardInSensor>],
     pub(crate) rig_from_sensor: Pose,
     pub(crate) mount: &'a MountUncertainty,
-    pub(crate) method: Method,
     pub(crate) options: &'a Options,
     /// Single readings, for the method that goes through them one by one.
     pub(crate) columns: Option<&'a Columns>,

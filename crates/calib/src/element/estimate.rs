@@ -2,14 +2,12 @@
 
 use crate::element::attempt::{Attempt, Failure, Fit, LEAST_BOARDS, Workspace, lost};
 use crate::element::choose::choose;
-use crate::element::gls::generalized;
 use crate::element::initial::{self, FARTHEST_START};
-use crate::element::recursive::recursive;
 use crate::element::single::blocks;
 use crate::element::solve::{self, Element, Solution};
+use crate::element::solver::{Solver, Task};
 use crate::element::verdict::{judge, residuals_agree};
 use crate::error::CalibError;
-use crate::options::Method;
 use crate::readings::columns::{Columns, MOST_BYTES};
 use crate::readings::observations::azimuth;
 use crate::screen::Candidate;
@@ -35,18 +33,19 @@ const LARGEST_EXCESS: f64 = 0.2;
 /// [`CalibError::Unreadable`].
 pub(crate) fn estimates(
     work: &Workspace,
+    solver: &Solver,
     candidates: &[Candidate],
     mirrors: &[MirrorPlane],
 ) -> Result<Vec<BeamEstimate>, CalibError> {
     let mut found = Vec::with_capacity(candidates.len());
-    for block in blocks(work, candidates, MOST_BYTES) {
+    for block in blocks(work, solver, candidates, MOST_BYTES) {
         let columns = Columns::read(work.dataset, &block.wanted)?;
         let work = Workspace {
             columns: Some(&columns),
             ..*work
         };
         let beams = block.beams.into_par_iter();
-        found.par_extend(beams.map(|beam| of_candidate(&work, beam, &candidates[beam], mirrors)));
+        found.par_extend(beams.map(|beam| of_candidate(&work, solver, beam, &candidates[beam], mirrors)));
     }
     Ok(found)
 }
@@ -54,6 +53,7 @@ pub(crate) fn estimates(
 /// The estimate of one element with all facets that it may belong to.
 fn of_candidate(
     work: &Workspace,
+    solver: &Solver,
     beam: usize,
     candidate: &Candidate,
     mirrors: &[MirrorPlane],
@@ -67,7 +67,7 @@ fn of_candidate(
         Candidate::Deflected(near) => {
             let mut tried = near
                 .iter()
-                .map(|f| estimate(work, beam, &facets[*f], &mirrors[*f]));
+                .map(|f| estimate(work, solver, beam, &facets[*f], &mirrors[*f]));
             let nearest = tried.next();
             match nearest {
                 Some(solved) if solved.status == Status::Solved => solved,
@@ -85,7 +85,13 @@ fn of_candidate(
 }
 
 /// The estimate of one element on a facet whose plane is believed to be `mirror`.
-fn estimate(work: &Workspace, beam: usize, facet: &NominalFacet, mirror: &MirrorPlane) -> BeamEstimate {
+fn estimate(
+    work: &Workspace,
+    solver: &Solver,
+    beam: usize,
+    facet: &NominalFacet,
+    mirror: &MirrorPlane,
+) -> BeamEstimate {
     let session = &work.dataset.session;
     let azimuth = azimuth(session, beam);
     let without = |status, reason| BeamEstimate {
@@ -97,8 +103,8 @@ fn estimate(work: &Workspace, beam: usize, facet: &NominalFacet, mirror: &Mirror
         return without(Status::Rejected, reason);
     };
     let attempt = Attempt::new(work, session, beam, facet, &nominal);
-    let mut estimate = match fit(&attempt, &nominal) {
-        Ok(fit) => judge(&attempt, &fit).unwrap_or_else(|f| without(f.status, f.reason)),
+    let mut estimate = match fit(solver, &attempt, &nominal) {
+        Ok(fit) => judge(solver, &attempt, &fit).unwrap_or_else(|f| without(f.status, f.reason)),
         Err(failure) => without(failure.status, failure.reason),
     };
     if matches!(estimate.status, Status::TooFewPoses | Status::NotConverged) {
@@ -116,7 +122,7 @@ fn estimate(work: &Workspace, beam: usize, facet: &NominalFacet, mirror: &Mirror
 }
 
 /// Chooses boards and solves, ever more strictly, until the choice no longer changes.
-fn fit(attempt: &Attempt, nominal: &Deflection) -> Result<Fit, Failure> {
+fn fit(solver: &Solver, attempt: &Attempt, nominal: &Deflection) -> Result<Fit, Failure> {
     let mut at = Element::place(&attempt.element(&[]), nominal.azimuth, nominal.elevation);
     let mut poses = Vec::new();
     let mut start = at;
@@ -139,18 +145,19 @@ fn fit(attempt: &Attempt, nominal: &Deflection) -> Result<Fit, Failure> {
             .ok_or_else(lost)?
             .deflection;
     }
-    let fit = by_method(attempt, poses, &start, &at)?;
-    if fit.poses.len() > LEAST_BOARDS && !residuals_agree(attempt, &fit) {
+    let fit = solved_by(solver, attempt, poses, &start, &at)?;
+    if fit.poses.len() > LEAST_BOARDS && !residuals_agree(solver, attempt, &fit) {
         // One foreign surface among the boards pulls the rest along; without it, it stands out.
-        if let Some(better) = without_one(attempt, &fit) {
+        if let Some(better) = without_one(solver, attempt, &fit) {
             return Ok(better);
         }
     }
     Ok(fit)
 }
 
-/// The solution by the method asked for, from the start; from the present estimate if that does not settle.
-fn by_method(
+/// The solution by the solver asked for, from the start; from the present estimate if that does not settle.
+fn solved_by(
+    solver: &Solver,
     attempt: &Attempt,
     poses: Vec<usize>,
     start: &Deflection,
@@ -158,16 +165,14 @@ fn by_method(
 ) -> Result<Fit, Failure> {
     let observations = attempt.observations(&poses);
     let element = attempt.element(&observations);
-    let options = attempt.work.options;
-    let run = |from: &Deflection| match attempt.work.method {
-        Method::BeamGls => generalized(attempt, &element, from),
-        Method::ClosedForm => without_iteration(attempt, &element, at),
-        Method::Recursive => {
-            let readings: Vec<Vec<f64>> = poses.iter().map(|p| attempt.single_readings(*p)).collect();
-            // Where the readings leave a direction open there is nothing to recurse on; the batch says which.
-            recursive(&element, &readings, from, options).or_else(|| solve::batch(&element, from, options))
-        }
-        Method::Beam | Method::Facet | Method::Joint | Method::Prior => solve::batch(&element, from, options),
+    let run = |from: &Deflection| {
+        (solver.solve)(&Task {
+            attempt,
+            element: &element,
+            poses: &poses,
+            from,
+            at,
+        })
     };
     let near = |s: &Solution| {
         let (a, b) = (
@@ -184,13 +189,6 @@ fn by_method(
     })
 }
 
-/// The closed form as the answer, its mirror and biases placed by the estimate that the boards were chosen with.
-fn without_iteration(attempt: &Attempt, element: &Element, at: &Deflection) -> Option<Solution> {
-    let found = initial::closed_form(at, attempt.azimuth, element.observations, element.bias)?;
-    let at = Deflection::from_exit(attempt.azimuth, &found.direction, at.distance);
-    element.finish(&element.place(at.azimuth, at.elevation), 0, true)
-}
-
 /// The start in closed form where it is to be believed, else the drawing.
 fn first_guess(attempt: &Attempt, element: &Element, nominal: &Deflection) -> Deflection {
     let found = initial::closed_form(nominal, attempt.azimuth, element.observations, element.bias);
@@ -203,7 +201,7 @@ fn first_guess(attempt: &Attempt, element: &Element, nominal: &Deflection) -> De
 }
 
 /// A consistent solution without one of the boards, if that board is then plainly not what the element read.
-fn without_one(attempt: &Attempt, fit: &Fit) -> Option<Fit> {
+fn without_one(solver: &Solver, attempt: &Attempt, fit: &Fit) -> Option<Fit> {
     let fits = fit.poses.iter().filter_map(|omitted| {
         let rest: Vec<usize> = fit.poses.iter().copied().filter(|p| p != omitted).collect();
         let observations = attempt.observations(&rest);
@@ -211,8 +209,8 @@ fn without_one(attempt: &Attempt, fit: &Fit) -> Option<Fit> {
         if choose(attempt, &at, 0.0) != rest {
             return None;
         }
-        let fit = by_method(attempt, rest, &fit.start, &at).ok()?;
-        residuals_agree(attempt, &fit).then_some(fit)
+        let fit = solved_by(solver, attempt, rest, &fit.start, &at).ok()?;
+        residuals_agree(solver, attempt, &fit).then_some(fit)
     });
     fits.min_by(|a, b| a.rms().total_cmp(&b.rms()))
 }

@@ -1,4 +1,4 @@
-//! One element by itself (steps 11 and 12): which boards it hits, its angles by each method, and whether they are to be
+//! One element by itself (steps 11 and 12): which boards it hits, its angles by the solver that a method names, and whether they are to be
 //! believed (step 13).
 
 mod ambiguity;
@@ -7,11 +7,11 @@ pub(crate) mod choose;
 mod drawn;
 mod estimate;
 pub(crate) mod facet_plane;
-mod gls;
 pub mod initial;
 pub mod recursive;
 mod single;
 pub mod solve;
+pub(crate) mod solver;
 mod verdict;
 
 pub(crate) use drawn::as_drawn;

@@ -1,7 +1,7 @@
 //! Single readings for the recursion: blocks of elements whose readings fit in memory together.
 
 use crate::element::attempt::Workspace;
-use crate::options::Method;
+use crate::element::solver::Solver;
 use crate::readings::columns::{self, Wanted};
 use crate::screen::Candidate;
 use catoptric_model::{PoseKind, PoseRecord};
@@ -14,8 +14,8 @@ pub(super) struct Block {
 }
 
 /// All elements, in blocks of at most so many bytes of readings, and of at least one element.
-pub(super) fn blocks(work: &Workspace, candidates: &[Candidate], most_bytes: usize) -> Vec<Block> {
-    if work.method != Method::Recursive {
+pub(super) fn blocks(work: &Workspace, solver: &Solver, candidates: &[Candidate], most_bytes: usize) -> Vec<Block> {
+    if !solver.single_readings {
         return vec![Block {
             beams: 0..candidates.len(),
             wanted: Vec::new(),

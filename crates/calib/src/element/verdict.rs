@@ -3,9 +3,8 @@
 use crate::element::ambiguity::second_direction;
 use crate::element::attempt::{Attempt, Failure, Fit, lost, rejected};
 use crate::element::choose::{GATE_FLOOR, GATE_SIGMAS};
-use crate::element::initial;
+use crate::element::solver::Solver;
 use crate::judge::levers::libm_cos;
-use crate::options::Method;
 use crate::readings::ahead::{AGREEMENT_FLOOR, ahead};
 use crate::readings::observations::{BoardView, Observation};
 use crate::readings::spread;
@@ -20,26 +19,21 @@ const RESIDUAL_FACTOR: f64 = 5.0;
 const RESIDUAL_FLOOR: f64 = 4e-3;
 
 /// Largest credible rms residual of a fit, and the expected one, in metres.
-fn residual_limit(attempt: &Attempt, fit: &Fit) -> Option<(f64, f64)> {
+fn residual_limit(solver: &Solver, attempt: &Attempt, fit: &Fit) -> Option<(f64, f64)> {
     let observations = attempt.observations(&fit.poses);
     let budget = attempt.budget(&fit.solution.deflection, &observations)?;
-    let residuals = match attempt.work.method {
-        Method::BeamGls => budget
-            .residual_covariance_at_bound()
-            .or_else(|| budget.residual_covariance()),
-        _ => budget.residual_covariance(),
-    }?;
+    let residuals = (solver.residuals)(&budget)?;
     let expected = (residuals.trace().max(0.0) / fit.poses.len() as f64).sqrt();
     Some((RESIDUAL_FACTOR * expected + RESIDUAL_FLOOR, expected))
 }
 
 /// Whether what a fit leaves is as small as everything believed in makes it.
-pub(crate) fn residuals_agree(attempt: &Attempt, fit: &Fit) -> bool {
-    residual_limit(attempt, fit).is_some_and(|(limit, _)| fit.rms() <= limit)
+pub(crate) fn residuals_agree(solver: &Solver, attempt: &Attempt, fit: &Fit) -> bool {
+    residual_limit(solver, attempt, fit).is_some_and(|(limit, _)| fit.rms() <= limit)
 }
 
 /// The estimate, if nothing speaks against it.
-pub(crate) fn judge(attempt: &Attempt, fit: &Fit) -> Result<BeamEstimate, Failure> {
+pub(crate) fn judge(solver: &Solver, attempt: &Attempt, fit: &Fit) -> Result<BeamEstimate, Failure> {
     let solution = &fit.solution;
     let observations = attempt.observations(&fit.poses);
     let readings: usize = observations.iter().map(|o| o.board.count).sum();
@@ -94,7 +88,7 @@ pub(crate) fn judge(attempt: &Attempt, fit: &Fit) -> Result<BeamEstimate, Failur
             reason,
         });
     }
-    let (limit, expected) = residual_limit(attempt, fit).ok_or_else(lost)?;
+    let (limit, expected) = residual_limit(solver, attempt, fit).ok_or_else(lost)?;
     if fit.rms() > limit {
         return Err(rejected(format!(
             "inconsistent ranges: rms residual {:.1} mm over {} boards, {:.1} mm expected",
@@ -103,14 +97,8 @@ pub(crate) fn judge(attempt: &Attempt, fit: &Fit) -> Result<BeamEstimate, Failur
             1e3 * expected
         )));
     }
-    let covariance = match attempt.work.method {
-        Method::BeamGls => budget.bound().or_else(|| budget.sandwich()),
-        Method::ClosedForm => {
-            initial::covariance(&solution.deflection, attempt.azimuth, &observations, &budget)
-        }
-        _ => budget.sandwich(),
-    }
-    .ok_or_else(lost)?;
+    let element = attempt.element(&observations);
+    let covariance = (solver.covariance)(&element, &solution.deflection, &budget).ok_or_else(lost)?;
     check_room(attempt, &solution.deflection, &covariance)?;
     // One number for all readings, as the paper has it: their pooled noise.
     let pooled: f64 = observations

@@ -12,7 +12,7 @@ use crate::element::facet_plane::plane_between;
 use crate::error::CalibError;
 use crate::judge::levers::libm_cos;
 use crate::lsq;
-use crate::options::{Method, Options};
+use crate::options::Options;
 use crate::prepare::{believable, prepare};
 use crate::readings::observations::azimuth;
 use catoptric_model::{Dataset, Deflection, MirrorPlane, frame};
@@ -45,7 +45,7 @@ pub fn limit(
     let dataset = dataset.as_ref();
     let prepared = prepare(dataset)?;
     let options = Options::default();
-    let work = prepared.workspace(dataset, Method::Joint, &options);
+    let work = prepared.workspace(dataset, &options);
     let session = &dataset.session;
     let mut planes = prepared.drawn.clone();
     let mut flat = Vec::new();

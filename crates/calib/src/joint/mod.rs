@@ -23,7 +23,6 @@ mod rows;
 use crate::element::attempt::Workspace;
 use crate::lsq::{self, ProblemError, State};
 use crate::mount::pose::Mount;
-use crate::options::Method;
 use assemble::{Assigned, begin, components, direct_group, group, mounting_as_drawn, mounting_as_found};
 use catoptric_model::calibration::{FacetEstimate, MountEstimate};
 use catoptric_model::{Assessment, BeamEstimate, Calibration, MirrorPlane, RangeBias};
@@ -39,6 +38,15 @@ pub use limit::{TrueDirection, limit};
 /// Rounds of leaving elements out.
 const ROUNDS: usize = 3;
 
+/// What is solved at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Extent {
+    /// Facets that share boards, with the mounting as step 5 found it and rigid planes.
+    EachFacet,
+    /// All facets and the boards before undeflected beams, beams free to depart from their facet's plane.
+    Everything,
+}
+
 /// What came of it.
 #[derive(Default)]
 struct Outcome {
@@ -52,6 +60,7 @@ struct Outcome {
 
 /// Calibrates the assigned elements together, and replaces what they found by themselves.
 pub(crate) fn together(
+    extent: Extent,
     work: &Workspace,
     mount: &Mount,
     planes: &[MirrorPlane],
@@ -59,7 +68,7 @@ pub(crate) fn together(
     calibration: &mut Calibration,
 ) {
     // Within the pool: groups are handed out over and over, and from outside each time would wake it.
-    match rayon::scope(|_| within_pool(work, mount, planes, assigned)) {
+    match rayon::scope(|_| within_pool(extent, work, mount, planes, assigned)) {
         Ok(outcome) => {
             for (beam, estimate) in outcome.beams {
                 calibration.beams[beam] = estimate;
@@ -76,37 +85,39 @@ pub(crate) fn together(
 }
 
 fn within_pool(
+    extent: Extent,
     work: &Workspace,
     mount: &Mount,
     planes: &[MirrorPlane],
     assigned: &[Assigned],
 ) -> Result<Outcome, ProblemError> {
-    let components = components(work.dataset.session.facets.len(), assigned);
-    if work.method == Method::Facet {
-        let mut outcome = Outcome::default();
-        for facets in components {
+    let groups = components(work.dataset.session.facets.len(), assigned)
+        .into_iter()
+        .map(|facets| {
             let some: Vec<&Assigned> = assigned.iter().filter(|a| facets.contains(&a.facet)).collect();
-            let group = group(work, &facets, &some);
-            let (mounting, mean) = mounting_as_found(work, mount);
-            let part = solve(work, vec![group], mounting, &mean, planes, false)?;
-            outcome.beams.extend(part.beams);
-            outcome.facets.extend(part.facets);
+            group(work, &facets, &some)
+        });
+    match extent {
+        Extent::EachFacet => {
+            let mut outcome = Outcome::default();
+            for group in groups {
+                let (mounting, mean) = mounting_as_found(work, mount);
+                let part = solve(work, vec![group], mounting, &mean, planes, false)?;
+                outcome.beams.extend(part.beams);
+                outcome.facets.extend(part.facets);
+            }
+            Ok(outcome)
         }
-        return Ok(outcome);
+        Extent::Everything => {
+            let direct = mount
+                .selection
+                .iter()
+                .filter_map(|board| direct_group(work, board));
+            let groups = groups.chain(direct).collect();
+            let (mounting, mean) = mounting_as_drawn(work, mount);
+            solve(work, groups, mounting, &mean, planes, true)
+        }
     }
-    let mut groups = Vec::new();
-    for facets in components {
-        let some: Vec<&Assigned> = assigned.iter().filter(|a| facets.contains(&a.facet)).collect();
-        groups.push(group(work, &facets, &some));
-    }
-    groups.extend(
-        mount
-            .selection
-            .iter()
-            .filter_map(|board| direct_group(work, board)),
-    );
-    let (mounting, mean) = mounting_as_drawn(work, mount);
-    solve(work, groups, mounting, &mean, planes, true)
 }
 
 fn solve(

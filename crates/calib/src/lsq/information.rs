@@ -190,16 +190,6 @@ impl Information {
             .map(|i| Some(self.covariance_among(&[i])?[(0, 0)].sqrt()))
             .collect()
     }
-
-    /// Correlation of two parameters; `None` if one of them is open.
-    ///
-    /// # Panics
-    ///
-    /// If there is no such parameter.
-    pub fn correlation(&self, first: usize, second: usize) -> Option<f64> {
-        let c = self.covariance_among(&[first, second])?;
-        Some(c[(0, 1)] / (c[(0, 0)] * c[(1, 1)]).sqrt())
-    }
 }
 
 /// An orthonormal basis of independent vectors (Gram–Schmidt, twice), the largest component of each positive.

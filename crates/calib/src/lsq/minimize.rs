@@ -96,12 +96,6 @@ impl Solution {
         let rows: usize = self.residuals.iter().map(|r| r.len()).sum();
         rows.saturating_sub(self.information.rank())
     }
-
-    /// s² = ‖f‖²/(m − rank), the variance of a residual as the residuals show it; `None` without degrees of freedom.
-    pub fn residual_variance(&self) -> Option<f64> {
-        let freedom = self.degrees_of_freedom();
-        (freedom > 0).then(|| self.sum_of_squares / freedom as f64)
-    }
 }
 
 /// Minimizes ‖f(x)‖² from a start.

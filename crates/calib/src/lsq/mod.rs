@@ -2,8 +2,8 @@
 //!
 //! The caller supplies residuals and Jacobian ([`Problem`]; [`GroupedProblem`] with parameters that only one group of
 //! residuals sees, which are eliminated). Parameters are blocks of Rⁿ, S², SO(3), SE(3) ([`Block`]). [`minimize`] is
-//! MINPACK's trust region over QR with column pivoting; [`Prior`]s are rows; [`minimize_robust`] and
-//! [`minimize_graduated`] withstand outliers. [`Information`] answers for the solution, and says what is open.
+//! MINPACK's trust region over QR with column pivoting; [`Prior`]s are rows. [`Information`] answers for the solution, and
+//! says what is open.
 //!
 //! ```
 //! use catoptric_calib::lsq::{Options, Point, Problem, minimize};
@@ -39,21 +39,17 @@
 mod elimination;
 mod information;
 mod linearized;
-mod loss;
 mod manifold;
 mod minimize;
 mod prior;
 mod problem;
 mod qr;
-mod robust;
 mod trust_region;
 
 pub use information::Information;
 pub use linearized::{Linearized, Reduced, linearize};
-pub use loss::{Loss, gate};
 pub use manifold::{Block, Point};
 pub use minimize::{Options, Solution, Stop, minimize};
 pub use prior::{Prior, WithPriors};
-pub use problem::{Flat, GroupJacobian, GroupRows, GroupedProblem, Problem, ProblemError, State};
+pub use problem::{GroupJacobian, GroupRows, GroupedProblem, Problem, ProblemError, State};
 pub use qr::PivotedQr;
-pub use robust::{RobustOptions, RobustSolution, Surrogate, minimize_graduated, minimize_robust};

@@ -38,20 +38,6 @@ impl Prior {
         }
     }
 
-    /// A belief with a covariance in tangent coordinates at the mean; `None` if it is not positive definite.
-    ///
-    /// # Panics
-    ///
-    /// If the covariance does not fit the block.
-    pub fn correlated(block: usize, mean: Block, covariance: &DMatrix<f64>) -> Option<Self> {
-        let n = mean.dimension();
-        assert_eq!(covariance.shape(), (n, n), "the covariance fits the block");
-        // C = KKᵀ, so L = K⁻¹ has LᵀL = C⁻¹.
-        let lower = covariance.clone().cholesky()?.l();
-        let root = lower.solve_lower_triangular(&DMatrix::identity(n, n))?;
-        Some(Self { block, mean, root })
-    }
-
     /// L·(x ⊟ x̄).
     ///
     /// # Panics
@@ -141,14 +127,6 @@ impl<P: GroupedProblem> GroupedProblem for WithPriors<'_, P> {
             jacobian: self.jacobian_below(group, own, measured.jacobian),
             log_covariance: measured.log_covariance,
         })
-    }
-
-    fn measured_rows(&self, group: usize, rows: usize) -> usize {
-        if group == self.problem.groups() {
-            return 0;
-        }
-        let priors: usize = self.own(group).iter().map(|p| p.root.nrows()).sum();
-        self.problem.measured_rows(group, rows - priors)
     }
 }
 

@@ -13,6 +13,27 @@ pub enum Criterion {
     A,
 }
 
+impl Criterion {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::D, Self::A];
+
+    /// The word that commands use.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::D => "d",
+            Self::A => "a",
+        }
+    }
+
+    /// What it is, in a line.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::D => "The area of the error ellipse: mean log det of the covariance",
+            Self::A => "The mean square error: mean trace of the covariance",
+        }
+    }
+}
+
 /// What is asked for, and the limits of a pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Request {

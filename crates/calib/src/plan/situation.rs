@@ -5,8 +5,9 @@ use crate::element::choose;
 use crate::element::facet_plane::{plane_as_built, plane_as_drawn};
 use crate::error::CalibError;
 use crate::judge::covariance::MountUncertainty;
+use crate::method::Method;
 use crate::mount::pose;
-use crate::options::{Method, Options};
+use crate::options::Options;
 use crate::prepare::{believable, prepare};
 use crate::readings::observations::{BoardInSensor, azimuth, cone_half_angle};
 use crate::readings::spread;
@@ -125,7 +126,7 @@ impl Situation {
         let options = Options::default();
         let calibration = calibrate(dataset, Method::BeamGls, &options)?;
         let prepared = prepare(dataset)?;
-        let work = prepared.workspace(dataset, Method::BeamGls, &options);
+        let work = prepared.workspace(dataset, &options);
         // Boards that could not be placed are in no element's list.
         let mut boards = Vec::new();
         let mut number_of = vec![None; dataset.poses.len()];

@@ -3,7 +3,6 @@
 //! With s = n·(c − P_L1)/(n·v) a change dv of the direction changes s by −s·(n·dv)/(n·v), and a change of d moves
 //! P_L1 along u: dr/dd = 1 − (n·u)/(n·v).
 
-use crate::options::JacobianForm;
 use catoptric_model::{BoardPlane, Deflection, beam, range};
 use nalgebra::{Point3, RowVector6, Unit, Vector2, Vector3};
 
@@ -146,19 +145,6 @@ pub fn central(deflection: &Deflection, beam_azimuth: f64, board: &BoardPlane) -
         elevation: (at(0.0, step)? - at(0.0, -step)?) / (2.0 * step),
         distance: analytic(deflection, beam_azimuth, board)?.distance,
     })
-}
-
-/// The derivatives in the form asked for.
-pub fn gradient(
-    form: JacobianForm,
-    deflection: &Deflection,
-    beam_azimuth: f64,
-    board: &BoardPlane,
-) -> Option<RangeGradient> {
-    match form {
-        JacobianForm::Analytic => analytic(deflection, beam_azimuth, board),
-        JacobianForm::CentralDifference => central(deflection, beam_azimuth, board),
-    }
 }
 
 /// Derivative of a range with respect to a small motion of the sensor: three shifts, three turns, about its own axes.

@@ -8,7 +8,7 @@ use catoptric_model::session::NominalFacet;
 /// At 65 mm a millimetre is 0.9°: an optical center a millimetre off in its housing, a facet half a millimetre and
 /// 1° off in its frame, and posts that hide an edge on the drawing add up to several. Being generous costs nothing:
 /// a beam that no mirror deflects is known by its readings, not by this.
-pub(super) const EDGE_DEG: f64 = 2.5;
+const EDGE_DEG: f64 = 2.5;
 
 /// The facets whose drawn range of beams is at most [`EDGE_DEG`] away, the nearest first.
 pub(super) fn facets_near(scan: &ScanGeometry, facets: &[NominalFacet], beam: usize) -> Vec<usize> {

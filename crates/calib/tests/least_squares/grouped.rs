@@ -1,8 +1,9 @@
 //! Grouped problems: elimination gives what the dense matrix gives, at the size of a joint calibration.
 
+use super::flat::Flat;
 use super::sample::Sample;
 use catoptric_calib::lsq::{
-    Block, Flat, GroupJacobian, GroupedProblem, Options, Point, Prior, Problem, Reduced, State, WithPriors,
+    Block, GroupJacobian, GroupedProblem, Options, Point, Prior, Problem, Reduced, State, WithPriors,
     linearize, minimize,
 };
 use catoptric_model::Pose;

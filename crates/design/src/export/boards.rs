@@ -1,18 +1,19 @@
-//! A dataset's boards as a table: what a calibrator needs of a recording, one row for every beam of every board.
+//! Export of a dataset's boards as a table: the part of a recording that a calibrator needs, one row for every beam of
+//! every board.
 //!
-//! A row holds what was read of a board and where the board stood, in the rig and in the sensor as drawn. Nothing is
-//! corrected, chosen or left out: the statistics are over all readings that are ranges.
+//! A row holds what was read of a board and the pose of the board, in the rig and in the sensor as drawn. Nothing is
+//! corrected, selected or omitted: the statistics are over all readings that are ranges.
 
 use catoptric_calib::observations::{BoardInSensor, azimuth};
 use catoptric_model::beam::direction;
 use catoptric_model::{Dataset, Pose, PoseKind, PoseRecord};
 use nalgebra::{Point3, Unit, Vector3};
 
-/// Beams beyond the first and last that a board in a fan was set up for that have rows too: mirrors stand a degree or
-/// two off the drawing.
+/// Number of beams on either side of those that a board in a fan serves that have rows too: mirrors are a degree or two
+/// off the drawing.
 pub const BESIDE: usize = 12;
 
-/// Columns that say what was read, in front of those of [`FRAMES`].
+/// Columns of the readings, in front of those of [`FRAMES`].
 const READ: [&str; 14] = [
     "kind",
     "pose",
@@ -30,14 +31,14 @@ const READ: [&str; 14] = [
     "sd_m",
 ];
 
-/// Prefixes of the columns that say where the board stood: in the rig, and in the sensor as the drawing mounts it.
+/// Prefixes of the columns of the board's pose: in the rig, and in the sensor as the drawing mounts it.
 const FRAMES: [&str; 2] = ["rig", "drawn"];
 
-/// The boards of a dataset as CSV, in the order of the recording; numbers are written so that they are read back to
-/// the bit.
+/// Returns the boards of a dataset as CSV, in the order of the recording; numbers are written such that they are read
+/// back bit for bit.
 ///
-/// The rows of a board are the beams that it was set up for, all of them where its label names none, and in the fan of
-/// a facet [`BESIDE`] more on either side. Stretches without a board have no rows.
+/// A board has rows for the beams that it was set up for, all beams if its label names none, and in the fan of a facet
+/// [`BESIDE`] more on either side. Stretches without a board have no rows.
 ///
 /// ```
 /// use catoptric::{export, sim};
@@ -53,7 +54,7 @@ const FRAMES: [&str; 2] = ["rig", "drawn"];
 /// ```
 ///
 /// # Errors
-/// What the CSV writer says; in memory it says nothing.
+/// An error of the CSV writer; writing to memory causes none.
 pub fn board_table(dataset: &Dataset) -> Result<Vec<u8>, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let place = FRAMES.iter().flat_map(|frame| {
@@ -71,7 +72,7 @@ pub fn board_table(dataset: &Dataset) -> Result<Vec<u8>, csv::Error> {
     writer.into_inner().map_err(|e| e.into_error().into())
 }
 
-/// Whether a stretch is of a board, and so has rows in [`board_table`].
+/// Whether a stretch records a board and so has rows in [`board_table`].
 pub fn has_rows(record: &PoseRecord) -> bool {
     matches!(record.label.kind, PoseKind::Direct | PoseKind::Facet) && record.room_from_board.is_some()
 }
@@ -133,15 +134,15 @@ fn write_board(
     Ok(())
 }
 
-/// How far inside the nearest edge of a board a beam from the origin meets it, in metres, negative off the board; `None`
-/// where it does not meet the board's plane.
+/// Returns the distance from a beam's intersection with a board to the nearest edge of the board, in meters, negative
+/// outside the board; `None` if the beam misses the board's plane.
 fn inside_edge(board: &BoardInSensor, direction: &Unit<Vector3<f64>>) -> Option<f64> {
     let at = board.hit(&Point3::origin(), direction)?.in_board;
     let half = [0.5 * board.outline.width, 0.5 * board.outline.height];
     Some((half[0] - at.x.abs()).min(half[1] - at.y.abs()))
 }
 
-/// Center of a board's face, its normal, and its x axis.
+/// Returns the center of a board's face, its normal, and its x axis.
 fn in_numbers(pose: &Pose) -> Vec<String> {
     let center = pose.translation.vector;
     let [along, normal] = [Vector3::x(), Vector3::z()].map(|axis| pose.rotation * axis);

@@ -1,7 +1,7 @@
-//! A frame to print: a plate behind every mirror, a bar from each to a hub above or below the scanner, whichever its back
-//! faces, and two columns behind the scanner, where it does not look, that join the hubs.
+//! A printable frame: a plate behind every mirror, a bar from each to a hub above or below the scanner, on the side
+//! that its back faces, and two columns that join the hubs behind the scanner, outside its scan.
 //!
-//! The bodies overlap where they join; a slicer makes one of them. Holes for screws are for whoever knows his screws.
+//! The bodies overlap where they join; a slicer merges them. Holes for screws are left to the user.
 
 use super::Solid;
 use crate::layout::{Detail, Drawing, analyze, center, plate_thickness};
@@ -10,19 +10,20 @@ use catoptric_sim::{Mesh, Scene, SimError};
 use nalgebra::{Point3, Unit, Vector3};
 use std::sync::Arc;
 
-/// Thickness of plates and hubs, in metres.
+/// Thickness of plates and hubs, in meters.
 const PLATE: f64 = 3e-3;
 
-/// Width of bars and columns, in metres.
+/// Width of bars and columns, in meters.
 const BAR: f64 = 5e-3;
 
-/// How far a plate stays within its mirror's outline, in metres, so that a beam past the edge does not meet it.
+/// Distance of a plate's edge inside its mirror's outline, in meters, so that it does not block beams that pass the
+/// mirror.
 const WITHIN: f64 = 0.5e-3;
 
-/// Room between housing and hubs, in metres.
+/// Clearance between housing and hubs, in meters.
 const CLEARANCE: f64 = 1e-3;
 
-/// What is taken for a scanner without a housing.
+/// Housing assumed for a scanner without one.
 const NO_HOUSING: Housing = Housing {
     radius: 30e-3,
     back: -25e-3,
@@ -33,19 +34,19 @@ const NO_HOUSING: Housing = Housing {
 /// Distance of the columns from the middle, over their distance behind the scanner (15°): the scan ends at 135°.
 const COLUMNS_ASIDE: f64 = 0.268;
 
-/// Extents of the scanner, in metres.
+/// Extents of the scanner, in meters.
 struct Housing {
     /// About the scanner's axis.
     radius: f64,
-    /// Least x.
+    /// Minimum x.
     back: f64,
-    /// Least z.
+    /// Minimum z.
     low: f64,
-    /// Greatest z.
+    /// Maximum z.
     high: f64,
 }
 
-/// The frame's bodies.
+/// Returns the bodies of the frame.
 pub(super) fn frame(drawing: &Drawing, thickness: f64) -> Vec<Solid> {
     if drawing.facets.is_empty() {
         return Vec::new();
@@ -53,7 +54,7 @@ pub(super) fn frame(drawing: &Drawing, thickness: f64) -> Vec<Solid> {
     let housing = housing(drawing);
     let (below, above) = (housing.low - CLEARANCE, housing.high + CLEARANCE);
     let behind = housing.back - CLEARANCE - 0.5 * BAR;
-    // Columns stand on the hubs with all of their width.
+    // The hubs support the columns over their full width.
     let radius = housing.radius.max(BAR - behind);
     let mut bodies = vec![
         Solid::disc("frame-base", radius, [below - PLATE, below]),
@@ -66,7 +67,7 @@ pub(super) fn frame(drawing: &Drawing, thickness: f64) -> Vec<Solid> {
         let outline = |depth: f64, within: f64| -> Vec<Point3<f64>> {
             let moved = |c: &Point3<f64>| {
                 let from_middle = c - middle;
-                // Towards the middle by as much, but never past it.
+                // Each corner moves toward the middle by `within`, but never past it.
                 let share = (1.0 - within / from_middle.norm()).max(0.1);
                 middle + from_middle * share - m * depth
             };
@@ -81,7 +82,7 @@ pub(super) fn frame(drawing: &Drawing, thickness: f64) -> Vec<Solid> {
             &back,
             &front,
         ));
-        // Where the back looks down the bar goes to the base.
+        // A mirror whose back faces down is joined to the base.
         let hub_height = if m.z > 0.0 {
             below - 0.5 * PLATE
         } else {
@@ -106,8 +107,8 @@ fn housing(drawing: &Drawing) -> Housing {
         let parts = drawing.parts.iter().filter(|p| p.housing);
         parts.flat_map(|p| p.skin.iter().flatten())
     };
-    let least = |axis: usize| points().map(|p| p[axis]).reduce(f64::min);
-    let (Some(back), Some(low), Some(high)) = (least(0), least(2), points().map(|p| p.z).reduce(f64::max))
+    let min = |axis: usize| points().map(|p| p[axis]).reduce(f64::min);
+    let (Some(back), Some(low), Some(high)) = (min(0), min(2), points().map(|p| p.z).reduce(f64::max))
     else {
         return NO_HOUSING;
     };
@@ -120,12 +121,12 @@ fn housing(drawing: &Drawing) -> Housing {
     }
 }
 
-/// Elements that the frame would take the sight of: found by looking at the layout with the frame in it.
+/// Returns the elements that the frame would block, found by analyzing the layout with the frame in it.
 ///
 /// # Errors
 /// As [`analyze`].
 pub fn shaded_by_frame(scene: &Scene, seed: Option<u64>) -> Result<Vec<usize>, SimError> {
-    /// What no file is called.
+    /// A name that no mesh file can have.
     const FRAME: &str = "\0frame";
     let drawing = Drawing::new(scene, seed)?;
     let bodies = frame(&drawing, plate_thickness(scene));

@@ -1,6 +1,6 @@
-//! glTF 2.0 in one binary file: mirrors, posts, housing and beams in their colors, in metres.
+//! Export to glTF 2.0 in one binary file: mirrors, posts, housing and beams in their colors, in meters.
 //!
-//! The format's up is y, ours is z: the root node holds the turn between the two.
+//! The up axis is y in glTF and z here: the root node holds the rotation between the two.
 
 use super::Part;
 use super::stl::single;
@@ -12,10 +12,10 @@ use nalgebra::{Point3, Vector3};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-const GREY: [u8; 3] = [0x7A, 0x80, 0x87];
+const GRAY: [u8; 3] = [0x7A, 0x80, 0x87];
 const DARK: [u8; 3] = [0x48, 0x4C, 0x52];
 
-/// glTF's numbers for what an accessor, a view and a primitive are.
+/// glTF's constants for component types, buffer targets and primitive modes.
 const FLOAT: u32 = 5126;
 const ARRAY_BUFFER: u32 = 34962;
 const LINES: u32 = 1;
@@ -24,7 +24,7 @@ const TRIANGLES: u32 = 4;
 /// Every n-th beam is drawn.
 const STEP: usize = 2;
 
-/// A file in the making.
+/// A glTF file being built.
 #[derive(Default)]
 struct Builder {
     data: Vec<u8>,
@@ -36,7 +36,7 @@ struct Builder {
 }
 
 impl Builder {
-    /// Appends vectors and returns their accessor.
+    /// Appends vectors and returns the index of their accessor.
     fn vectors(&mut self, vectors: &[Vector3<f64>]) -> usize {
         let begin = self.data.len();
         for v in vectors {
@@ -47,7 +47,7 @@ impl Builder {
             let v = all
                 .reduce(|a, b| a.zip_map(&b, fold))
                 .unwrap_or_else(Vector3::zeros);
-            // Bounds are those of the numbers as they are stored.
+            // The bounds of the numbers as stored.
             #[allow(clippy::cast_possible_truncation)]
             let stored = [v.x, v.y, v.z].map(|c| f64::from(c as f32));
             stored
@@ -109,7 +109,7 @@ impl Builder {
     fn finish(mut self, name: &str) -> Vec<u8> {
         let children: Vec<usize> = (0..self.nodes.len()).collect();
         let root = self.nodes.len();
-        // A quarter turn about x takes z, our up, to y, the format's.
+        // A quarter turn about x takes our up axis z to the format's y.
         let half = std::f64::consts::FRAC_1_SQRT_2;
         self.nodes
             .push(json!({ "name": name, "rotation": [-half, 0.0, 0.0, half], "children": children }));
@@ -125,7 +125,7 @@ impl Builder {
             "buffers": [{ "byteLength": self.data.len() }]
         });
         let mut text = document.to_string().into_bytes();
-        // Chunks are as long as a multiple of four.
+        // The length of a chunk is a multiple of four.
         text.resize(text.len().next_multiple_of(4), b' ');
         let mut data = self.data;
         data.resize(data.len().next_multiple_of(4), 0);
@@ -143,7 +143,7 @@ impl Builder {
     }
 }
 
-/// The layout and its beams as a binary glTF file; beams that leave end `reach_m` after their last mirror.
+/// Returns the layout and its beams as a binary glTF file; beams that leave end `reach_m` after their last mirror.
 pub fn glb(scene: &Scene, drawing: &Drawing, reach_m: f64) -> Vec<u8> {
     let mut builder = Builder::default();
     for (facet, solid) in solids(scene, drawing, Part::Mirrors).iter().enumerate() {
@@ -154,7 +154,7 @@ pub fn glb(scene: &Scene, drawing: &Drawing, reach_m: f64) -> Vec<u8> {
             name: part.name.clone(),
             triangles: part.skin.clone(),
         };
-        builder.solid(&solid, if part.housing { DARK } else { GREY });
+        builder.solid(&solid, if part.housing { DARK } else { GRAY });
     }
     let mut beams: BTreeMap<Option<usize>, Vec<Vector3<f64>>> = BTreeMap::new();
     for ray in drawing.rays.iter().filter(|r| r.beam.is_multiple_of(STEP)) {
@@ -179,13 +179,13 @@ pub fn glb(scene: &Scene, drawing: &Drawing, reach_m: f64) -> Vec<u8> {
                 let name = format!("beams {}", drawing.facets[*facet].name);
                 builder.lines(&name, ends, facet_color(*facet));
             }
-            None => builder.lines("beams undeflected", ends, GREY),
+            None => builder.lines("beams undeflected", ends, GRAY),
         }
     }
     builder.finish(&drawing.name)
 }
 
-/// A byte of sRGB as linear light (IEC 61966-2-1).
+/// Converts a byte of sRGB to linear light (IEC 61966-2-1).
 fn linear(byte: u8) -> f64 {
     let c = f64::from(byte) / 255.0;
     if c <= 0.04045 {

@@ -1,13 +1,13 @@
-//! A layout for making and using it: solids to cut and print, a scene to look at, a table of its drawing, its frames;
+//! Files for making and using a layout: solids to cut and print, a scene to view, a table of its drawing, its frames;
 //! and a dataset's boards as a table.
 //!
-//! | format | what it holds | unit |
+//! | format | contents | unit |
 //! |---|---|---|
-//! | [`stl`](fn@stl) | mirrors as plates, posts, a printable frame: closed, outward, binary | millimetres |
-//! | [`glb`](fn@glb) | mirrors, posts, housing and beams in their colors (glTF 2.0) | metres |
-//! | [`drawing_table`] | corners, angles and tolerances of every mirror, as CSV | millimetres, degrees |
-//! | [`urdf`](fn@urdf) | the scanner and its mirrors in the rig, as links | metres, radians |
-//! | [`board_table`] | what every beam read of every board of a dataset, as CSV | metres, radians |
+//! | [`stl`](fn@stl) | mirrors as plates, posts, a printable frame: closed, oriented outward, binary | millimeters |
+//! | [`glb`](fn@glb) | mirrors, posts, housing and beams in their colors (glTF 2.0) | meters |
+//! | [`drawing_table`] | corners, angles and tolerances of every mirror, as CSV | millimeters, degrees |
+//! | [`urdf`](fn@urdf) | the scanner and its mirrors in the rig, as links | meters, radians |
+//! | [`board_table`] | the readings of every beam on every board of a dataset, as CSV | meters, radians |
 //!
 //! ```
 //! use catoptric::{export, layout, sim};
@@ -41,7 +41,7 @@ pub use urdf::urdf;
 use crate::layout::{Drawing, plate_thickness};
 use catoptric_sim::Scene;
 
-/// Which solids.
+/// A selection of solids.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
     /// The mirrors as plates.
@@ -52,7 +52,7 @@ pub enum Part {
     All,
 }
 
-/// The solids of a layout, each closed, in the sensor frame.
+/// Returns the selected solids of a layout, each closed, in the sensor frame.
 pub fn solids(scene: &Scene, drawing: &Drawing, part: Part) -> Vec<Solid> {
     let thickness = plate_thickness(scene);
     let mut solids = Vec::new();

@@ -1,20 +1,20 @@
-//! Closed bodies as triangles.
+//! Closed bodies as triangle meshes.
 
 use catoptric_cast::Triangle;
 use nalgebra::{Point3, Unit, Vector3};
 
-/// A closed body in the sensor frame; its triangles run counter-clockwise seen from outside.
+/// A closed body in the sensor frame; its triangles are counterclockwise seen from outside.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solid {
     /// Name.
     pub name: String,
-    /// Its surface, in metres.
+    /// Its surface, in meters.
     pub triangles: Vec<Triangle>,
 }
 
 impl Solid {
-    /// The body between two convex outlines with the same number of corners; both run counter-clockwise seen from the side
-    /// of the top.
+    /// Returns the body between two convex outlines with the same number of corners, both counterclockwise seen from
+    /// the top.
     pub(super) fn between(name: &str, bottom: &[Point3<f64>], top: &[Point3<f64>]) -> Self {
         let mut triangles = Vec::new();
         for i in 1..top.len().max(2) - 1 {
@@ -32,10 +32,10 @@ impl Solid {
         }
     }
 
-    /// A square bar from one point to another.
+    /// Returns a square bar from one point to another.
     pub(super) fn bar(name: &str, from: Point3<f64>, to: Point3<f64>, width: f64) -> Option<Self> {
         let along = Unit::try_new(to - from, 1e-6)?;
-        // Any direction across will do; upright where there is one.
+        // Any perpendicular direction will do; a horizontal one where it is defined.
         let across = Unit::try_new(Vector3::z().cross(&along), 1e-3).unwrap_or(Vector3::x_axis());
         let up = along.cross(&across);
         let end = |at: Point3<f64>| {
@@ -45,7 +45,7 @@ impl Solid {
         Some(Self::between(name, &end(from), &end(to)))
     }
 
-    /// An upright disc between two heights.
+    /// Returns a horizontal disc between two heights.
     pub(super) fn disc(name: &str, radius: f64, [bottom, top]: [f64; 2]) -> Self {
         let corners = |z: f64| -> Vec<Point3<f64>> {
             (0..catoptric_cast::CYLINDER_FACES)

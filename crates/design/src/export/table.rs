@@ -1,4 +1,4 @@
-//! The drawing as a table: one row for every corner of every mirror, with the mirror's angles and tolerances.
+//! Export of the drawing as a table: one row for every corner of every mirror, with the mirror's angles and tolerances.
 
 use crate::layout::{Drawing, plate_thickness};
 use catoptric_cast::area_vector;
@@ -28,10 +28,10 @@ const HEADER: [&str; 20] = [
     "reflectivity",
 ];
 
-/// The drawing table as CSV, in the sensor frame; corners run counter-clockwise seen from the reflecting side.
+/// Returns the drawing table as CSV, in the sensor frame; corners are counterclockwise seen from the reflecting side.
 ///
 /// # Errors
-/// What the CSV writer says; in memory it says nothing.
+/// An error of the CSV writer; writing to memory causes none.
 pub fn drawing_table(scene: &Scene, drawing: &Drawing) -> Result<Vec<u8>, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(HEADER)?;
@@ -76,7 +76,7 @@ pub fn drawing_table(scene: &Scene, drawing: &Drawing) -> Result<Vec<u8>, csv::E
     writer.into_inner().map_err(|e| e.into_error().into())
 }
 
-/// To the nearest 10⁻⁶, a nanometre or a micro-degree, without a negative zero.
+/// Rounds to the nearest 10⁻⁶, a nanometer or a microdegree, without a negative zero.
 fn rounded(value: f64) -> f64 {
     (value * 1e6).round() / 1e6 + 0.0
 }

@@ -1,4 +1,5 @@
-//! The scanner and its mirrors as links of a URDF file: lengths in metres, turns in radians about fixed x, y and z.
+//! Export to URDF: the scanner and its mirrors as links, lengths in meters, rotations in radians about fixed x, y and
+//! z.
 
 use crate::layout::{Drawing, center};
 use catoptric_model::Pose;
@@ -7,10 +8,10 @@ use catoptric_sim::Scene;
 use catoptric_sim::build::nominal_mount;
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
-/// The frames of a layout: the rig, the laser as drawn, and one for every mirror, its z axis along the normal.
+/// Returns the frames of a layout: the rig, the laser as drawn, and one per mirror, its z axis along the normal.
 pub fn urdf(scene: &Scene, drawing: &Drawing) -> String {
     let mut xml = format!(
-        "<?xml version=\"1.0\"?>\n<!-- Frames of a layout of mirrors around a 2D laser scanner: metres, radians. -->\n<robot \
+        "<?xml version=\"1.0\"?>\n<!-- Frames of a layout of mirrors around a 2D laser scanner: meters, radians. -->\n<robot \
          name=\"{}\">\n  <link name=\"rig\"/>\n  <link name=\"laser\">\n",
         escape(&scene.name)
     );
@@ -30,7 +31,7 @@ pub fn urdf(scene: &Scene, drawing: &Drawing) -> String {
         let link = format!("mirror_{}", facet.name);
         let normal = facet.face.normal;
         let (a, b) = tangent_basis(&normal);
-        // A right-handed frame: the basis is one with the direction behind it.
+        // A right-handed frame: the tangent basis is right-handed with the opposite direction.
         let columns = [a.into_inner(), b.into_inner(), a.cross(&b)];
         let mut turn = Matrix3::from_columns(&columns);
         if turn.column(2).dot(&normal) < 0.0 {
@@ -60,7 +61,7 @@ fn joint(parent: &str, child: &str, parent_from_child: &Pose) -> String {
     )
 }
 
-/// Three numbers to the nearest 10⁻⁹.
+/// Formats three numbers to the nearest 10⁻⁹.
 fn numbers(values: [f64; 3]) -> String {
     values
         .map(|v| ((v * 1e9).round() / 1e9 + 0.0).to_string())

@@ -1,9 +1,10 @@
-//! How well the scene's own experiment can calibrate the layout, before anything is recorded.
+//! Predicts how well the scene's own experiment can calibrate the layout, before anything is recorded.
 //!
-//! The bound of the whole experiment ([`limit`](fn@catoptric_calib::limit)) is a matter of geometry and of how many readings
-//! each element has of each board, not of their noise. So every board pose of the scene is looked at once, with one ray per
-//! beam and without noise, and each reading is repeated as often as the scene says, alternately above and below itself by
-//! the standard deviation of one reading. The structure is as built under a seed: facets are then as uneven as they will be.
+//! The bound of the whole experiment ([`limit`](fn@catoptric_calib::limit)) depends on geometry and on the number of
+//! readings that each element has of each board, not on the values of their noise. So every board pose of the scene is
+//! simulated once, with one ray per beam and without noise, and each reading is repeated as often as the scene says,
+//! alternately above and below its noise-free value by the standard deviation of one reading. The structure is as built
+//! under a seed, so that its facets have realistic slope errors.
 
 use catoptric_assess::score::true_directions;
 use catoptric_calib::{TrueDirection, limit};
@@ -14,37 +15,37 @@ use nalgebra::Matrix2;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// The least error that any unbiased calibration from the scene's experiment can have.
+/// The smallest error that any unbiased calibration from the scene's experiment can have.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Accuracy {
     /// Seed of the structure as built.
     pub seed: u64,
-    /// Board poses of the experiment.
+    /// Number of board poses of the experiment.
     pub board_poses: usize,
-    /// Unsplit deflected elements whose boards determine both angles.
+    /// Number of unsplit deflected elements whose boards determine both angles.
     pub determined: usize,
-    /// Unsplit deflected elements whose boards do not.
+    /// Number of unsplit deflected elements whose boards do not.
     pub open: usize,
     /// Root mean square of the bound over the determined elements, in degrees per axis; `None` without any.
     pub per_axis_deg: Option<f64>,
     /// Largest bound of an element, in degrees per axis.
     pub worst_per_axis_deg: Option<f64>,
-    /// What that is at 4 m, in millimetres, by the root mean square.
+    /// Root mean square displacement of a point at 4 m, in millimeters.
     pub point_at_4m_mm: Option<f64>,
     /// Facet by facet.
     pub facets: Vec<FacetAccuracy>,
-    /// Why there is no bound, where there is none.
+    /// Why there is no bound, if there is none.
     pub reason: Option<String>,
 }
 
-/// The same of one facet.
+/// The same for one facet.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FacetAccuracy {
     /// The facet.
     pub name: String,
-    /// Elements whose boards determine both angles.
+    /// Number of elements whose boards determine both angles.
     pub determined: usize,
-    /// Elements whose boards do not.
+    /// Number of elements whose boards do not.
     pub open: usize,
     /// Root mean square of the bound, in degrees per axis.
     pub per_axis_deg: Option<f64>,
@@ -52,7 +53,7 @@ pub struct FacetAccuracy {
 
 /// Predicts the accuracy of a scene's own experiment on the structure as built under a seed.
 ///
-/// That there is no bound (no boards or no room for them, no facets, errors switched off) is said in the answer.
+/// If there is no bound (no boards or no room for them, no facets, errors switched off), the result holds the reason.
 pub fn predict(scene: &Scene, seed: u64) -> Accuracy {
     let mut accuracy = Accuracy {
         seed,
@@ -72,15 +73,15 @@ pub fn predict(scene: &Scene, seed: u64) -> Accuracy {
 }
 
 fn find(scene: &Scene, seed: u64, accuracy: &mut Accuracy) -> Result<(), String> {
-    let words = |error: SimError| error.to_string();
-    // What becomes of the elements is a question of whole beams, where the boards are one of directions alone.
+    let text = |error: SimError| error.to_string();
+    // The classes of elements depend on whole beams, the boards' information on directions alone.
     let truth = Laboratory::new(scene, seed)
         .and_then(|l| l.truth())
-        .map_err(words)?;
-    let laboratory = Laboratory::new(&looked_at_once(scene), seed).map_err(words)?;
+        .map_err(text)?;
+    let laboratory = Laboratory::new(&sampled_once(scene), seed).map_err(text)?;
     let directions = true_directions(&truth);
     accuracy.board_poses = laboratory.board_poses();
-    let session = laboratory.session().map_err(words)?;
+    let session = laboratory.session().map_err(text)?;
     if directions.is_empty() {
         return Err("no element is deflected by one facet alone".to_owned());
     }
@@ -95,10 +96,10 @@ fn find(scene: &Scene, seed: u64, accuracy: &mut Accuracy) -> Result<(), String>
         .collect();
     let mut dataset = Dataset {
         session,
-        poses: poses.map_err(words)?.into_iter().flatten().collect(),
+        poses: poses.map_err(text)?.into_iter().flatten().collect(),
         id: None,
     };
-    // Poses that are left out leave no gap in the numbers.
+    // Omitted poses leave no gap in the numbering.
     for (number, pose) in dataset.poses.iter_mut().enumerate() {
         pose.label.pose = number;
     }
@@ -127,7 +128,7 @@ fn find(scene: &Scene, seed: u64, accuracy: &mut Accuracy) -> Result<(), String>
     accuracy.open = open;
     accuracy.per_axis_deg = rms.map(f64::to_degrees);
     accuracy.worst_per_axis_deg = worst.map(f64::to_degrees);
-    // Both axes of a direction move the point.
+    // Both axes of a direction displace the point.
     accuracy.point_at_4m_mm = rms.map(|r| 4e3 * r * std::f64::consts::SQRT_2);
     accuracy.facets = scene
         .superstructure
@@ -147,8 +148,8 @@ fn find(scene: &Scene, seed: u64, accuracy: &mut Accuracy) -> Result<(), String>
         .ok_or_else(|| "no element is determined by the scene's boards".to_owned())
 }
 
-/// The scene with one ray per beam and one scan of every stretch, in which every marker is seen.
-fn looked_at_once(scene: &Scene) -> Scene {
+/// Returns the scene with one ray per beam and one scan per stretch, in which every marker is detected.
+fn sampled_once(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     scene.scanner.sub_rays = 1;
     scene.experiment.scans_per_pose = 1;
@@ -158,7 +159,8 @@ fn looked_at_once(scene: &Scene) -> Scene {
     scene
 }
 
-/// What a calibration needs of a stretch, its readings spread as they will be; `None` for one that it takes nothing from.
+/// Returns the data that a calibration needs of a stretch, with readings spread by their noise; `None` for a stretch
+/// that it does not use.
 fn record(laboratory: &Laboratory, number: usize, readings: usize) -> Result<Option<PoseRecord>, SimError> {
     let returns = laboratory.returns(number)?;
     let stretch = laboratory.record(number, &returns);
@@ -174,9 +176,10 @@ fn record(laboratory: &Laboratory, number: usize, readings: usize) -> Result<Opt
     Ok(Some(record))
 }
 
-/// Readings scan after scan: alternately above and below what is seen, with the sample standard deviation of the noise.
+/// Returns the readings scan by scan: alternately above and below the noise-free range, with the sample standard
+/// deviation of the noise.
 fn spread(returns: &Returns, readings: usize) -> Vec<f64> {
-    // An even number of ±a has the sample variance a²·n/(n − 1).
+    // An even number of values ±a has the sample variance a²·n/(n − 1).
     let share = ((readings.max(2) - 1) as f64 / readings.max(2) as f64).sqrt();
     let mut ranges = Vec::with_capacity(readings * returns.len());
     for scan in 0..readings {

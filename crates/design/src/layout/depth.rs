@@ -1,7 +1,7 @@
-//! The depth image of a layout: how far it is in the scene's room in all directions, and to what each element reads.
+//! The depth image of a layout: the range in the scene's room in all directions, and of each element.
 //!
-//! A synthetic picture, without noise or errors of range: chief rays on exact surfaces, boards aside, which are in another
-//! place for every pose.
+//! The image is synthetic, without noise or range errors: chief rays on exact surfaces. Boards are left out, since
+//! every pose has another placement of them.
 
 use super::drawing::Drawing;
 use catoptric_cast::Ray;
@@ -11,25 +11,25 @@ use catoptric_sim::{Scene, SimError};
 use nalgebra::{Point3, Unit, Vector3};
 use rayon::prelude::*;
 
-/// Directions along the azimuth, and along the elevation: one every half degree.
+/// Number of directions along azimuth and along elevation: one every half degree.
 const COLUMNS: usize = 720;
 const ROWS: usize = 360;
 
-/// Ranges from the scanner, in metres; `None` where nothing is in the way.
+/// Ranges from the scanner, in meters; `None` where no surface is hit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Depth {
-    /// Directions along the azimuth, the first just below 180°, falling.
+    /// Number of directions along azimuth; the first is just below 180°, and they decrease.
     pub columns: usize,
-    /// Directions along the elevation, the first just below 90°, falling.
+    /// Number of directions along elevation; the first is just below 90°, and they decrease.
     pub rows: usize,
-    /// What stands in the room as one would see it from the scanner if the rig were not there, row by row.
+    /// Range of the room as seen from the scanner if the rig were not there, row by row.
     pub room_m: Vec<Option<f64>>,
-    /// What each beam reads, by its number: the way over the mirrors included. `None` also for beams that do not leave.
+    /// Range of each beam, by its number, along the path via the mirrors. `None` also for beams that do not leave.
     pub read_m: Vec<Option<f64>>,
 }
 
 impl Depth {
-    /// Azimuth and elevation of the middle of a cell, in radians.
+    /// Returns azimuth and elevation of the center of a cell, in radians.
     pub fn direction(&self, row: usize, column: usize) -> (f64, f64) {
         let middle = |i: usize, count: usize| (i as f64 + 0.5) / count as f64;
         (
@@ -39,7 +39,7 @@ impl Depth {
     }
 }
 
-/// The depth image of a drawing in the room of its scene.
+/// Computes the depth image of a drawing in the room of its scene.
 ///
 /// # Errors
 /// As [`Scenery::room`].
@@ -69,7 +69,8 @@ pub fn depth(scene: &Scene, drawing: &Drawing) -> Result<Depth, SimError> {
     Ok(depth)
 }
 
-/// How far a ray goes in the room, mirrors that stand there included; both are given in the sensor frame.
+/// Returns the length of a ray's path in the room, with reflections by the room's mirrors; the ray is in the sensor
+/// frame.
 fn range(
     tracer: &Tracer<'_>,
     room_from_sensor: &Pose,
@@ -80,9 +81,9 @@ fn range(
         origin: room_from_sensor * origin,
         direction: room_from_sensor * direction,
     };
-    let mut way: Vec<Vertex> = Vec::new();
-    match tracer.follow(&ray, &mut way) {
-        Fate::Hit => way.last().map(|vertex| vertex.path),
+    let mut vertices: Vec<Vertex> = Vec::new();
+    match tracer.follow(&ray, &mut vertices) {
+        Fate::Hit => vertices.last().map(|vertex| vertex.path),
         Fate::Escaped | Fate::Trapped => None,
     }
 }
@@ -91,7 +92,7 @@ fn range(
 mod tests {
     use super::*;
 
-    /// Distance to the wall of an empty room with its frame on the middle of the floor.
+    /// Returns the distance to the wall of an empty room whose frame is at the center of the floor.
     fn to_wall(size: &[f64; 3], from: &Point3<f64>, v: &Unit<Vector3<f64>>) -> f64 {
         let [x, y, z] = *size;
         let limits = [[-0.5 * x, 0.5 * x], [-0.5 * y, 0.5 * y], [0.0, z]];
@@ -136,9 +137,9 @@ mod tests {
                 lost += 1;
                 continue;
             };
-            let way: f64 = ray.points.windows(2).map(|p| (p[1] - p[0]).norm()).sum();
+            let length: f64 = ray.points.windows(2).map(|p| (p[1] - p[0]).norm()).sum();
             bent += usize::from(!ray.facets.is_empty());
-            let wall = way + expected(ray.points.last().expect("the scanner"), &exit);
+            let wall = length + expected(ray.points.last().expect("the scanner"), &exit);
             assert!(range.is_some_and(|r| (r - wall).abs() < 1e-9), "{}", ray.beam);
         }
         assert!(bent > 400 && lost > 20, "{bent} {lost}");

@@ -1,4 +1,4 @@
-//! The geometry of a layout for whoever draws or builds it: mirrors, posts, housing, the ways of all beams.
+//! The geometry of a layout for drawing or building it: mirrors, posts, housing, the paths of all beams.
 
 use super::element::{Class, exit, trace};
 use super::field::{Cell, cells};
@@ -13,22 +13,22 @@ use catoptric_sim::receive::Sensor;
 use catoptric_sim::{Scene, SimError};
 use nalgebra::{Point3, Unit, Vector3};
 
-/// Mirrors, bodies and beams in the sensor frame, in metres.
+/// Mirrors, bodies and beams in the sensor frame, in meters.
 #[derive(Debug, Clone)]
 pub struct Drawing {
     /// Name of the scene.
     pub name: String,
-    /// Where the scanner stands in the room.
+    /// Pose of the scanner in the room.
     pub room_from_sensor: Pose,
     /// The mirrors.
     pub facets: Vec<BuiltFacet>,
     /// Posts and housing.
     pub parts: Vec<DrawnPart>,
-    /// One for every beam.
+    /// The path of every beam.
     pub rays: Vec<DrawnRay>,
-    /// Where beams fall on facets, in order of beam and bounce.
+    /// Footprints of beams on facets, in order of beam and bounce.
     pub footprints: Vec<Footprint>,
-    /// What every beam stands for in the scan.
+    /// The cell that every beam represents in the scan.
     pub cells: Vec<Cell>,
     /// How the scanner scans.
     pub scan: ScanGeometry,
@@ -45,23 +45,23 @@ pub struct DrawnPart {
     pub housing: bool,
 }
 
-/// The way of a beam's chief ray.
+/// The path of a beam's chief ray.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DrawnRay {
     /// The beam.
     pub beam: usize,
-    /// What becomes of the beam.
+    /// Class of the beam.
     pub class: Class,
-    /// Facets met, by their number.
+    /// Facets hit, by their number.
     pub facets: Vec<usize>,
-    /// The scanner, the mirrors met, and the end on the structure if there is one.
+    /// The scanner, the points on mirrors, and the end on the structure if there is one.
     pub points: Vec<Point3<f64>>,
-    /// Where it goes from the last point; `None` if it ends there.
+    /// Direction from the last point; `None` if the ray ends there.
     pub exit: Option<Unit<Vector3<f64>>>,
 }
 
 impl Drawing {
-    /// The geometry of a scene as drawn, or as built under a seed.
+    /// Traces the geometry of a scene as drawn, or as built under a seed.
     ///
     /// # Errors
     /// As [`analyze`](super::analyze).

@@ -1,11 +1,11 @@
-//! Element by element: what becomes of its light, where it looks, and how far.
+//! Element by element: the class of its light, its direction, and its limits of range.
 //!
-//! A face-on target of reflectivity ρ is seen as far as Eq. 1 keeps its echo above the threshold. With the threshold set
-//! by a target of reflectivity ρ_t at R_t, and g = Σ share·(ρ_mirrorⁿ·gain)², what two passes over n mirrors leave of the
-//! light that goes the chief ray's way,
+//! A face-on target of reflectivity ρ is detected as far as Eq. (1) keeps its echo above the threshold. Let the
+//! threshold be set by a target of reflectivity ρ_t at R_t, and let g = Σ share·(ρ_mirrorⁿ·gain)² be what two passes
+//! via n mirrors leave of the light on the chief ray's path. Then
 //!
 //! ```text
-//! R = R_t·√(g·ρ/ρ_t)         at most the scanner's longest range, along the whole way from the scanner
+//! R = R_t·√(g·ρ/ρ_t)         limited by the scanner's maximum range, along the whole path from the scanner
 //! ```
 
 use super::footprint::Footprint;
@@ -21,10 +21,10 @@ use nalgebra::{Unit, Vector3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Reflectivity of the dark target: what data sheets state ranges for.
+/// Reflectivity of the dark target for which data sheets state ranges.
 pub const DARK: f64 = 0.1;
 
-/// What becomes of an element's light.
+/// How an element's light ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Class {
@@ -34,15 +34,15 @@ pub enum Class {
     Deflected,
     /// All of it leaves after more than one facet.
     MultiBounce,
-    /// An edge cuts it: its parts take different ways.
+    /// An edge divides it between paths.
     Split,
-    /// All of it ends on the structure without meeting a mirror first.
+    /// All of it ends on the structure without hitting a mirror first.
     HitsStructure,
-    /// All of it meets a mirror, and then ends on the structure.
+    /// All of it hits a mirror and then ends on the structure.
     Shaded,
     /// All of it is still between mirrors after the last bounce allowed.
     Trapped,
-    /// It leaves, and not even a white target returns enough of it.
+    /// It leaves, but even a white target returns too little of it.
     TooFaint,
 }
 
@@ -53,49 +53,50 @@ pub struct Element {
     pub beam: usize,
     /// Its azimuth in the scan, in degrees.
     pub scan_azimuth_deg: f64,
-    /// What becomes of its light.
+    /// Its class.
     pub class: Class,
-    /// The same in the words of a recording's truth.
+    /// Its class as the truth of a recording states it.
     pub status: BeamClass,
-    /// Facets that its chief ray meets, in order.
+    /// Facets that its chief ray hits, in order.
     pub facets: Vec<String>,
-    /// What ends its chief ray's way.
+    /// What its chief ray's path ends on.
     pub stopped_by: Option<String>,
-    /// Share of its energy that goes the chief ray's way.
+    /// Share of its energy on the chief ray's path.
     pub chief_energy: f64,
-    /// Azimuth in which its chief ray leaves, in degrees.
+    /// Exit azimuth of its chief ray, in degrees.
     pub exit_azimuth_deg: Option<f64>,
-    /// Elevation in which its chief ray leaves, in degrees.
+    /// Exit elevation of its chief ray, in degrees.
     pub exit_elevation_deg: Option<f64>,
-    /// Length of the way to the last mirror, in metres; 0 without any.
+    /// Length of the path to the last mirror, in meters; 0 without a mirror.
     pub mirror_at_m: f64,
-    /// Shortest range that is reported and beyond the last mirror, in metres from the scanner.
+    /// Shortest range that is reported and beyond the last mirror, in meters from the scanner.
     pub range_min_m: Option<f64>,
-    /// Farthest face-on white target that is seen, in metres from the scanner.
+    /// Range of the farthest face-on white target that is detected, in meters from the scanner.
     pub range_max_white_m: Option<f64>,
-    /// Farthest face-on target of 10 % that is seen, in metres from the scanner.
+    /// Range of the farthest face-on target of 10 % that is detected, in meters from the scanner.
     pub range_max_dark_m: Option<f64>,
-    /// Least distance of its spot from an edge of the mirrors it meets, in millimetres; negative where an edge cuts it.
+    /// Minimum distance of its footprint from an edge of the mirrors it hits, in millimeters; negative where an edge
+    /// cuts it.
     pub margin_mm: Option<f64>,
-    /// The same, over the distance by which neighboring beams are apart there.
+    /// The same, over the distance between neighboring beams there.
     pub margin_beams: Option<f64>,
 }
 
-/// The ways of one beam.
+/// The paths of one beam.
 pub(crate) struct Traced {
     pub(crate) beam: usize,
     pub(crate) chief: Path,
     pub(crate) status: BeamClass,
     pub(crate) chief_energy: f64,
-    /// What two passes leave of the light that goes the chief ray's way.
+    /// What two passes leave of the light on the chief ray's path.
     pub(crate) light: f64,
     pub(crate) sees: bool,
-    /// Where all of its light went over the structure.
+    /// Where its light passed the structure.
     pub(crate) trail: Trail,
 }
 
 impl Traced {
-    /// What becomes of it.
+    /// Returns the class of the element.
     pub(crate) fn class(&self) -> Class {
         match self.status {
             BeamClass::Split => Class::Split,
@@ -128,7 +129,7 @@ impl Class {
         matches!(self, Self::Direct | Self::Deflected | Self::MultiBounce)
     }
 
-    /// Its name in files.
+    /// Returns its name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Direct => "direct",
@@ -142,7 +143,7 @@ impl Class {
         }
     }
 
-    /// The same for people.
+    /// Returns its name for people.
     pub fn words(self) -> &'static str {
         match self {
             Self::Direct => "direct",
@@ -157,12 +158,12 @@ impl Class {
     }
 }
 
-/// Direction in which a way leaves; `None` if it does not.
+/// Returns the exit direction of a path; `None` if it does not leave.
 pub(crate) fn exit(path: &Path) -> Option<Unit<Vector3<f64>>> {
     matches!(path.end, End::Escaped).then_some(path.last.direction)
 }
 
-/// Length of a way to its last mirror, in metres.
+/// Returns the length of a path to its last mirror, in meters.
 fn mirror_at(path: &Path) -> f64 {
     match path.end {
         End::Escaped | End::Trapped => path.length,
@@ -170,18 +171,18 @@ fn mirror_at(path: &Path) -> f64 {
     }
 }
 
-/// Follows every beam through a setting without targets.
+/// Traces every beam through a setting without targets.
 pub(crate) fn trace(sensor: &Sensor, bare: &Setting<'_>, scene: &Scene) -> Vec<Traced> {
     let beams = (0..sensor.scan().beams()).into_par_iter();
     beams.map(|beam| trace_one(sensor, bare, scene, beam)).collect()
 }
 
-/// Follows a beam through a setting without targets.
+/// Traces a beam through a setting without targets.
 pub(crate) fn trace_one(sensor: &Sensor, bare: &Setting<'_>, scene: &Scene, beam: usize) -> Traced {
     let rays: Vec<Ray> = sensor.rays(beam).chain([sensor.chief_ray(beam)]).collect();
     let (paths, trail) = bare.trace_with_trail(&rays);
     let chief = paths[paths.len() - 1];
-    let paths = || sensor.bundle().iter().zip(&paths);
+    let paths = || sensor.sub_ray_list().iter().zip(&paths);
     let (status, chief_energy) = class(&chief, paths());
     let along = paths().filter(|(_, p)| exit(p).is_some() && p.facets() == chief.facets());
     let light = along.map(|(s, p)| {
@@ -205,27 +206,27 @@ pub(crate) fn trace_one(sensor: &Sensor, bare: &Setting<'_>, scene: &Scene, beam
     traced
 }
 
-/// Reflectivity of the white that scenes mean.
+/// Returns the reflectivity of the scene's color `white`.
 fn white(scene: &Scene) -> f64 {
     color::paint(scene, "white").map_or(1.0, |paint| paint.reflectivity)
 }
 
-/// Farthest face-on target of a reflectivity, along the whole way.
+/// Returns the range of the farthest face-on target of a reflectivity, along the whole path.
 fn farthest(scene: &Scene, traced: &Traced, reflectivity: f64) -> f64 {
     let detection = &scene.detection;
     let brightness = traced.light * reflectivity / detection.threshold_reflectivity;
     let seen = detection.threshold_range_m * brightness.sqrt();
-    // Without a threshold everything is seen, and no light at all is not.
+    // Without a threshold everything is detected, except where there is no light at all (0/0).
     let seen = if seen.is_nan() { 0.0 } else { seen };
     seen.min(scene.scanner.limits().range_max_m)
 }
 
-/// Shortest way that is reported and leads beyond the last mirror.
+/// Returns the shortest path that is reported and leads beyond the last mirror.
 fn nearest(scene: &Scene, traced: &Traced) -> f64 {
     scene.scanner.limits().range_min_m.max(mirror_at(&traced.chief))
 }
 
-/// What is told of every element.
+/// Returns the results for every element.
 pub(crate) fn elements(
     scene: &Scene,
     scan: &ScanGeometry,

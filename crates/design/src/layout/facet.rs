@@ -1,4 +1,4 @@
-//! Facet by facet: what it serves, where its fan goes, what room it leaves, and what an error of it does.
+//! Facet by facet: its elements, the extent of its fan, its margins, and the effect of its errors.
 
 use super::element::{Class, Element, Traced, exit};
 use super::field::Cell;
@@ -9,60 +9,60 @@ use catoptric_model::ScanGeometry;
 use catoptric_sim::build::Structure;
 use serde::Serialize;
 
-/// Turn of a facet that its sensitivity is stated for, in degrees.
+/// Turn of a facet for which its sensitivity is stated, in degrees.
 const TURN_DEG: f64 = 0.1;
 
-/// Shift of a facet that its sensitivity is stated for, in millimetres.
+/// Shift of a facet for which its sensitivity is stated, in millimeters.
 const SHIFT_MM: f64 = 0.1;
 
-/// What one facet serves, and what an error of it does.
+/// The elements of one facet, and the effect of its errors.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FacetView {
     /// The facet.
     pub name: String,
-    /// Elements that it deflects alone, and that see.
+    /// Number of elements that it deflects alone and that have a direction.
     pub elements: usize,
-    /// First and last of them.
+    /// The first and last of them.
     pub beams: Option<[usize; 2]>,
-    /// Elements that meet it and leave after other facets too.
+    /// Number of elements that hit it and leave after other facets too.
     pub multi_bounce: usize,
-    /// Elements whose chief ray meets it and that an edge cuts.
+    /// Number of elements whose chief ray hits it and that an edge cuts.
     pub split: usize,
-    /// Elements that meet it and then end on the structure.
+    /// Number of elements that hit it and then end on the structure.
     pub shaded: usize,
-    /// Least and greatest azimuth of its fan, in degrees; the first may be below −180.
+    /// Minimum and maximum azimuth of its fan, in degrees; the first may be below −180.
     pub exit_azimuth_deg: Option<[f64; 2]>,
-    /// Least and greatest elevation of its fan, in degrees.
+    /// Minimum and maximum elevation of its fan, in degrees.
     pub exit_elevation_deg: Option<[f64; 2]>,
     /// Solid angle of its elements' cells, in steradians.
     pub solid_angle_sr: f64,
     /// The same as a share of 4π.
     pub field_of_regard: f64,
-    /// Way from the scanner to it, least and greatest, in metres.
+    /// Minimum and maximum length of the path from the scanner to it, in meters.
     pub mirror_at_m: Option<[f64; 2]>,
-    /// Farthest face-on white target that all of its elements see, in metres from the scanner.
+    /// Range of the farthest face-on white target that all of its elements detect, in meters from the scanner.
     pub range_max_white_m: Option<f64>,
-    /// Farthest face-on target of 10 % that all of its elements see, in metres from the scanner.
+    /// Range of the farthest face-on target of 10 % that all of its elements detect, in meters from the scanner.
     pub range_max_dark_m: Option<f64>,
-    /// Least distance of an unsplit element's spot from any edge, in millimetres.
+    /// Minimum distance of an unsplit element's footprint from any edge, in millimeters.
     pub margin_mm: Option<f64>,
-    /// The same over the distance by which neighboring beams are apart on the facet.
+    /// The same over the distance between neighboring beams on the facet.
     pub margin_beams: Option<f64>,
-    /// Least distance of an unsplit element's spot from the edges beside the scan's line, in millimetres: how far the scan
-    /// may rise or sink.
+    /// Minimum distance of an unsplit element's footprint from the edges above and below the scan's line, in
+    /// millimeters: how far the scan may rise or sink.
     pub margin_across_mm: Option<f64>,
-    /// Area, in square millimetres.
+    /// Area, in square millimeters.
     pub area_mm2: f64,
-    /// Movement of the point at 4 m for a turn of the facet by 0.1° about the worst axis, root mean square over the
-    /// elements that meet it and see, in millimetres.
+    /// Displacement of the point at 4 m for a turn of the facet by 0.1° about the worst axis, root mean square over the
+    /// elements that hit it and have a direction, in millimeters.
     pub point_at_4m_per_0_1_deg_rms_mm: Option<f64>,
-    /// The same, the greatest.
+    /// The maximum of the same.
     pub point_at_4m_per_0_1_deg_max_mm: Option<f64>,
-    /// Movement of the point at 4 m for a shift of the facet by 0.1 mm along its normal, in millimetres.
+    /// Displacement of the point at 4 m for a shift of the facet by 0.1 mm along its normal, in millimeters.
     pub point_at_4m_per_0_1_mm_mm: Option<f64>,
 }
 
-/// All facets.
+/// Returns the results for all facets.
 pub(crate) fn facets(
     scan: &ScanGeometry,
     structure: &Structure,
@@ -136,8 +136,8 @@ fn view(
         solid_angle_sr,
         field_of_regard: solid_angle_sr / super::SPHERE_SR,
         mirror_at_m: extremes(&|e| Some(e.mirror_at_m)),
-        range_max_white_m: extremes(&|e| e.range_max_white_m).map(|[least, _]| least),
-        range_max_dark_m: extremes(&|e| e.range_max_dark_m).map(|[least, _]| least),
+        range_max_white_m: extremes(&|e| e.range_max_white_m).map(|[min, _]| min),
+        range_max_dark_m: extremes(&|e| e.range_max_dark_m).map(|[min, _]| min),
         margin_mm: nearest.map(|f| f.margin_mm),
         margin_beams: nearest.map(|f| f.margin_beams),
         margin_across_mm: across,
@@ -148,7 +148,7 @@ fn view(
     }
 }
 
-/// Least and greatest azimuth of a fan, in degrees, measured from its middle so that no turn is counted twice.
+/// Returns minimum and maximum azimuth of a fan, in degrees, measured from its middle to avoid a jump at ±180°.
 fn azimuths(own: &[(&Element, &&Traced)]) -> Option<[f64; 2]> {
     let (_, middle) = own.get(own.len() / 2)?;
     let middle = exit(&middle.chief)?;

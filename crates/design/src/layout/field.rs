@@ -1,10 +1,10 @@
 //! Field of regard: the directions that the elements' cells cover, each counted once.
 //!
-//! Elements that meet the same facets in the same order share one isometry of directions, the product of their
-//! reflections (facets as planes, their unevenness aside). Whether a direction lies in a cell is asked where cells are
-//! plain rectangles: turned back into the scan. Ways are taken one after the other, undeflected elements first. Every cell is cut
-//! into parts, and a part counts unless a way before sees it, so that cells that nothing overlaps keep their solid angle
-//! exactly.
+//! Elements whose light hits the same facets in the same order share one isometry of directions, the product of their
+//! reflections (facets as planes, without slope errors). Whether a direction is in a cell is evaluated in the scan,
+//! where cells are plain rectangles. Sequences of facets are processed one after the other, undeflected elements first.
+//! Every cell is divided into parts, and a part counts unless an earlier sequence covers it, so that cells without
+//! overlap keep their solid angle exactly.
 
 use super::element::{Traced, exit};
 use catoptric_model::ScanGeometry;
@@ -16,22 +16,23 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
-/// Angle within which a direction is near a beam, in degrees.
+/// Angle within which a direction counts as near a beam, in degrees.
 pub const NEAR_DEG: f64 = 5.0;
 
-/// Parts of a cell along the scan and across it.
+/// Number of parts of a cell along the scan and across it.
 const PARTS: [usize; 2] = [3, 6];
 
-/// Directions of the lattice on which nearness is counted: the share is right to about 1e-3.
+/// Number of lattice directions for the share near a beam, which is accurate to about 1e-3.
 const LATTICE: usize = 8000;
 
-/// Fewest directions or cells that are worth another thread.
+/// Minimum number of directions or cells per thread.
 const AT_ONCE: usize = 64;
 
-/// What one element stands for in the scan: half-way to its neighbors, and across as far as its beam reaches.
+/// The directions that one element represents in the scan: half-way to its neighbors, and across as far as its beam
+/// extends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cell {
-    /// Azimuth of its middle, in radians.
+    /// Azimuth of its center, in radians.
     pub azimuth: f64,
     /// Half its extent across the scan, in radians.
     pub half_height: f64,
@@ -40,17 +41,17 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// Its solid angle, in steradians: step·2·sin(δ/2).
+    /// Returns its solid angle, in steradians: step·2·sin(δ/2).
     pub fn solid_angle(&self) -> f64 {
         2.0 * self.width * libm::sin(self.half_height)
     }
 }
 
-/// Elements that see by the same facets.
-pub(crate) struct Way {
-    /// The facets in the order in which they are met.
+/// The seeing elements whose chief rays hit the same facets in the same order.
+pub(crate) struct FacetSequence {
+    /// The facets in order.
     pub(crate) facets: Vec<usize>,
-    /// From the scan to where it looks.
+    /// The product of the reflections: from directions in the scan to exit directions.
     pub(crate) turn: Matrix3<f64>,
     /// Number of its elements below each beam: `below[j] - below[i]` of them are in i..j.
     below: Vec<usize>,
@@ -58,10 +59,10 @@ pub(crate) struct Way {
     scan: ScanGeometry,
 }
 
-/// All ways of seeing elements.
-pub(crate) struct Ways(pub(crate) Vec<Way>);
+/// All sequences of facets that seeing elements have.
+pub(crate) struct FacetSequences(pub(crate) Vec<FacetSequence>);
 
-/// What the elements see together.
+/// The combined coverage of the elements.
 pub(crate) struct Field {
     pub(crate) covered_sr: f64,
     pub(crate) direct_sr: f64,
@@ -92,13 +93,13 @@ pub(crate) fn cells(sensor: &Sensor) -> Vec<Cell> {
     (0..scan.beams()).map(cell).collect()
 }
 
-impl Ways {
+impl FacetSequences {
     pub(crate) fn new(structure: &Structure, scan: &ScanGeometry, traced: &[&Traced]) -> Self {
         let mut beams: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
         for t in traced.iter().filter(|t| t.sees) {
             beams.entry(t.chief.facets().to_vec()).or_default().push(t.beam);
         }
-        let way = |(facets, beams): (Vec<usize>, Vec<usize>)| {
+        let sequence = |(facets, beams): (Vec<usize>, Vec<usize>)| {
             let turn = facets.iter().fold(Matrix3::identity(), |turn, &facet| {
                 let m = structure.facets[facet].face.normal.into_inner();
                 (Matrix3::identity() - m * m.transpose() * 2.0) * turn
@@ -110,7 +111,7 @@ impl Ways {
             for beam in 0..scan.beams() {
                 below[beam + 1] += below[beam];
             }
-            Way {
+            FacetSequence {
                 facets,
                 turn,
                 below,
@@ -118,16 +119,16 @@ impl Ways {
                 scan: *scan,
             }
         };
-        Self(beams.into_iter().map(way).collect())
+        Self(beams.into_iter().map(sequence).collect())
     }
 }
 
-impl Way {
+impl FacetSequence {
     fn holds(&self, beam: usize) -> bool {
         self.below[beam + 1] > self.below[beam]
     }
 
-    /// Elevation in the scan of a direction out there; its sine is one product.
+    /// Returns the sine of the elevation in the scan of an exit direction.
     fn sin_elevation(&self, direction: &Vector3<f64>) -> f64 {
         self.turn.column(2).dot(direction)
     }
@@ -138,7 +139,7 @@ impl Way {
         libm::atan2(along[1], along[0])
     }
 
-    /// Whether one of its cells holds a direction out there.
+    /// Whether one of its cells holds an exit direction.
     fn sees(&self, direction: &Vector3<f64>, cells: &[Cell], highest: f64) -> bool {
         let sin = self.sin_elevation(direction);
         if sin.abs() > highest {
@@ -148,7 +149,7 @@ impl Way {
         beam.is_some_and(|beam| self.holds(beam) && libm::asin(sin).abs() <= cells[beam].half_height)
     }
 
-    /// Whether one of its beams is within an angle of a direction out there; its sine and cosine are given.
+    /// Whether one of its beams is within an angle, given by its sine and cosine, of an exit direction.
     fn is_near(&self, direction: &Vector3<f64>, sin_near: f64, cos_near: f64) -> bool {
         let sin = self.sin_elevation(direction);
         if sin.abs() > sin_near {
@@ -177,27 +178,27 @@ impl Way {
     }
 }
 
-/// What all ways see together.
-pub(crate) fn field(ways: &Ways, cells: &[Cell], traced: &[&Traced]) -> Field {
+/// Computes the combined coverage of all sequences.
+pub(crate) fn field(sequences: &FacetSequences, cells: &[Cell], traced: &[&Traced]) -> Field {
     let highest = cells.iter().fold(0.0_f64, |h, c| h.max(libm::sin(c.half_height)));
     let seen_by = |(own, beam): &(usize, usize)| -> f64 {
-        let (way, before) = (&ways.0[*own], &ways.0[..*own]);
+        let (sequence, before) = (&sequences.0[*own], &sequences.0[..*own]);
         let seen = part_directions(&cells[*beam]).map(|(in_scan, weight)| {
-            let direction = way.turn * in_scan;
+            let direction = sequence.turn * in_scan;
             let counted = before.iter().any(|w| w.sees(&direction, cells, highest));
             if counted { 0.0 } else { weight }
         });
         seen.sum()
     };
-    let all = ways.0.iter().enumerate();
+    let all = sequences.0.iter().enumerate();
     let all: Vec<(usize, usize)> = all
-        .flat_map(|(own, way)| way.beams.iter().map(move |beam| (own, *beam)))
+        .flat_map(|(own, sequence)| sequence.beams.iter().map(move |beam| (own, *beam)))
         .collect();
-    // Added up in order, so that the sum is the same on any number of threads.
+    // Summed in order, so that the sum is the same on any number of threads.
     let seen: Vec<f64> = all.par_iter().with_min_len(AT_ONCE).map(seen_by).collect();
     let covered_sr = seen.iter().fold(0.0, |sum, seen| sum + seen);
-    let direct = ways.0.iter().filter(|way| way.facets.is_empty());
-    let direct = direct.flat_map(|way| &way.beams);
+    let direct = sequences.0.iter().filter(|sequence| sequence.facets.is_empty());
+    let direct = direct.flat_map(|sequence| &sequence.beams);
     let direct_sr = direct.fold(0.0, |sum, beam| sum + cells[*beam].solid_angle());
     let seeing = || traced.iter().filter(|t| t.sees).filter_map(|t| exit(&t.chief));
     let elevations: Vec<f64> = seeing()
@@ -209,14 +210,14 @@ pub(crate) fn field(ways: &Ways, cells: &[Cell], traced: &[&Traced]) -> Field {
     Field {
         covered_sr,
         direct_sr,
-        near: near(ways),
+        near: near(sequences),
         elevation_deg: (low <= high).then_some([low, high]),
         elevation_covered_deg: covered(elevations.iter().copied(), 90.0),
         azimuth_covered_deg: covered(azimuths, 180.0),
     }
 }
 
-/// The parts of a cell: a direction in the scan and a solid angle, which sum to the cell's.
+/// Returns the parts of a cell: each a direction in the scan and a solid angle; the solid angles sum to the cell's.
 fn part_directions(cell: &Cell) -> impl Iterator<Item = (Vector3<f64>, f64)> {
     let [along, across] = PARTS;
     let (azimuth, top, cell_width) = (cell.azimuth, libm::sin(cell.half_height), cell.width);
@@ -233,9 +234,9 @@ fn part_directions(cell: &Cell) -> impl Iterator<Item = (Vector3<f64>, f64)> {
     })
 }
 
-/// Share of all directions within [`NEAR_DEG`] of a beam, on a spiral of even density.
-fn near(ways: &Ways) -> f64 {
-    // π·(3 − √5): each turn of the spiral falls between those before.
+/// Returns the share of all directions within [`NEAR_DEG`] of a beam, on a spiral of uniform density.
+fn near(sequences: &FacetSequences) -> f64 {
+    // π·(3 − √5): each turn of the spiral falls between the previous ones.
     const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
     let (sin_near, cos_near) = libm::sincos(NEAR_DEG.to_radians());
     static DIRECTIONS: LazyLock<Vec<Vector3<f64>>> = LazyLock::new(|| {
@@ -248,15 +249,15 @@ fn near(ways: &Ways) -> f64 {
         (0..LATTICE).map(direction).collect()
     });
     let is_near = |direction: &&Vector3<f64>| {
-        ways.0
+        sequences.0
             .iter()
-            .any(|way| way.is_near(direction, sin_near, cos_near))
+            .any(|sequence| sequence.is_near(direction, sin_near, cos_near))
     };
     let directions = DIRECTIONS.par_iter().with_min_len(AT_ONCE);
     directions.filter(is_near).count() as f64 / LATTICE as f64
 }
 
-/// Number of whole degrees between −limit and limit in which a value lies.
+/// Returns the number of whole degrees between −limit and limit that contain a value.
 fn covered(values: impl Iterator<Item = f64>, limit: f64) -> f64 {
     let degrees: std::collections::BTreeSet<i64> = values
         // Within ±180.

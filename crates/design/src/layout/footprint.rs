@@ -1,8 +1,9 @@
-//! Footprints: where the 1/e² contour of a beam falls on each facet that its chief ray meets, and how far that is from the
-//! facet's edges.
+//! Footprints: the 1/e² contour of a beam on each facet that its chief ray hits, and its distance from the facet's
+//! edges.
 //!
-//! The contour's rays are taken along the chief ray's facets as if those were unbounded planes, so that an outline that an
-//! edge cuts is whole and its margin negative. Glass moves a footprint by less than its own thickness; it is left out.
+//! The rays of the contour are reflected by the chief ray's facets as if those were unbounded planes, so that the
+//! outline of a footprint is complete even where an edge cuts it, and its margin is then negative. Glass moves a
+//! footprint by less than its own thickness; this is neglected.
 
 use super::element::Traced;
 use catoptric_cast::Polygon;
@@ -13,34 +14,34 @@ use catoptric_sim::light::footprint::{SubRay, ray};
 use catoptric_sim::receive::Sensor;
 use nalgebra::{Point3, Vector3};
 
-/// Rays of a contour.
+/// Number of rays of a contour.
 pub const OUTLINE: usize = 16;
 
-/// Where a beam falls on a facet.
+/// The footprint of a beam on a facet.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Footprint {
     /// The beam.
     pub beam: usize,
-    /// The facet, by its number.
+    /// Number of the facet.
     pub facet: usize,
-    /// Facets met before it.
+    /// Number of facets hit before it.
     pub bounce: usize,
-    /// Where the chief ray meets it, in the sensor frame, in metres.
+    /// Point where the chief ray hits it, in the sensor frame, in meters.
     pub center: Point3<f64>,
-    /// Where the contour does.
+    /// Points where the rays of the contour hit it.
     pub outline: [Point3<f64>; OUTLINE],
-    /// Least distance from the contour to an edge, in millimetres; negative beyond it.
+    /// Minimum distance from the contour to an edge, in millimeters; negative beyond it.
     pub margin_mm: f64,
-    /// Least distance from the contour to an edge that runs more along the scan's line on the facet than across it: above
-    /// and below; `None` without such an edge.
+    /// Minimum distance from the contour to the edges above and below, those that are more parallel to the scan's line
+    /// on the facet than perpendicular; `None` without such an edge.
     pub across_mm: Option<f64>,
-    /// Distance between neighboring beams on the facet, in millimetres.
+    /// Distance between neighboring beams on the facet, in millimeters.
     pub spacing_mm: f64,
     /// `margin_mm` over `spacing_mm`.
     pub margin_beams: f64,
 }
 
-/// What footprints are made of: the contour of a beam, and the edges of the facets.
+/// The inputs of footprints: the contour of a beam, and the edges of the facets.
 pub(crate) struct Outlines<'a> {
     sensor: &'a Sensor,
     structure: &'a Structure,
@@ -65,7 +66,7 @@ impl<'a> Outlines<'a> {
         }
     }
 
-    /// The footprints of a beam, in order of the bounces.
+    /// Returns the footprints of a beam, in order of the bounces.
     pub(crate) fn of(&self, traced: &Traced) -> Vec<Footprint> {
         let facets = traced.chief.facets();
         if facets.is_empty() {
@@ -115,7 +116,7 @@ impl<'a> Outlines<'a> {
     }
 }
 
-/// An edge of a polygon: the direction in the plane that points inwards, and its product with the edge's points.
+/// An edge of a polygon: the in-plane unit vector that points inward, and its product with the edge's points.
 struct Edge {
     inwards: Vector3<f64>,
     offset: f64,
@@ -136,7 +137,7 @@ fn edges(face: &Polygon) -> Vec<Edge> {
         .collect()
 }
 
-/// A ray after its reflection in the plane of a face, as if that had no end.
+/// Reflects a ray in the unbounded plane of a face.
 fn reflected(ray: &Ray, face: &Polygon) -> Ray {
     let closing = face.normal.dot(&ray.direction);
     let distance = face.normal.dot(&(face.origin - ray.origin)) / closing;

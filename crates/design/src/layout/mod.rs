@@ -1,21 +1,21 @@
-//! What a mirror layout sees, loses and allows: everything that can be said before a mirror is cut.
+//! What a mirror layout sees, loses and allows: the analysis that is possible before a mirror is cut.
 //!
-//! Without noise, through the same beams of sub-rays as [`simulate`](catoptric_sim::Laboratory), so that the class of
-//! every element is the one the truth of a recording states. [`analyze`] is cheap: with [`Detail::Coarse`] (one ray per
+//! The analysis is noise-free and uses the same sub-rays as [`simulate`](catoptric_sim::Laboratory), so that the class
+//! of every element is that of the truth of a recording. [`analyze`] is cheap: with [`Detail::Coarse`] (one ray per
 //! beam) it takes a few milliseconds, and a search can call it thousands of times. [`predict`], the accuracy that a
-//! calibration can reach, looks at every board of the experiment and takes longer.
+//! calibration can reach, simulates every board pose of the experiment and takes longer.
 //!
-//! **Field of regard.** A scanner's beams are discrete, so an element is given a cell of directions: along the scan half-way
-//! to its neighbors, across it as far as the 1/e² contour of its own beam reaches,
+//! **Field of regard.** A scanner's beams are discrete, so an element is given a cell of directions: along the scan
+//! half-way to its neighbors, across it up to the 1/e² contour of its own beam,
 //!
 //! ```text
 //! cell = [θ_b − step/2, θ_b + step/2] × [−δ/2, δ/2]      Ω = step·2·sin(δ/2)      δ² = (δ_wide·sin θ_b)² + (δ_narrow·cos θ_b)²
 //! ```
 //!
-//! (δ = δ_narrow where the spot does not turn). A plane mirror keeps solid angles, so that one flat facet sees ΣΩ over its
-//! elements, whatever its pose. The field of regard is the share of 4π that the cells of all unsplit elements cover, each
-//! direction counted once. Beside it stands the share of directions within 5° of a beam, for those who move the rig or
-//! look for large things.
+//! (δ = δ_narrow where the spot does not turn). A plane mirror preserves solid angles, so a flat facet covers ΣΩ over
+//! its elements, whatever its pose. The field of regard is the share of 4π that the cells of all unsplit elements
+//! cover, each direction counted once. The share of directions within 5° of a beam is reported as well, for users who
+//! move the rig or look for large objects.
 //!
 //! ```
 //! use catoptric::{layout, sim};
@@ -37,10 +37,10 @@ mod element;
 mod facet;
 mod field;
 mod footprint;
+mod incremental;
 mod require;
 mod sensitivity;
 mod size;
-mod ways;
 
 pub use accuracy::{Accuracy, FacetAccuracy, predict};
 pub use depth::{Depth, depth};
@@ -50,12 +50,12 @@ pub(crate) use element::{Traced, exit, trace};
 pub use facet::FacetView;
 pub use field::{Cell, NEAR_DEG};
 pub use footprint::{Footprint, OUTLINE};
+pub use incremental::Layout;
 pub(crate) use require::numbers;
 pub use require::{Requirement, RequirementError, Unmet, figures};
 pub use sensitivity::center;
 pub(crate) use size::plate_thickness;
 pub use size::{MIRROR_DENSITY, POST_DENSITY, Size};
-pub use ways::Layout;
 
 use catoptric_model::ScanGeometry;
 use catoptric_sim::build::Structure;
@@ -64,20 +64,20 @@ use catoptric_sim::{Scene, SimError};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Version of what an analysis is written as.
+/// Version of the format of an analysis.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// Ranges at which the spot is stated, in metres.
+/// Ranges at which the spot is stated, in meters.
 pub const SPOT_RANGES_M: [f64; 3] = [1.0, 4.0, 10.0];
 
-/// How closely to look.
+/// Level of detail of an analysis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Detail {
     /// The scene's own sub-rays.
     #[default]
     Full,
-    /// One ray per beam: elements that an edge cuts are not told from others.
+    /// One ray per beam: elements that an edge cuts are not distinguished.
     Coarse,
 }
 
@@ -90,15 +90,15 @@ pub struct Analysis {
     pub name: String,
     /// Seed of the structure as built; `None` for the drawing.
     pub seed: Option<u64>,
-    /// Sub-rays per beam.
+    /// Number of sub-rays per beam.
     pub sub_rays: usize,
-    /// Elements of each class.
+    /// Number of elements of each class.
     pub counts: BTreeMap<Class, usize>,
-    /// Elements with a direction of their own: direct, deflected, or leaving after several mirrors.
+    /// Number of elements with a direction of their own: direct, deflected, or leaving after several mirrors.
     pub seeing: usize,
-    /// Elements without one.
+    /// Number of elements without one.
     pub lost: usize,
-    /// Elements whose chief ray's way ends at a facet: facets that shade others, or are seen from behind.
+    /// Number of elements whose chief ray ends on a facet: on one that shades others, or on the back of one.
     pub stopped_by_facets: usize,
     /// Longest run of neighboring elements without one, in degrees of the scan.
     pub largest_gap_deg: f64,
@@ -106,11 +106,11 @@ pub struct Analysis {
     pub field_of_regard: f64,
     /// The same in steradians.
     pub solid_angle_sr: f64,
-    /// Part of it that undeflected elements cover, as a share of 4π.
+    /// Share of 4π that undeflected elements cover.
     pub direct_field_of_regard: f64,
     /// Share of all directions within 5° of a seeing element's beam.
     pub share_within_5_deg: f64,
-    /// Least and greatest elevation of a seeing element, in degrees; `None` without any.
+    /// Minimum and maximum elevation of a seeing element, in degrees; `None` without any.
     pub elevation_deg: Option<[f64; 2]>,
     /// Degrees of elevation, of 180, in which an element looks.
     pub elevation_covered_deg: f64,
@@ -118,55 +118,55 @@ pub struct Analysis {
     pub azimuth_covered_deg: f64,
     /// Facet by facet.
     pub facets: Vec<FacetView>,
-    /// Spot and spacing of the beams over the range.
+    /// Spot and spacing of the beams at several ranges.
     pub spots: Vec<Spot>,
     /// Size, mirror area and mass.
     pub size: Size,
-    /// What a calibration can reach; `None` where nobody asked.
+    /// The accuracy that a calibration can reach; `None` if not requested.
     pub accuracy: Option<Accuracy>,
-    /// Neighboring elements with one fate, in order.
-    pub runs: Vec<Run>,
+    /// Runs of neighboring elements that end the same way, in order.
+    pub runs: Vec<ElementRun>,
     /// Every element.
     pub elements: Vec<Element>,
 }
 
-/// Spot and spacing at a range, whatever mirrors are on the way: a plane mirror changes neither.
+/// Spot and spacing at a range; they do not depend on the mirrors of the path, since a plane mirror changes neither.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Spot {
-    /// Length of the way from the scanner, in metres.
+    /// Length of the path from the scanner, in meters.
     pub range_m: f64,
-    /// Full width of the 1/e² contour along its long axis, in millimetres.
+    /// Full width of the 1/e² contour along its long axis, in millimeters.
     pub wide_mm: f64,
-    /// Full width along its short axis, in millimetres.
+    /// Full width along its short axis, in millimeters.
     pub narrow_mm: f64,
-    /// Distance between neighboring beams of a fan, in millimetres.
+    /// Distance between neighboring beams of a fan, in millimeters.
     pub spacing_mm: f64,
 }
 
-/// Neighboring elements of one class that meet the same things; a run ends where the scan does.
+/// A run of neighboring elements of one class that hit the same surfaces.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Run {
+pub struct ElementRun {
     /// First and last beam.
     pub beams: [usize; 2],
-    /// Azimuths that they take up in the scan, in degrees, the smaller first.
+    /// Interval of azimuth in the scan, in degrees.
     pub azimuth_deg: [f64; 2],
     /// Their class.
     pub class: Class,
-    /// Facets that they meet.
+    /// Facets that they hit.
     pub facets: Vec<String>,
-    /// What ends their way.
+    /// What their paths end on.
     pub stopped_by: Option<String>,
 }
 
-/// Looks at a layout: as drawn, or as built under a seed.
+/// Analyzes a layout: as drawn, or as built under a seed.
 ///
 /// # Errors
-/// [`SimError`] for a facet without a shape, an unknown color or a mesh that nobody has read.
+/// [`SimError`] for a facet without a shape, an unknown color or a mesh that has not been read.
 pub fn analyze(scene: &Scene, seed: Option<u64>, detail: Detail) -> Result<Analysis, SimError> {
     Layout::new(scene, seed, detail)?.analysis()
 }
 
-/// What is said of a layout whose beams are known.
+/// Returns the results for a layout whose beams have been traced.
 fn analysis(layout: &Layout, names: &[&str], traced: &[&Traced], footprints: &[&Footprint]) -> Analysis {
     let Layout {
         scene,
@@ -174,10 +174,10 @@ fn analysis(layout: &Layout, names: &[&str], traced: &[&Traced], footprints: &[&
         sensor,
         ..
     } = layout;
-    let ways = field::Ways::new(structure, sensor.scan(), traced);
+    let sequences = field::FacetSequences::new(structure, sensor.scan(), traced);
     let cells = field::cells(sensor);
     let elements = element::elements(scene, sensor.scan(), structure, names, traced, footprints);
-    let field = field::field(&ways, &cells, traced);
+    let field = field::field(&sequences, &cells, traced);
     let mut counts: BTreeMap<Class, usize> = Class::ALL.map(|class| (class, 0)).into();
     for element in &elements {
         *counts.entry(element.class).or_default() += 1;
@@ -213,7 +213,8 @@ fn analysis(layout: &Layout, names: &[&str], traced: &[&Traced], footprints: &[&
 /// Solid angle of all directions.
 pub(crate) const SPHERE_SR: f64 = 4.0 * std::f64::consts::PI;
 
-/// 1/e² full widths of the beam at a range, from its divergence and its width where it leaves.
+/// Returns the 1/e² full widths of the beam at every range, from its divergence and its width at the exit of the
+/// scanner.
 fn spots(sensor: &Sensor) -> Vec<Spot> {
     let shape = sensor.shape();
     let width = |aperture_mm: f64, full_mrad: f64, range: f64| {
@@ -229,7 +230,7 @@ fn spots(sensor: &Sensor) -> Vec<Spot> {
         .to_vec()
 }
 
-fn runs(elements: &[Element], scan: &ScanGeometry) -> Vec<Run> {
+fn runs(elements: &[Element], scan: &ScanGeometry) -> Vec<ElementRun> {
     let same =
         |a: &Element, b: &Element| a.class == b.class && a.facets == b.facets && a.stopped_by == b.stopped_by;
     let half_step = 0.5 * scan.step().to_degrees();
@@ -237,7 +238,7 @@ fn runs(elements: &[Element], scan: &ScanGeometry) -> Vec<Run> {
         .chunk_by(same)
         .filter_map(|run| {
             let (first, last) = (run.first()?, run.last()?);
-            Some(Run {
+            Some(ElementRun {
                 beams: [first.beam, last.beam],
                 azimuth_deg: [
                     first.scan_azimuth_deg.min(last.scan_azimuth_deg) - half_step,

@@ -1,42 +1,42 @@
-//! Requirements on a layout: `field_of_regard>=0.004`, for whoever builds a pipeline on it.
+//! Requirements on a layout, such as `field_of_regard>=0.004`, for pipelines that check layouts automatically.
 //!
-//! Every number of the JSON but those of single elements has a name: its keys joined by dots, facets by their names, other
-//! lists by place. `*` in the place of a facet's name means every facet.
+//! Every number of the JSON except those of single elements has a name: its keys joined by dots, facets by their names,
+//! other lists by index. `*` instead of a facet's name means every facet.
 
 use super::Analysis;
 use catoptric_model::place::nearest;
 use serde_json::Value;
 use std::fmt;
 
-/// A limit that a figure has to keep.
+/// A limit on a figure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Requirement {
     key: String,
     comparison: Comparison,
     limit: f64,
-    /// As it was written.
+    /// The text as written.
     text: String,
 }
 
-/// A requirement that a layout does not meet, in words.
+/// Description of a requirement that a layout does not meet.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Unmet(String);
 
-/// Why a requirement is none.
+/// Why a requirement is invalid.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum RequirementError {
-    /// It is no comparison of a name with a number.
-    #[error("{text:?} is no requirement: it takes a name, one of >= <= > <, and a number")]
+    /// Not a comparison of a name with a number.
+    #[error("{text:?} is not a requirement: it takes a name, one of >= <= > <, and a number")]
     Form {
-        /// What was written.
+        /// The text as written.
         text: String,
     },
     /// Nothing has that name.
-    #[error("{key:?} is no figure")]
+    #[error("{key:?} is not a figure")]
     Unknown {
         /// The name.
         key: String,
-        /// The one that was probably meant, or some of those there are.
+        /// The name that was probably meant, or some of the existing ones.
         help: String,
     },
 }
@@ -58,7 +58,7 @@ const SIGNS: [(&str, Comparison); 4] = [
 ];
 
 impl RequirementError {
-    /// What to do about it, where that is known.
+    /// Returns advice on how to correct it, where there is any.
     pub fn help(&self) -> Option<String> {
         match self {
             Self::Form { .. } => None,
@@ -68,7 +68,7 @@ impl RequirementError {
 }
 
 impl Requirement {
-    /// Reads a requirement.
+    /// Parses a requirement.
     ///
     /// ```
     /// use catoptric_design::layout::Requirement;
@@ -77,7 +77,7 @@ impl Requirement {
     /// ```
     ///
     /// # Errors
-    /// [`RequirementError::Form`] for anything that is no comparison of a name with a number.
+    /// [`RequirementError::Form`] for anything that is not a comparison of a name with a number.
     pub fn parse(text: &str) -> Result<Self, RequirementError> {
         let form = || RequirementError::Form {
             text: text.to_owned(),
@@ -99,10 +99,10 @@ impl Requirement {
         })
     }
 
-    /// Whether a layout meets it; a figure that has no value meets no limit.
+    /// Checks it on a layout; a figure without a value meets no limit.
     ///
     /// # Errors
-    /// [`RequirementError::Unknown`] if no figure has its name.
+    /// [`RequirementError::Unknown`] if no figure has that name.
     pub fn judge(&self, analysis: &Analysis) -> Result<Vec<Unmet>, RequirementError> {
         self.judge_figures(
             &analysis.name,
@@ -111,7 +111,7 @@ impl Requirement {
         )
     }
 
-    /// The same for any figures with names, of something with a name itself.
+    /// Checks it on the named figures of any named object.
     pub(crate) fn judge_figures(
         &self,
         name: &str,
@@ -136,20 +136,20 @@ impl Requirement {
         let unmet = all
             .into_iter()
             .filter(|(_, value)| !value.is_some_and(|v| self.holds(v)));
-        let words = |(key, value): &(String, Option<f64>)| match value {
+        let describe = |(key, value): &(String, Option<f64>)| match value {
             Some(value) => Unmet(format!("{name}: {key} is {value}, required {}", self.text)),
             None => Unmet(format!("{name}: {key} has no value, required {}", self.text)),
         };
-        Ok(unmet.map(words).collect())
+        Ok(unmet.map(describe).collect())
     }
 
-    /// The name of the figure.
+    /// Returns the name of the figure.
     pub(crate) fn key(&self) -> &str {
         &self.key
     }
 
-    /// How far figures are from meeting it, as a share of its limit and summed over all it names; 1 for one without a
-    /// value.
+    /// Returns the relative violation: the distance of figures from the limit over the limit, summed over all figures
+    /// it names; 1 for a figure without a value.
     pub(crate) fn shortfall(&self, figures: &[(String, Option<f64>)]) -> f64 {
         let named = figures.iter().filter(|(key, _)| matches(&self.key, key));
         let scale = if self.limit == 0.0 { 1.0 } else { self.limit.abs() };
@@ -184,9 +184,10 @@ impl fmt::Display for Unmet {
     }
 }
 
-/// Every number of an analysis with its name, those of single elements and runs aside; `None` for one without a value.
+/// Returns every number of an analysis with its name, except those of single elements and runs; `None` for one without
+/// a value.
 pub fn figures(analysis: &Analysis) -> Vec<(String, Option<f64>)> {
-    // An analysis has string keys and finite numbers: it is always a value.
+    // An analysis has string keys and finite numbers, so its conversion cannot fail.
     let value = serde_json::to_value(Analysis {
         elements: Vec::new(),
         runs: Vec::new(),
@@ -198,7 +199,7 @@ pub fn figures(analysis: &Analysis) -> Vec<(String, Option<f64>)> {
     )
 }
 
-/// Every number of an object with its name, save for those below some keys; `None` for one without a value.
+/// Returns every number of an object with its name, except those below the given keys; `None` for one without a value.
 pub(crate) fn numbers(object: &Value, skipped: &[&str]) -> Vec<(String, Option<f64>)> {
     let mut found = Vec::new();
     for (key, value) in object.as_object().into_iter().flatten() {
@@ -229,16 +230,16 @@ fn collect(key: &str, value: &Value, found: &mut Vec<(String, Option<f64>)>) {
     }
 }
 
-/// Whether a name, perhaps with `*` for a facet, is a figure's.
+/// Whether a pattern, perhaps with `*` for a facet, matches the name of a figure.
 fn matches(pattern: &str, key: &str) -> bool {
     pattern == key || pattern == starred(key)
 }
 
-/// A facet's figure under the name of all facets' figures.
+/// Returns the name of a facet's figure with `*` for the facet.
 fn starred(key: &str) -> String {
     for list in ["accuracy.facets.", "facets."] {
         if let Some(rest) = key.strip_prefix(list)
-            // Names may hold dots, figures of facets do not, but for those of several numbers.
+            // Names of facets may hold dots; names of their figures do not, except those of several numbers.
             && let Some(figure) = FACET_FIGURES.iter().find(|f| rest.ends_with(**f)).copied()
         {
             return format!("{list}*{figure}");
@@ -252,7 +253,7 @@ fn starred(key: &str) -> String {
     key.to_owned()
 }
 
-/// Figures of a facet that are several numbers.
+/// Figures of a facet that consist of several numbers.
 const FACET_FIGURES: [&str; 16] = [
     ".beams.0",
     ".beams.1",

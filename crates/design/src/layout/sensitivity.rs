@@ -1,30 +1,31 @@
-//! How far a point moves when a facet is not where it is drawn.
+//! Sensitivity of a measured point to errors of the facets.
 //!
-//! Reading r of a beam that meets the facets 1…n is the point P = M_n ∘ … ∘ M_1 (r·u), M_k being the reflection of points
-//! in plane k, {m·x = h}: x ↦ x − 2(m·x − h)m. A facet that is turned by ω about its center c and shifted by t has
-//! m + ω×m and h + δh with δh = (ω×m)·c + m·t, and moves the image of x by
+//! A reading r of a beam that hits the facets 1…n is the point P = M_n ∘ … ∘ M_1 (r·u), where M_k is the reflection of
+//! points in plane k, {m·x = h}: x ↦ x − 2(m·x − h)m. A facet turned by ω about its center c and shifted by t has m +
+//! ω×m and h + δh with δh = (ω×m)·c + m·t, and moves the image of x by
 //!
 //! ```text
 //! δM(x) = −2·[m (x − c)ᵀ + (m·x − h)·I]·(ω×m) + 2·(m·t)·m
 //! ```
 //!
-//! which the mirrors behind it turn like any direction. A turn about the normal and a shift along the plane move nothing.
-//! Glass moves with its facet, so it does not count here; it adds a walk of its own millimetres times the turn.
+//! which the mirrors behind it reflect like any direction. A turn about the normal and a shift along the plane move
+//! nothing. Glass moves with its facet and is neglected here; its effect is about its thickness in millimeters times
+//! the turn.
 
 use catoptric_cast::Polygon;
 use catoptric_model::beam;
 use catoptric_model::frame::tangent_basis;
 use nalgebra::{Matrix3, Matrix3x2, Point3, Vector3};
 
-/// Reading for which it is stated, in metres from the scanner.
+/// Reading for which the sensitivity is stated, in meters from the scanner.
 pub(super) const RANGE_M: f64 = 4.0;
 
-/// How the point of one reading moves with one facet.
+/// Derivatives of the point of one reading by the pose of one facet.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Shift {
-    /// With a turn of the facet about the two axes of its plane, in metres per radian.
+    /// By a turn of the facet about the two axes of its plane, in meters per radian.
     pub(super) turn: Matrix3x2<f64>,
-    /// With a shift of the facet along its normal, without unit.
+    /// By a shift of the facet along its normal, dimensionless.
     pub(super) shift: Vector3<f64>,
 }
 
@@ -40,7 +41,7 @@ impl std::ops::Add for Shift {
 }
 
 impl Shift {
-    /// Largest movement over the directions of a turn, in metres per radian: the greater singular value.
+    /// Returns the maximum displacement over all axes of a turn, in meters per radian: the larger singular value.
     pub(super) fn worst_turn(&self) -> f64 {
         let square = self.turn.transpose() * self.turn;
         let half = 0.5 * square.trace();
@@ -75,7 +76,7 @@ pub(super) fn shifts<'f>(azimuth: f64, faces: impl Iterator<Item = &'f Polygon>,
     shifts
 }
 
-/// Mean of the corners, about which a facet is turned.
+/// Returns the mean of the corners, about which a facet is turned.
 pub fn center(corners: &[Point3<f64>]) -> Point3<f64> {
     Point3::from(corners.iter().map(|c| c.coords).sum::<Vector3<f64>>() / corners.len().max(1) as f64)
 }
@@ -115,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn derivatives_over_two_mirrors_are_finite_differences() {
+    fn derivatives_for_two_mirrors_are_finite_differences() {
         /// Ten steps of 0.25°.
         const AZIMUTH: f64 = 2.5 * std::f64::consts::PI / 180.0;
         let faces = [

@@ -14,31 +14,31 @@ pub const MIRROR_DENSITY: f64 = 2500.0;
 /// Density of posts and frame, in kg/m³: solid polylactide as printed (NatureWorks Ingeo 4043D, data sheet).
 pub const POST_DENSITY: f64 = 1240.0;
 
-/// Thickness taken for mirrors that are drawn without one, in metres.
-const LEAST_THICKNESS: f64 = 1e-3;
+/// Thickness assumed for mirrors drawn without one, in meters.
+const MIN_THICKNESS: f64 = 1e-3;
 
 /// Size, mirror area and mass.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Size {
-    /// Extents of mirrors, posts and housing along the axes of the sensor frame, in millimetres.
+    /// Extents of mirrors, posts and housing along the axes of the sensor frame, in millimeters.
     pub extent_mm: [f64; 3],
-    /// Diameter about the scanner's axis, in millimetres.
+    /// Diameter about the scanner's axis, in millimeters.
     pub diameter_mm: f64,
-    /// Extent along that axis, in millimetres.
+    /// Extent along that axis, in millimeters.
     pub height_mm: f64,
-    /// Area of all mirrors, in square millimetres.
+    /// Area of all mirrors, in square millimeters.
     pub mirror_area_mm2: f64,
     /// Mass of the mirrors as glass of `superstructure.mirror.thickness_mm`, in grams.
     pub mirror_mass_g: f64,
     /// Mass of the posts as solid printed plastic, in grams.
     pub post_mass_g: f64,
-    /// Both, without the scanner.
+    /// Mass of mirrors and posts, without the scanner, in grams.
     pub structure_mass_g: f64,
-    /// Mass of the scanner without its cable by its data sheet, in grams; `None` for one of your own.
+    /// Mass of the scanner without its cable by its data sheet, in grams; `None` for a custom one.
     pub scanner_mass_g: Option<f64>,
 }
 
-/// Measures a structure.
+/// Computes size, area and mass of a structure.
 pub(crate) fn size(scene: &Scene, structure: &Structure) -> Size {
     let mut points: Vec<Point3<f64>> = structure
         .facets
@@ -82,13 +82,13 @@ pub(crate) fn size(scene: &Scene, structure: &Structure) -> Size {
     }
 }
 
-/// Thickness of a mirror as a plate, in metres: with its glass, if that is thicker.
+/// Returns the thickness of a mirror as a plate, in meters: with its glass, if that is thicker.
 pub(crate) fn plate_thickness(scene: &Scene) -> f64 {
     let mirror = &scene.superstructure.mirror;
     let glass = mirror.glass.map_or(0.0, |g| g.thickness_mm);
     let drawn = 1e-3 * mirror.thickness_mm.max(glass);
-    if drawn > 0.0 { drawn } else { LEAST_THICKNESS }
+    if drawn > 0.0 { drawn } else { MIN_THICKNESS }
 }
 
-/// What the parts of the scanner's own housing are called.
+/// Name of the parts of the scanner's own housing.
 pub(crate) const HOUSING: &str = "housing";

@@ -1,46 +1,46 @@
-//! One choice of the parameters, and what it comes to.
+//! Candidates of the search: a choice of parameter values with the goals and requirements of its layout.
 
 use super::goal::{Goal, requires_accuracy};
-use super::{Open, OptimizeError, Options};
+use super::{OpenParameter, OptimizeError, Options};
 use crate::layout::{self, Analysis, Layout};
 use catoptric_files::parametric::ParametricScene;
 use catoptric_sim::Scene;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Steps into which a parameter's way from one limit to the other is cut at least, so that what is written is what was
-/// looked at.
+/// Minimum number of steps between a parameter's limits. Values are rounded to decimal steps, so that the value written
+/// is the value evaluated.
 const STEPS: f64 = 1e4;
 
-/// One choice of the parameters, and what it comes to.
+/// A choice of parameter values, with the results for its layout.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Candidate {
-    /// The how manieth layout that was looked at; 0 is the start.
+    /// Number of the layout in order of evaluation; 0 is the start.
     pub number: usize,
-    /// The parameters.
+    /// Values of the parameters.
     pub parameters: BTreeMap<String, f64>,
-    /// The goals; none for a scene that is refused.
+    /// Values of the goals; empty for a scene that is refused.
     pub goals: BTreeMap<String, f64>,
-    /// Requirements that it does not meet, or why the scene is refused, in words.
+    /// Requirements that it does not meet, or why the scene is refused, as text.
     pub unmet: Vec<String>,
-    /// Where it is between the limits, each 0 to 1.
+    /// Position between the limits, 0 to 1 for each parameter.
     #[serde(skip)]
     pub(super) place: Vec<f64>,
-    /// The goals so that less is better.
+    /// Costs: the goals with signs such that less is better.
     #[serde(skip)]
     pub(super) costs: Vec<f64>,
-    /// How far it is from the requirements, as shares of the limits.
+    /// Violation of the requirements, as a fraction of their limits.
     #[serde(skip)]
     pub(super) shortfall: f64,
 }
 
 impl Candidate {
-    /// Whether it is a scene that keeps every requirement.
+    /// Whether it is a valid scene that meets every requirement.
     pub fn is_kept(&self) -> bool {
         self.unmet.is_empty()
     }
 
-    /// Its parameters as a choice.
+    /// Returns its parameters as name and value.
     pub fn choice(&self) -> Vec<(&str, f64)> {
         self.parameters
             .iter()
@@ -48,7 +48,7 @@ impl Candidate {
             .collect()
     }
 
-    /// Its goals in their order.
+    /// Returns its goals in the order given.
     pub(super) fn goals(&self, goals: &[Goal]) -> Vec<f64> {
         goals
             .iter()
@@ -57,21 +57,21 @@ impl Candidate {
     }
 }
 
-/// What looks at candidates.
+/// Evaluates candidates.
 pub(super) struct Judge<'a> {
     template: &'a ParametricScene,
-    parameters: &'a [Open],
+    parameters: &'a [OpenParameter],
     options: &'a Options,
     accuracy: bool,
-    /// The scene as it is, of which a candidate mostly is a part changed.
+    /// The unchanged scene's layout; most candidates differ from it in part only.
     start: Layout,
 }
 
 impl<'a> Judge<'a> {
-    /// Checks that goals and requirements are about something.
+    /// Checks that goals and requirements name existing figures.
     pub(super) fn new(
         template: &'a ParametricScene,
-        parameters: &'a [Open],
+        parameters: &'a [OpenParameter],
         options: &'a Options,
     ) -> Result<Self, OptimizeError> {
         let accuracy = options.goals.iter().any(Goal::needs_accuracy)
@@ -98,17 +98,17 @@ impl<'a> Judge<'a> {
         self.parameters.len()
     }
 
-    /// Where the scene as it is stands between the limits.
+    /// Returns the position of the unchanged scene between the limits.
     pub(super) fn start(&self) -> Vec<f64> {
-        let place = |p: &Open| (p.start - p.low) / (p.high - p.low);
+        let place = |p: &OpenParameter| (p.start - p.low) / (p.high - p.low);
         self.parameters.iter().map(place).collect()
     }
 
-    /// Names and numbers of a place between the limits.
+    /// Returns the parameter values at a position between the limits.
     fn numbers(&self, place: &[f64]) -> Vec<f64> {
-        let one = |(open, x): (&Open, &f64)| {
+        let one = |(open, x): (&OpenParameter, &f64)| {
             let number = open.low + x * (open.high - open.low);
-            // Decimals, so that the number is short to write.
+            // Rounded to decimals, so that the value is short to write.
             let mut unit = 1.0;
             while unit * (open.high - open.low) < STEPS {
                 unit *= 10.0;
@@ -118,21 +118,21 @@ impl<'a> Judge<'a> {
         self.parameters.iter().zip(place).map(one).collect()
     }
 
-    /// Looks at the candidate at a place.
+    /// Evaluates the candidate at a position.
     pub(super) fn candidate(&self, number: usize, place: &[f64]) -> Candidate {
         let numbers = if place == self.start() {
             self.parameters.iter().map(|p| p.start).collect()
         } else {
             self.numbers(place)
         };
-        let (mut found, _) = self.look(&numbers);
+        let (mut found, _) = self.evaluate(&numbers);
         found.number = number;
         found.place = place.to_vec();
         found
     }
 
-    /// Looks at a choice of numbers, in the order of the parameters.
-    pub(super) fn look(&self, numbers: &[f64]) -> (Candidate, Option<Analysis>) {
+    /// Evaluates a choice of values, in the order of the parameters.
+    pub(super) fn evaluate(&self, numbers: &[f64]) -> (Candidate, Option<Analysis>) {
         let names = self.parameters.iter().map(|p| p.name.clone());
         let mut candidate = Candidate {
             number: 0,
@@ -189,7 +189,7 @@ impl<'a> Judge<'a> {
         Ok(analysis)
     }
 
-    pub(super) fn parameters(&self) -> &[Open] {
+    pub(super) fn parameters(&self) -> &[OpenParameter] {
         self.parameters
     }
 }

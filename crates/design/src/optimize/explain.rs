@@ -1,4 +1,5 @@
-//! Why the best layout is better: what became of the elements, and what each parameter has to do with it.
+//! Explains why the best layout is better: how the classes of its elements changed, and the contribution of each
+//! parameter.
 
 use super::candidate::{Candidate, Judge};
 use crate::layout::{Analysis, Class};
@@ -9,38 +10,38 @@ use std::collections::BTreeMap;
 /// Why the best layout is better than the start.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Why {
-    /// Elements of each class, at the start and in the best.
+    /// Number of elements of each class, at the start and in the best.
     pub elements: BTreeMap<Class, [usize; 2]>,
-    /// Elements that each facet deflects alone, at the start and in the best.
+    /// Number of elements that each facet deflects alone, at the start and in the best.
     pub facets: BTreeMap<String, [usize; 2]>,
-    /// The best with one parameter as it was at the start, each by itself, what costs most first.
+    /// The best layout with one parameter at a time reset to its start value, the costliest first.
     pub left_as_it_was: Vec<LeftAsItWas>,
 }
 
-/// The best layout with one parameter as it was at the start.
+/// The best layout with one parameter reset to its start value.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LeftAsItWas {
     /// The parameter.
     pub parameter: String,
-    /// What it was.
+    /// Value at the start.
     pub start: f64,
-    /// What it is in the best.
+    /// Value in the best layout.
     pub best: f64,
-    /// The goals then; none for a scene that is refused.
+    /// The goals of the layout with the reset parameter; empty for a scene that is refused.
     pub goals: BTreeMap<String, f64>,
-    /// Requirements that are not met then.
+    /// Requirements that this layout does not meet.
     pub unmet: Vec<String>,
 }
 
-/// Compares; `None` if either is refused.
+/// Compares start and best; `None` if either is refused.
 pub(super) fn explain(judge: &Judge<'_>, start: &Candidate, best: &Candidate) -> Option<Why> {
     let numbers = |c: &Candidate| -> Vec<f64> {
         let names = judge.parameters().iter();
         names.filter_map(|p| c.parameters.get(&p.name).copied()).collect()
     };
     let (from, to) = (numbers(start), numbers(best));
-    let (_, at_start) = judge.look(&from);
-    let (_, at_best) = judge.look(&to);
+    let (_, at_start) = judge.evaluate(&from);
+    let (_, at_best) = judge.evaluate(&to);
     let (at_start, at_best) = (at_start?, at_best?);
     let count = |a: &Analysis, class: Class| a.counts.get(&class).copied().unwrap_or(0);
     let pairs = Class::ALL.map(|c| (c, [count(&at_start, c), count(&at_best, c)]));
@@ -55,7 +56,7 @@ pub(super) fn explain(judge: &Judge<'_>, start: &Candidate, best: &Candidate) ->
         .map(|i| {
             let mut numbers = to.clone();
             numbers[i] = from[i];
-            let (without, _) = judge.look(&numbers);
+            let (without, _) = judge.evaluate(&numbers);
             let left = LeftAsItWas {
                 parameter: judge.parameters()[i].name.clone(),
                 start: from[i],
@@ -74,7 +75,7 @@ pub(super) fn explain(judge: &Judge<'_>, start: &Candidate, best: &Candidate) ->
     })
 }
 
-/// The greatest loss in a goal, as a share of what was gained in it; without limit if requirements are broken.
+/// Returns the largest loss in a goal, as a fraction of what was gained in it; infinite if a requirement is not met.
 fn loss(without: &Candidate, start: &Candidate, best: &Candidate) -> f64 {
     if !without.is_kept() {
         return f64::INFINITY;

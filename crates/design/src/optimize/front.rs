@@ -1,4 +1,4 @@
-//! What no other layout beats in all goals.
+//! The Pareto front: the layouts that no other beats in all goals.
 
 use super::candidate::Candidate;
 
@@ -13,7 +13,8 @@ pub(super) fn beats_in_all(a: &Candidate, b: &Candidate) -> bool {
     a.is_kept() && !b.costs.is_empty() && a.costs.iter().zip(&b.costs).all(|(a, b)| a < b)
 }
 
-/// The layouts that keep the requirements and that no other beats, the best of the first goal first; one of each.
+/// Returns the layouts that meet the requirements and that no other beats, without duplicates, sorted by the first
+/// goal, best first.
 pub(super) fn front(all: &[Candidate]) -> Vec<Candidate> {
     let mut front: Vec<&Candidate> = Vec::new();
     for candidate in all.iter().filter(|c| c.is_kept()) {
@@ -32,7 +33,7 @@ pub(super) fn front(all: &[Candidate]) -> Vec<Candidate> {
     front.into_iter().cloned().collect()
 }
 
-/// The one that gains most in the goal in which it gains least, gains counted in shares of how far the front reaches.
+/// Returns the layout whose smallest gain in any goal is largest; gains are relative to the spread of the front.
 pub(super) fn best(all: &[Candidate], start: &Candidate) -> Option<Candidate> {
     let front = front(all);
     let spans = spreads(front.iter());
@@ -43,7 +44,7 @@ pub(super) fn best(all: &[Candidate], start: &Candidate) -> Option<Candidate> {
             .map(|c| c.costs[goal])
             .fold(f64::NEG_INFINITY, f64::max),
     };
-    let least_gain = |c: &Candidate| {
+    let min_gain = |c: &Candidate| {
         let gains = c
             .costs
             .iter()
@@ -53,7 +54,7 @@ pub(super) fn best(all: &[Candidate], start: &Candidate) -> Option<Candidate> {
     };
     let mut best: Option<(f64, &Candidate)> = None;
     for candidate in &front {
-        let gain = least_gain(candidate);
+        let gain = min_gain(candidate);
         if best.is_none_or(|(most, _)| gain > most) {
             best = Some((gain, candidate));
         }
@@ -61,7 +62,7 @@ pub(super) fn best(all: &[Candidate], start: &Candidate) -> Option<Candidate> {
     best.map(|(_, candidate)| candidate.clone())
 }
 
-/// How far some layouts reach in every goal; 1 where they are all alike.
+/// Returns the spread of layouts in every goal; 1 where all are equal.
 pub(super) fn spreads<'a>(some: impl Iterator<Item = &'a Candidate>) -> Vec<f64> {
     let mut limits: Vec<[f64; 2]> = Vec::new();
     for candidate in some {
@@ -94,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn the_front_is_what_none_beats() {
+    fn the_front_holds_the_undominated_layouts() {
         let all = [
             candidate(0, &[5.0, 5.0], true),
             candidate(1, &[1.0, 9.0], true),

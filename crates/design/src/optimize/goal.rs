@@ -1,4 +1,4 @@
-//! Goals: what a layout should have more, or less, of.
+//! Goals: quantities of a layout to maximize or minimize.
 
 use super::Stated;
 use crate::layout::{Analysis, Requirement};
@@ -18,69 +18,69 @@ pub enum Better {
     Down,
 }
 
-/// A direction that some elements should look in.
+/// A direction in which some elements should look.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wanted {
     /// Azimuth, in degrees.
     pub azimuth_deg: f64,
     /// Elevation, in degrees: 90 is the ceiling, −90 the floor.
     pub elevation_deg: f64,
-    /// How many elements.
+    /// Number of elements.
     pub elements: usize,
 }
 
-/// What a layout should have more, or less, of.
+/// A quantity of a layout to maximize or minimize.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Goal {
     name: String,
     better: Better,
     unit: Option<&'static str>,
-    what: What,
+    what: Measure,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-enum What {
+enum Measure {
     /// A figure of `layout --json`.
     Figure(String),
-    /// The least cylinder about the scanner's axis that holds everything.
+    /// Volume of the smallest cylinder about the scanner's axis that holds everything.
     Cylinder,
-    /// How far the nearest elements look from wanted directions.
+    /// Mean angle from wanted directions to the nearest elements.
     Directions(Vec<Wanted>),
 }
 
-/// Why a goal is none.
+/// Why a goal is invalid.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum GoalError {
     /// Nothing has that name.
-    #[error("{text:?} is no goal")]
+    #[error("{text:?} is not a goal")]
     Unknown {
-        /// What was written.
+        /// The text as written.
         text: String,
-        /// The one that was probably meant, or all there are.
+        /// The name that was probably meant, or a list of all.
         help: String,
     },
-    /// A direction that is none.
+    /// Not a valid direction.
     #[error(
-        "{text:?} is no direction: it takes an azimuth and an elevation in degrees, and the number of elements: 90,-60,4"
+        "{text:?} is not a direction: it takes an azimuth and an elevation in degrees, and the number of elements: 90,-60,4"
     )]
     Direction {
-        /// What was written.
+        /// The text as written.
         text: String,
     },
-    /// Directions without the goal, or the goal without any.
+    /// Directions without the goal, or the goal without directions.
     #[error("the goal `directions` and wanted directions need one another")]
     Directions,
     /// A layout has no figure of that name.
-    #[error("{key:?} is no figure of a layout")]
+    #[error("{key:?} is not a figure of a layout")]
     Figure {
         /// The name.
         key: String,
-        /// The one that was probably meant.
+        /// The name that was probably meant.
         help: String,
     },
 }
 
-/// Goals with a name of their own: which way is better, what figure they are, its unit.
+/// Goals with names of their own: whether more or less is better, the figure, and its unit.
 const NAMED: [(&str, Better, &str, Option<&str>); 4] = [
     ("field_of_regard", Better::Up, "field_of_regard", None),
     ("split_beams", Better::Down, "counts.split", None),
@@ -93,11 +93,11 @@ const NAMED: [(&str, Better, &str, Option<&str>); 4] = [
     ),
 ];
 
-/// Goals that are no figure.
+/// Goals that are not figures.
 const OTHERS: [&str; 2] = ["size", "directions"];
 
 impl Wanted {
-    /// Reads a direction: `AZIMUTH,ELEVATION` or `AZIMUTH,ELEVATION,ELEMENTS`.
+    /// Parses a direction: `AZIMUTH,ELEVATION` or `AZIMUTH,ELEVATION,ELEMENTS`.
     ///
     /// # Errors
     /// [`GoalError::Direction`] for anything else.
@@ -130,9 +130,9 @@ impl Wanted {
     }
 }
 
-/// Mean over wanted directions of the mean angle to the elements that serve them, in degrees; as far as can be for those that
-/// lack. An element serves one direction: the nearest pairs are made first.
-fn apart(wanted: &[Wanted], exits: &[Unit<Vector3<f64>>]) -> f64 {
+/// Returns the mean over wanted directions of the mean angle to the elements that serve them, in degrees; a missing
+/// element counts as 180°. An element serves one direction: pairs are made in order of increasing angle.
+fn mean_angle(wanted: &[Wanted], exits: &[Unit<Vector3<f64>>]) -> f64 {
     let mut pairs = Vec::with_capacity(wanted.len() * exits.len());
     for (direction, w) in wanted.iter().enumerate() {
         let own = beam::spherical(w.azimuth_deg.to_radians(), w.elevation_deg.to_radians());
@@ -156,10 +156,11 @@ fn apart(wanted: &[Wanted], exits: &[Unit<Vector3<f64>>]) -> f64 {
 }
 
 impl Goal {
-    /// Reads a goal: one of the named ones, or a figure of `layout --json` with its direction, `share_within_5_deg:up`.
+    /// Parses a goal: a named one, or a figure of `layout --json` and whether more or less of it is better:
+    /// `share_within_5_deg:up`.
     ///
     /// # Errors
-    /// [`GoalError`] for anything else, and for `directions` without any.
+    /// [`GoalError`] for anything else, and for `directions` without wanted directions.
     pub fn parse(text: &str, wanted: &[Wanted]) -> Result<Self, GoalError> {
         let goal = |name: &str, better, unit, what| {
             Ok(Self {
@@ -170,24 +171,24 @@ impl Goal {
             })
         };
         if let Some((name, better, figure, unit)) = NAMED.iter().find(|(name, ..)| *name == text) {
-            return goal(name, *better, *unit, What::Figure((*figure).to_owned()));
+            return goal(name, *better, *unit, Measure::Figure((*figure).to_owned()));
         }
         match text {
-            "size" => return goal(text, Better::Down, Some("cm³"), What::Cylinder),
+            "size" => return goal(text, Better::Down, Some("cm³"), Measure::Cylinder),
             "directions" if wanted.is_empty() => return Err(GoalError::Directions),
             "directions" => {
-                return goal(text, Better::Down, Some("°"), What::Directions(wanted.to_vec()));
+                return goal(text, Better::Down, Some("°"), Measure::Directions(wanted.to_vec()));
             }
             _ => {}
         }
-        if let Some((figure, way)) = text.rsplit_once(':')
-            && let Some(better) = match way {
+        if let Some((figure, direction)) = text.rsplit_once(':')
+            && let Some(better) = match direction {
                 "up" => Some(Better::Up),
                 "down" => Some(Better::Down),
                 _ => None,
             }
         {
-            return goal(figure, better, None, What::Figure(figure.to_owned()));
+            return goal(figure, better, None, Measure::Figure(figure.to_owned()));
         }
         let names = || NAMED.iter().map(|(name, ..)| *name).chain(OTHERS);
         let help = match nearest(text, names()) {
@@ -203,12 +204,12 @@ impl Goal {
         })
     }
 
-    /// Its name.
+    /// Returns its name.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// In words.
+    /// Returns it as results state it.
     pub fn stated(&self) -> Stated {
         Stated {
             name: self.name.clone(),
@@ -217,14 +218,14 @@ impl Goal {
         }
     }
 
-    /// Whether it needs the predicted accuracy, which takes longer than all else.
+    /// Whether it needs the predicted accuracy, which takes longer than everything else.
     pub(super) fn needs_accuracy(&self) -> bool {
-        matches!(&self.what, What::Figure(key) if key.starts_with("accuracy"))
+        matches!(&self.what, Measure::Figure(key) if key.starts_with("accuracy"))
     }
 
-    /// Whether a layout has such a figure at all.
+    /// Checks that layouts have such a figure.
     pub(super) fn check(&self, figures: &[(String, Option<f64>)]) -> Result<(), GoalError> {
-        let What::Figure(key) = &self.what else {
+        let Measure::Figure(key) = &self.what else {
             return Ok(());
         };
         if figures.iter().any(|(name, _)| name == key) {
@@ -240,27 +241,27 @@ impl Goal {
         })
     }
 
-    /// Its value for a layout.
+    /// Returns its value for a layout.
     pub(super) fn value(&self, analysis: &Analysis, figures: &[(String, Option<f64>)]) -> Option<f64> {
         match &self.what {
-            What::Figure(key) => figures.iter().find(|(name, _)| name == key)?.1,
-            What::Cylinder => {
+            Measure::Figure(key) => figures.iter().find(|(name, _)| name == key)?.1,
+            Measure::Cylinder => {
                 let size = &analysis.size;
                 let radius_cm = 0.05 * size.diameter_mm;
                 Some(std::f64::consts::PI * radius_cm * radius_cm * 0.1 * size.height_mm)
             }
-            What::Directions(wanted) => {
+            Measure::Directions(wanted) => {
                 let seeing = analysis.elements.iter().filter(|e| e.class.sees());
                 let exits: Vec<Unit<Vector3<f64>>> = seeing
                     .filter_map(|e| Some((e.exit_azimuth_deg?, e.exit_elevation_deg?)))
                     .map(|(azimuth, elevation)| beam::spherical(azimuth.to_radians(), elevation.to_radians()))
                     .collect();
-                Some(apart(wanted, &exits))
+                Some(mean_angle(wanted, &exits))
             }
         }
     }
 
-    /// A value so that less is better.
+    /// Returns a value with the sign such that less is better.
     pub(super) fn cost(&self, value: f64) -> f64 {
         match self.better {
             Better::Up => -value,
@@ -279,7 +280,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn goals_have_names_and_figures_have_ways() {
+    fn goals_are_named_or_figures_with_a_direction() {
         let goal = |text: &str| Goal::parse(text, &[]);
         assert_eq!(goal("lost_beams").expect("it is one").better, Better::Down);
         let figure = goal("facets.left-1.elements:up").expect("it is one");
@@ -302,11 +303,11 @@ mod tests {
         let wanted = Wanted::parse("0,-90,2").expect("it is one");
         let exits = [(0.0, -80.0), (90.0, -84.0), (180.0, 0.0)];
         let exits = exits.map(|(a, e): (f64, f64)| beam::spherical(a.to_radians(), e.to_radians()));
-        assert!((apart(&[wanted], &exits) - 8.0).abs() < 1e-9);
-        // One that lacks is as far as can be.
-        assert!((apart(&[wanted], &exits[..1]) - 95.0).abs() < 1e-9);
-        // Asked for twice, an element serves once: 6° and 10°, then 90° and nothing.
-        assert!((apart(&[wanted, wanted], &exits) - (8.0 + 0.5 * (90.0 + 180.0)) / 2.0).abs() < 1e-9);
+        assert!((mean_angle(&[wanted], &exits) - 8.0).abs() < 1e-9);
+        // A missing element counts as 180°.
+        assert!((mean_angle(&[wanted], &exits[..1]) - 95.0).abs() < 1e-9);
+        // Wanted twice, an element serves once: 6° and 10°, then 90° and nothing.
+        assert!((mean_angle(&[wanted, wanted], &exits) - (8.0 + 0.5 * (90.0 + 180.0)) / 2.0).abs() < 1e-9);
         for text in ["", "90", "90,100", "90,-60,0", "90,-60,x", "1,2,3,4", "nan,0"] {
             assert!(Wanted::parse(text).is_err(), "{text}");
         }

@@ -1,22 +1,23 @@
-//! The search for a layout: named parameters within their limits, one or several goals, and requirements to keep.
+//! The search for a layout: named parameters within limits, one or several goals, and requirements to meet.
 //!
-//! Every candidate is the scene with other numbers for its parameters, checked as any scene is and looked at by
-//! [`crate::layout::analyze`]. With several goals there is no best layout but a front of those that no other beats in all of
-//! them. The search is argmin's particle swarm (Kennedy and Eberhart's, as in the Standard PSO of 2011), which needs no
-//! derivatives of what jumps from beam to beam; for every direction λ along the front one swarm goes after the least
+//! Every candidate is the scene with other values of its parameters, checked as any scene is and evaluated by
+//! [`crate::layout::analyze`]. With several goals there is no single best layout but a front of those that no other
+//! beats in all goals. The search is argmin's particle swarm (Kennedy and Eberhart's, as in the Standard PSO of 2011),
+//! which needs no derivatives of functions that jump from beam to beam; for every direction λ along the front one swarm
+//! minimizes
 //!
 //! ```text
 //! max_k λ_k (c_k − z_k)/s_k + 0.05 Σ_k λ_k (c_k − z_k)/s_k            Σ λ_k = 1
 //! ```
 //!
-//! (the augmented Chebyshev distance of Steuer and Choo 1983), c the goals so that less is better, s their spread over the
-//! first candidates, z the best seen of each. The first swarm has the layout as drawn for z: it looks for one that is
-//! better in all goals at once (Wierzbicki's achievement function). The front is gathered from everything that was
-//! looked at.
+//! (the augmented Chebyshev distance of Steuer and Choo 1983), where c are the goals with signs such that less is
+//! better, s their spread over the first candidates, and z the best value found of each. For the first swarm z is the
+//! layout as drawn: it searches for a layout that is better in all goals at once (Wierzbicki's achievement function).
+//! The front is collected from all evaluated layouts.
 //!
-//! Candidates that break a requirement come after all that break none, by how far; scenes that are refused come last.
-//! Draws come from one generator with a seed, candidates are looked at in parallel and noted in order: the same seed gives
-//! the same answer on any number of threads.
+//! Candidates that violate a requirement rank after all that meet them, by the size of the violation; scenes that are
+//! refused rank last. Random numbers come from one generator with a seed, candidates are evaluated in parallel and
+//! stored in order: the same seed gives the same result on any number of threads.
 
 mod candidate;
 mod explain;
@@ -35,49 +36,49 @@ use catoptric_sim::SimError;
 use search::Search;
 use serde::Serialize;
 
-/// Version of what a search is written as.
+/// Version of the format of a search result.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// What to look for, and for how long.
+/// Goals, requirements and extent of a search.
 #[derive(Debug, Clone)]
 pub struct Options {
     /// The goals.
     pub goals: Vec<Goal>,
-    /// What every layout has to keep.
+    /// Requirements that every layout has to meet.
     pub requirements: Vec<Requirement>,
-    /// How many layouts to look at.
+    /// Number of layouts to evaluate.
     pub evaluations: usize,
     /// Seed of the search.
     pub seed: u64,
-    /// How closely to look at each.
+    /// Level of detail of each evaluation.
     pub detail: Detail,
 }
 
-/// Why there is no search.
+/// Why a search failed.
 #[derive(Debug, thiserror::Error)]
 pub enum OptimizeError {
-    /// There is nothing to choose.
+    /// There is no parameter to vary.
     #[error("the scene has no parameter with both `low` and `high`")]
     NothingOpen,
-    /// There is nothing to look for.
+    /// There is no goal.
     #[error("a search needs a goal")]
     NoGoal,
-    /// A goal is none.
+    /// A goal is invalid.
     #[error(transparent)]
     Goal(#[from] GoalError),
-    /// A requirement is none.
+    /// A requirement is invalid.
     #[error(transparent)]
     Requirement(#[from] RequirementError),
     /// The scene cannot be set up.
     #[error(transparent)]
     Setup(#[from] SimError),
-    /// The swarm stopped for a reason of its own.
+    /// The optimizer stopped with an error.
     #[error("the search ended early: {0}")]
     Search(String),
 }
 
 impl OptimizeError {
-    /// What to do about it, where that is known.
+    /// Returns advice on how to correct it, where there is any.
     pub fn help(&self) -> Option<String> {
         match self {
             Self::Goal(GoalError::Unknown { help, .. } | GoalError::Figure { help, .. }) => {
@@ -93,20 +94,20 @@ impl OptimizeError {
     }
 }
 
-/// A parameter that was open.
+/// A parameter that the search varied.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Open {
+pub struct OpenParameter {
     /// Its name.
     pub name: String,
-    /// The least it may be.
+    /// Lower limit.
     pub low: f64,
-    /// The most it may be.
+    /// Upper limit.
     pub high: f64,
-    /// What it is in the scene.
+    /// Value in the scene.
     pub start: f64,
 }
 
-/// A goal in words.
+/// A goal as results state it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Stated {
     /// Its name.
@@ -117,7 +118,7 @@ pub struct Stated {
     pub unit: Option<&'static str>,
 }
 
-/// What a search found.
+/// The result of a search.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Optimum {
     /// Version of this format.
@@ -126,41 +127,41 @@ pub struct Optimum {
     pub name: String,
     /// Seed of the search.
     pub seed: u64,
-    /// Layouts that were looked at, the reasons aside.
+    /// Number of layouts evaluated, without those for the explanation.
     pub evaluations: usize,
-    /// Whether it was told to stop before it was done.
+    /// Whether the search was stopped before it was finished.
     pub interrupted: bool,
     /// The goals.
     pub goals: Vec<Stated>,
-    /// What every layout had to keep.
+    /// Requirements that every layout had to meet.
     pub requirements: Vec<String>,
-    /// What could be chosen.
-    pub parameters: Vec<Open>,
+    /// The parameters that were varied.
+    pub parameters: Vec<OpenParameter>,
     /// The layout as the scene has it.
     pub start: Candidate,
-    /// The one that gains most in the goal in which it gains least; `None` if none keeps the requirements.
+    /// The layout whose smallest gain in any goal is largest; `None` if none meets the requirements.
     pub best: Option<Candidate>,
     /// Whether it is better than the start in every goal.
     pub beats_start_in_every_goal: bool,
-    /// Layouts that no other beats in all goals, the best of the first goal first.
+    /// Layouts that no other beats in all goals, sorted by the first goal, best first.
     pub front: Vec<Candidate>,
     /// Why the best is better than the start.
     pub why: Option<Why>,
-    /// Goals of every layout that keeps the requirements, in the order in which they were looked at.
+    /// Goals of every layout that meets the requirements, in order of evaluation.
     #[serde(skip)]
     pub tried: Vec<Vec<f64>>,
 }
 
-/// How far a search is.
+/// Progress of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
-    /// Layouts looked at since the last time.
+    /// Number of layouts evaluated since the last report.
     pub more: usize,
-    /// Layouts on the front so far.
+    /// Number of layouts on the front so far.
     pub front: usize,
 }
 
-/// Searches; `watch` is told of every batch and stops the search by returning `false`.
+/// Runs a search; `watch` is called after every batch and stops the search by returning `false`.
 ///
 /// ```
 /// use catoptric_files::parametric::ParametricScene;
@@ -184,16 +185,16 @@ pub struct Progress {
 /// ```
 ///
 /// # Errors
-/// [`OptimizeError`]: nothing to choose or to look for, or goals and requirements that no layout has.
+/// [`OptimizeError`]: no parameters or no goal, or goals and requirements that layouts do not have.
 pub fn optimize(
     template: &ParametricScene,
     options: &Options,
     watch: &mut dyn FnMut(Progress) -> bool,
 ) -> Result<Optimum, OptimizeError> {
-    let parameters: Vec<Open> = template
+    let parameters: Vec<OpenParameter> = template
         .open()
         .into_iter()
-        .map(|(name, parameter, [low, high])| Open {
+        .map(|(name, parameter, [low, high])| OpenParameter {
             name: name.to_owned(),
             low,
             high,
@@ -210,7 +211,7 @@ pub fn optimize(
     let mut search = Search::new(&judge, options, watch);
     let outcome = search.run();
     let interrupted = search.stopped();
-    let (all, start) = search.done();
+    let (all, start) = search.finish();
     if !interrupted {
         outcome.map_err(OptimizeError::Search)?;
     }

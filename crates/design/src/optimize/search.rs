@@ -1,4 +1,4 @@
-//! The swarms: which places they go to, and what is remembered of them.
+//! The particle swarms: which positions they evaluate, and the record of all candidates.
 
 use super::candidate::{Candidate, Judge};
 use super::front::{front, spreads};
@@ -11,29 +11,29 @@ use rayon::prelude::*;
 use std::borrow::Borrow;
 use std::cell::RefCell;
 
-/// Particles of a swarm.
+/// Number of particles of a swarm.
 const PARTICLES: usize = 16;
 
-/// Share of the candidates that are spread out before the swarms begin.
+/// Fraction of the candidates that are spread out before the swarms begin.
 const SPREAD_SHARE: f64 = 0.2;
 
-/// Directions along the front of two goals, its ends among them.
+/// Number of directions along the front of two goals, including its ends.
 const DIRECTIONS: usize = 5;
 
-/// Weight of the sum beside the maximum: what is equal in the worst goal is told apart by the others.
+/// Weight of the sum next to the maximum: it ranks candidates that are equal in the worst goal.
 const AUGMENTATION: f64 = 0.05;
 
-/// Least weight of a goal: even at its ends the front is not paid for without limit.
-const LEAST_WEIGHT: f64 = 0.02;
+/// Minimum weight of a goal, so that even at its ends the front does not sacrifice a goal without limit.
+const MIN_WEIGHT: f64 = 0.02;
 
-/// Beyond every cost of a candidate that keeps the requirements, and then of one that is a scene.
+/// Costs above that of any candidate that meets the requirements: of one that does not, and of one that is refused.
 const UNMET: f64 = 1e6;
 const REFUSED: f64 = 1e12;
 
-/// How far a particle starts to move at most, as a share of the way between the limits.
+/// Maximum initial step of a particle, as a fraction of the distance between the limits.
 const FIRST_STEP: f64 = 0.15;
 
-/// Everything that was looked at, and how to go on.
+/// A search in progress: all candidates so far, and what is needed to evaluate more.
 pub(super) struct Search<'a> {
     judge: &'a Judge<'a>,
     options: &'a Options,
@@ -46,7 +46,7 @@ struct Log<'a> {
     stopped: bool,
 }
 
-/// What one swarm goes after.
+/// The scalar cost that one swarm minimizes.
 #[derive(Clone)]
 struct Aim {
     weights: Vec<f64>,
@@ -76,17 +76,17 @@ impl Aim {
 }
 
 /// One swarm's problem, for argmin.
-struct Flight<'a, 'b> {
+struct SwarmProblem<'a, 'b> {
     search: &'b Search<'a>,
     aim: Aim,
 }
 
-impl CostFunction for Flight<'_, '_> {
+impl CostFunction for SwarmProblem<'_, '_> {
     type Param = Vec<f64>;
     type Output = f64;
 
     fn cost(&self, place: &Vec<f64>) -> Result<f64, Error> {
-        let costs = self.search.look(std::slice::from_ref(place), &self.aim)?;
+        let costs = self.search.costs(std::slice::from_ref(place), &self.aim)?;
         costs.first().copied().ok_or_else(|| Stopped.into())
     }
 
@@ -97,13 +97,13 @@ impl CostFunction for Flight<'_, '_> {
         Self: SyncAlias,
     {
         let places: Vec<Vec<f64>> = places.iter().map(|p| p.borrow().clone()).collect();
-        Ok(self.search.look(&places, &self.aim)?)
+        Ok(self.search.costs(&places, &self.aim)?)
     }
 }
 
-/// Told to stop.
+/// The caller stopped the search.
 #[derive(Debug, Clone, Copy, thiserror::Error)]
-#[error("told to stop")]
+#[error("stopped by the caller")]
 struct Stopped;
 
 impl<'a> Search<'a> {
@@ -124,15 +124,15 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Spreads candidates out, then sends one swarm after another.
+    /// Evaluates spread-out candidates, then runs one swarm after another.
     pub(super) fn run(&mut self) -> Result<(), String> {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(self.options.seed);
         let first = self.first_places(&mut random);
-        if self.note(&first).is_err() {
+        if self.evaluate(&first).is_err() {
             return Ok(());
         }
         let weights = directions(self.options.goals.len());
-        // The first looks for what beats the drawing in all goals, and is given twice as long.
+        // The first searches for layouts that beat the drawing in all goals, and gets twice the evaluations.
         let shares = weights.len() + 1;
         for (number, weights) in weights.into_iter().enumerate() {
             let left = self
@@ -142,7 +142,7 @@ impl<'a> Search<'a> {
             let to_come = shares - number - usize::from(number > 0);
             let share = left * if number == 0 { 2 } else { 1 } / to_come.max(1);
             let seed = random.next_u64();
-            self.fly(self.aim(number == 0, weights), share / PARTICLES, seed)?;
+            self.run_swarm(self.aim(number == 0, weights), share / PARTICLES, seed)?;
             if self.stopped() {
                 break;
             }
@@ -154,14 +154,14 @@ impl<'a> Search<'a> {
         self.log.borrow().stopped
     }
 
-    /// Everything that was looked at, and the start.
-    pub(super) fn done(self) -> (Vec<Candidate>, Candidate) {
+    /// Returns all candidates, and the start.
+    pub(super) fn finish(self) -> (Vec<Candidate>, Candidate) {
         let all = self.log.into_inner().all;
         let start = all[0].clone();
         (all, start)
     }
 
-    /// Half of them near the drawing, half anywhere.
+    /// Returns the first positions: half of them near the drawing, half anywhere.
     fn first_places(&self, random: &mut Xoshiro256PlusPlus) -> Vec<Vec<f64>> {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let share = (SPREAD_SHARE * self.options.evaluations as f64) as usize;
@@ -202,8 +202,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Sends one swarm, which begins where others have found the most.
-    fn fly(&self, aim: Aim, rounds: usize, seed: u64) -> Result<(), String> {
+    /// Runs one swarm, starting from the best candidates so far.
+    fn run_swarm(&self, aim: Aim, rounds: usize, seed: u64) -> Result<(), String> {
         if rounds == 0 {
             return Ok(());
         }
@@ -217,15 +217,15 @@ impl<'a> Search<'a> {
         let state = |state: PopulationState<Particle<Vec<f64>, f64>, f64>| {
             state.population(particles).max_iters(rounds as u64)
         };
-        let flight = Flight { search: self, aim };
-        let outcome = Executor::new(flight, swarm).configure(state).timer(false).run();
+        let problem = SwarmProblem { search: self, aim };
+        let outcome = Executor::new(problem, swarm).configure(state).timer(false).run();
         match outcome {
             Err(error) if !self.stopped() => Err(error.to_string()),
             _ => Ok(()),
         }
     }
 
-    /// Half of them the best so far, half any of the others.
+    /// Returns the initial particles: half of them the best so far, half random others.
     fn particles(&self, aim: &Aim, random: &mut Xoshiro256PlusPlus) -> Vec<Particle<Vec<f64>, f64>> {
         let log = self.log.borrow();
         let mut order: Vec<(f64, &Candidate)> = log.all.iter().map(|c| (aim.cost(c), c)).collect();
@@ -247,16 +247,16 @@ impl<'a> Search<'a> {
         particles
     }
 
-    fn look(&self, places: &[Vec<f64>], aim: &Aim) -> Result<Vec<f64>, Stopped> {
-        let begin = self.note(places)?;
+    fn costs(&self, places: &[Vec<f64>], aim: &Aim) -> Result<Vec<f64>, Stopped> {
+        let begin = self.evaluate(places)?;
         Ok(self.log.borrow().all[begin..]
             .iter()
             .map(|c| aim.cost(c))
             .collect())
     }
 
-    /// Looks at places, in parallel, and notes what they come to, in order; where the notes begin.
-    fn note(&self, places: &[Vec<f64>]) -> Result<usize, Stopped> {
+    /// Evaluates positions in parallel and stores the candidates in order; returns the index of the first.
+    fn evaluate(&self, places: &[Vec<f64>]) -> Result<usize, Stopped> {
         let begin = self.log.borrow().all.len();
         let judge = self.judge;
         for (batch, places) in places.chunks(PARTICLES).enumerate() {
@@ -281,16 +281,16 @@ impl<'a> Search<'a> {
     }
 }
 
-/// A number from 0 to 1.
+/// Returns a uniform random number from 0 to 1.
 fn unit(random: &mut Xoshiro256PlusPlus) -> f64 {
-    // 53 bits are as many as a float holds.
+    // 53 bits are the precision of an `f64`.
     (random.next_u64() >> 11) as f64 * (0.5_f64).powi(53)
 }
 
-/// Weights of the goals for every swarm: all alike first, then along the front.
+/// Returns the weights of the goals for every swarm: first all equal, then along the front.
 fn directions(goals: usize) -> Vec<Vec<f64>> {
-    let alike = vec![1.0 / goals as f64; goals];
-    let mut all = vec![alike.clone()];
+    let equal = vec![1.0 / goals as f64; goals];
+    let mut all = vec![equal.clone()];
     match goals {
         1 => {}
         2 => {
@@ -300,8 +300,8 @@ fn directions(goals: usize) -> Vec<Vec<f64>> {
             }
         }
         _ => {
-            // The middle, every goal by itself, and every two together.
-            all.push(alike);
+            // The middle, every goal separately, and every pair.
+            all.push(equal);
             for a in 0..goals {
                 for b in a..goals {
                     let mut weights = vec![0.0; goals];
@@ -314,7 +314,7 @@ fn directions(goals: usize) -> Vec<Vec<f64>> {
     }
     for weights in &mut all {
         for weight in weights.iter_mut() {
-            *weight = weight.max(LEAST_WEIGHT);
+            *weight = weight.max(MIN_WEIGHT);
         }
         let sum: f64 = weights.iter().sum();
         weights.iter_mut().for_each(|w| *w /= sum);

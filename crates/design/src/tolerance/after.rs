@@ -1,4 +1,4 @@
-//! What a calibration leaves of the errors: its bound, and what is found by simulating experiments.
+//! The errors that remain after calibration: their bound, and those of simulated experiments.
 
 use crate::layout::Accuracy;
 use catoptric_assess::study::{Contestant, Job, Run, Study, run};
@@ -6,29 +6,29 @@ use catoptric_calib::Method;
 use catoptric_sim::{Scene, SimError};
 use serde::Serialize;
 
-/// The least error that any unbiased calibration from the scene's own boards can have, over several structures.
+/// The smallest error that any unbiased calibration from the scene's own boards can have, over several structures.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Bounds {
-    /// Structures with a bound.
+    /// Number of structures with a bound.
     pub structures: usize,
-    /// Structures without.
+    /// Number of structures without.
     pub without: usize,
     /// Root mean square over elements and structures, in degrees per axis.
     pub per_axis_deg: Option<f64>,
-    /// The same as an angle between directions, in degrees: √2 times as much.
+    /// The same as an angle between directions, in degrees: √2 times the per-axis value.
     pub direction_rms_deg: Option<f64>,
     /// Largest bound of an element, in degrees per axis.
     pub worst_per_axis_deg: Option<f64>,
-    /// Most elements of a structure that the boards leave open.
+    /// Maximum number of elements of a structure that the boards leave open.
     pub open_worst: Option<usize>,
 }
 
-/// What simulated experiments, calibrated by `joint`, are off by.
+/// Errors of simulated experiments, calibrated by `joint`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Calibrated {
-    /// Structures that could be calibrated.
+    /// Number of structures that could be calibrated.
     pub structures: usize,
-    /// Structures that could not.
+    /// Number of structures that could not.
     pub failed: usize,
     /// Root mean square over elements and structures, in degrees per axis.
     pub per_axis_deg: Option<f64>,
@@ -45,7 +45,7 @@ pub struct Calibrated {
 /// Simulates the scene's experiment on the structure as built under a seed, calibrates it by `joint` and scores it.
 ///
 /// # Errors
-/// A scene that cannot be set up. A calibration that fails is a result.
+/// A scene that cannot be set up. A failed calibration is a result, not an error.
 pub fn calibrate(scene: &Scene, seed: u64) -> Result<Run, SimError> {
     let study = Study::of_scene(scene.clone(), 1, vec![Contestant::Method(Method::Joint)]);
     let runs = run(&study, Job { cell: 0, seed })?;
@@ -59,7 +59,7 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 impl Bounds {
-    /// Puts together what is predicted of several structures.
+    /// Combines the predictions for several structures.
     pub fn of(predicted: &[Accuracy]) -> Self {
         let bounds = || predicted.iter().filter_map(|a| a.per_axis_deg);
         let per_axis_deg = mean(bounds().map(|b| b * b)).map(f64::sqrt);
@@ -78,7 +78,7 @@ impl Bounds {
 }
 
 impl Calibrated {
-    /// Puts together what was found of several structures.
+    /// Combines the results for several structures.
     pub fn of(runs: &[Run]) -> Self {
         let solved = || runs.iter().filter(|r| r.square.is_finite());
         let root = |of: fn(&Run) -> f64| mean(solved().map(of)).map(|square| square.sqrt().to_degrees());

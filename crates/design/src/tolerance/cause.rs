@@ -1,4 +1,4 @@
-//! The kinds of errors that a structure is built with, each by itself.
+//! The kinds of manufacturing errors, to apply individually.
 
 use catoptric_sim::Scene;
 use catoptric_sim::scene::AsBuilt;
@@ -10,11 +10,11 @@ pub enum Cause {
     Tilt,
     /// Facets are shifted.
     Shift,
-    /// Mirrors are thicker or thinner than said.
+    /// Mirrors are thicker or thinner than specified.
     Thickness,
-    /// Mirrors are uneven.
+    /// Mirrors have slope errors.
     Flatness,
-    /// The scanner sits askew in its housing.
+    /// The scanner is misaligned in its housing.
     Mount,
 }
 
@@ -39,7 +39,7 @@ impl Cause {
         }
     }
 
-    /// The scene with errors of this kind alone; `None` if it has none of them.
+    /// Returns the scene with errors of this kind alone; `None` if the scene has none of them.
     pub fn alone(self, scene: &Scene) -> Option<Scene> {
         let as_built = &scene.superstructure.as_built;
         let mount = &scene.scanner.mount;

@@ -1,4 +1,4 @@
-//! One structure as built, beam by beam beside the drawing.
+//! One structure as built, compared beam by beam with the drawing.
 
 use super::Cause;
 use crate::layout::{Class, Traced, exit, trace};
@@ -9,10 +9,10 @@ use catoptric_sim::receive::Sensor;
 use catoptric_sim::{Scene, SimError};
 use nalgebra::{Point3, Unit, Vector3};
 
-/// Length of the whole way for which the error of a point is stated, in metres.
+/// Length of the ray path at which the error of a point is stated, in meters.
 pub const POINT_RANGE_M: f64 = 4.0;
 
-/// A drawing, from which structures are built.
+/// A drawing from which structures are built.
 pub struct Workshop {
     whole: Bench,
     alone: Vec<(Cause, Bench)>,
@@ -21,42 +21,43 @@ pub struct Workshop {
 /// A structure as built under a seed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Built {
-    /// What it is like with all errors.
+    /// The structure with all errors.
     pub whole: Draw,
-    /// How far elements are off with errors of one kind alone, in the order of [`Workshop::causes`]: number of elements,
+    /// Errors of the elements with one kind of error alone, in the order of [`Workshop::causes`]: number of elements,
     /// sum of squares of the direction's error in rad², and of the point's in m².
     pub alone: Vec<(usize, f64, f64)>,
 }
 
-/// What a structure is like beside its drawing.
+/// A structure as built, compared with its drawing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draw {
     /// The seed.
     pub seed: u64,
-    /// Elements that an edge splits.
+    /// Number of elements that an edge splits.
     pub split: usize,
-    /// Elements without a direction of their own, split ones among them.
+    /// Number of elements without a direction of their own, split ones included.
     pub lost: usize,
-    /// Elements that a facet deflects in the drawing, and that this facet does not deflect, or not alone, as built.
+    /// Number of elements that a facet deflects in the drawing, and that this facet does not deflect, or not alone, as
+    /// built.
     pub changed: usize,
-    /// Those that it does.
+    /// The elements that it does deflect alone.
     pub departures: Vec<Departure>,
 }
 
-/// How far an element is from where it is drawn.
+/// Difference between an element as built and as drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Departure {
     /// The element.
     pub beam: usize,
     /// Number of its facet.
     pub facet: usize,
-    /// Angle between the directions in which it leaves, in radians.
+    /// Angle between its exit directions, in radians.
     pub direction: f64,
-    /// Distance between its points at [`POINT_RANGE_M`], in metres.
+    /// Distance between its points at [`POINT_RANGE_M`], in meters.
     pub point: f64,
 }
 
-/// A scene with its drawing, followed once.
+/// A scene whose drawing has been traced.
 pub(super) struct Bench {
     pub(super) scene: Scene,
     sensor: Sensor,
@@ -64,7 +65,7 @@ pub(super) struct Bench {
 }
 
 impl Workshop {
-    /// Follows the beams of the drawing.
+    /// Traces the beams of the drawing.
     ///
     /// # Errors
     /// As [`layout::analyze`](crate::layout::analyze).
@@ -72,7 +73,7 @@ impl Workshop {
         let mut alone = Vec::new();
         for cause in Cause::ALL {
             if let Some(mut scene) = cause.alone(scene) {
-                // A direction is the chief ray's.
+                // The direction is the chief ray's.
                 scene.scanner.sub_rays = 1;
                 alone.push((cause, Bench::new(scene)?));
             }
@@ -83,7 +84,7 @@ impl Workshop {
         })
     }
 
-    /// Builds a structure and follows its beams.
+    /// Builds a structure and traces its beams.
     ///
     /// # Errors
     /// As [`Workshop::new`].
@@ -99,7 +100,7 @@ impl Workshop {
         })
     }
 
-    /// The kinds of errors that the scene has.
+    /// Returns the kinds of errors that the scene has.
     pub fn causes(&self) -> impl Iterator<Item = Cause> + '_ {
         self.alone.iter().map(|(cause, _)| *cause)
     }
@@ -109,20 +110,20 @@ impl Workshop {
     }
 }
 
-/// Where an element that one facet deflects alone looks.
-struct Way {
+/// Exit direction and point of an element that one facet deflects alone.
+struct SoleExit {
     facet: usize,
     exit: Unit<Vector3<f64>>,
     point: Point3<f64>,
 }
 
-fn way(traced: &Traced) -> Option<Way> {
+fn sole_exit(traced: &Traced) -> Option<SoleExit> {
     let [facet] = traced.chief.facets() else {
         return None;
     };
     let exit = exit(&traced.chief).filter(|_| traced.class() == Class::Deflected)?;
     let path = &traced.chief;
-    Some(Way {
+    Some(SoleExit {
         facet: *facet,
         exit,
         point: path.last.origin + exit.into_inner() * (POINT_RANGE_M - path.length),
@@ -151,10 +152,10 @@ impl Bench {
             departures: Vec::new(),
         };
         for (drawn, built) in self.drawn.iter().zip(&built) {
-            let Some(from) = way(drawn) else {
+            let Some(from) = sole_exit(drawn) else {
                 continue;
             };
-            match way(built).filter(|to| to.facet == from.facet) {
+            match sole_exit(built).filter(|to| to.facet == from.facet) {
                 Some(to) => draw.departures.push(Departure {
                     beam: drawn.beam,
                     facet: from.facet,
@@ -167,9 +168,9 @@ impl Bench {
         Ok(draw)
     }
 
-    /// Elements that a facet deflects alone in the drawing.
+    /// Returns the number of elements that a facet deflects alone in the drawing.
     pub(super) fn drawn_of(&self, facet: usize) -> usize {
-        let ways = self.drawn.iter().filter_map(way);
-        ways.filter(|w| w.facet == facet).count()
+        let exits = self.drawn.iter().filter_map(sole_exit);
+        exits.filter(|e| e.facet == facet).count()
     }
 }

@@ -1,17 +1,17 @@
-//! What manufacturing errors do to a layout: many structures, each as it may be built from one drawing.
+//! The effect of manufacturing errors on a layout: many structures, each as it may be built from one drawing.
 //!
-//! A draw is the structure that [`simulate`](catoptric_sim::Laboratory) builds under a seed: facets a little turned,
-//! shifted, thicker and uneven by `superstructure.as_built`, the scanner a little askew in its housing by `scanner.mount`.
-//! An element that the same facet deflects alone in the drawing and as built is off by the angle between its two exit
-//! directions in the sensor frame: what the drawing, taken for a calibration, would get wrong. A facet that is turned by
-//! ω ~ N(0, σ²I) turns its normal by δm = ω×m, and a beam u by
-//!
+//! A draw is the structure that [`simulate`](catoptric_sim::Laboratory) builds under a seed: facets turned, shifted,
+//! with other thicknesses and slope errors by `superstructure.as_built`, and the scanner misaligned in its housing by
+//! `scanner.mount`. For an element that the same facet deflects alone in the drawing and as built, the error is the
+//! angle between its two exit directions in the sensor frame: the error of the drawing if it is used as a calibration.
+//! A rotation of a facet by ω ~ N(0, σ²I) turns its normal by δm = ω×m, and the reflection of a beam u by
 //! ```text
 //! δv = −2·[(δm·u)·m + (m·u)·δm]        E|δv|² = 4σ²·(1 + cos² i)        cos i = |m·u|
 //! ```
 //!
-//! Beside it stand the elements that are split or lose their direction, what each kind of error does alone, and what a
-//! calibration from the scene's own boards leaves: its bound, or what is found by simulating experiments.
+//! The analysis also counts the elements that are split or lose their direction, separates the effect of each kind of
+//! error, and states the error that a calibration from the scene's own boards leaves: its bound, or the result of
+//! simulated experiments.
 //!
 //! ```
 //! use catoptric_design::tolerance::Workshop;
@@ -36,15 +36,15 @@ pub use cause::Cause;
 pub use draw::{Built, Departure, Draw, POINT_RANGE_M, Workshop};
 pub use summary::{Counts, Distribution, Errors, FacetTolerance, Histogram, Source, Tolerance};
 
-/// Version of what a tolerance analysis is written as.
+/// Version of the format of a tolerance analysis.
 pub const SCHEMA_VERSION: u32 = 1;
 
 use crate::layout::{Requirement, RequirementError, Unmet, numbers};
 
-/// Judges a requirement on a tolerance analysis; a figure that has no value meets no limit.
+/// Checks a requirement on a tolerance analysis; a figure without a value meets no limit.
 ///
 /// # Errors
-/// [`RequirementError::Unknown`] if no figure has its name.
+/// [`RequirementError::Unknown`] if no figure has that name.
 pub fn judge(requirement: &Requirement, tolerance: &Tolerance) -> Result<Vec<Unmet>, RequirementError> {
     let value = serde_json::to_value(tolerance).unwrap_or_default();
     let figures = numbers(&value, &["schema_version", "seed", "worst_seed", "histogram"]);

@@ -1,4 +1,4 @@
-//! What many structures have in common.
+//! Summary of many structures: the result of a tolerance analysis.
 
 use super::draw::{Built, Departure, Draw, Workshop};
 use super::{Bounds, Calibrated, SCHEMA_VERSION};
@@ -7,10 +7,10 @@ use catoptric_assess::score::percentile;
 use catoptric_sim::Scene;
 use serde::Serialize;
 
-/// Bars that a histogram has at most, save for the one of the greatest value.
+/// Maximum number of bars of a histogram, apart from the one of the largest value.
 const BARS: f64 = 60.0;
 
-/// What manufacturing errors do to a layout.
+/// The effect of manufacturing errors on a layout.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Tolerance {
     /// Version of this format.
@@ -19,82 +19,82 @@ pub struct Tolerance {
     pub name: String,
     /// Seed of the first structure.
     pub seed: u64,
-    /// Structures, one for every seed from there on.
+    /// Number of structures, one for every seed from there on.
     pub draws: usize,
-    /// What they are built with.
+    /// The errors that they are built with.
     pub errors: Errors,
     /// Elements of the drawing.
     pub drawn: Counts,
-    /// Elements that an edge splits, on average.
+    /// Mean number of elements that an edge splits.
     pub split_mean: f64,
-    /// The most of a structure.
+    /// Maximum number of them in a structure.
     pub split_worst: usize,
-    /// Elements without a direction of their own, split ones among them, on average.
+    /// Mean number of elements without a direction of their own, split ones included.
     pub lost_mean: f64,
-    /// The most of a structure.
+    /// Maximum number of them in a structure.
     pub lost_worst: usize,
-    /// The first seed with so many.
+    /// The first seed with that maximum.
     pub worst_seed: u64,
-    /// Elements that a facet deflects in the drawing and does not as built, on average.
+    /// Mean number of elements that a facet deflects in the drawing and not as built.
     pub changed_mean: f64,
-    /// The most of a structure.
+    /// Maximum number of them in a structure.
     pub changed_worst: usize,
-    /// How far directions are off before calibration, over all elements and structures, in degrees.
+    /// Errors of the directions before calibration, over all elements and structures, in degrees.
     pub direction_deg: Distribution,
-    /// How far points at 4 m are off, in millimetres.
+    /// Errors of points at 4 m, in millimeters.
     pub point_at_4m_mm: Distribution,
     /// Facet by facet.
     pub facets: Vec<FacetTolerance>,
-    /// What each kind of error does alone.
+    /// The effect of each kind of error alone.
     pub sources: Vec<Source>,
-    /// Directions by how far they are off.
+    /// Histogram of the errors of the directions.
     pub histogram: Histogram,
-    /// What any calibration leaves; `None` where nobody asked.
+    /// The error that any calibration leaves; `None` if not requested.
     pub bound: Option<Bounds>,
-    /// What simulated calibrations leave; `None` where nobody asked.
+    /// The error that simulated calibrations leave; `None` if not requested.
     pub calibrated: Option<Calibrated>,
 }
 
 /// The errors that structures are built with, as the scene states them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Errors {
-    /// Turn of a facet about each axis, 1σ, in degrees.
+    /// Rotation of a facet about each axis, 1σ, in degrees.
     pub tilt_sd_deg: f64,
-    /// Shift of a facet along each axis, 1σ, in millimetres.
+    /// Shift of a facet along each axis, 1σ, in millimeters.
     pub shift_sd_mm: f64,
-    /// Departure of a mirror's thickness, 1σ, in millimetres.
+    /// Error of a mirror's thickness, 1σ, in millimeters.
     pub thickness_sd_mm: f64,
-    /// Root mean square of a mirror's slope, in milliradians.
+    /// Root mean square of a mirror's slope error, in milliradians.
     pub slope_rms_mrad: f64,
-    /// Yaw of the scanner in its housing, at most, in degrees.
+    /// Maximum yaw of the scanner in its housing, in degrees.
     pub mount_yaw_tolerance_deg: f64,
-    /// Pitch and roll of the scanner, at most, in degrees.
+    /// Maximum pitch and roll of the scanner, in degrees.
     pub mount_tilt_tolerance_deg: f64,
-    /// Shift of the scanner, at most, in millimetres.
+    /// Maximum shift of the scanner, in millimeters.
     pub mount_shift_tolerance_mm: f64,
 }
 
-/// Elements of the drawing.
+/// Elements of the drawing by class.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Counts {
     /// Deflected by one facet alone.
     pub deflected: usize,
     /// Split at an edge.
     pub split: usize,
-    /// Without a direction of their own, split ones among them.
+    /// Without a direction of their own, split ones included.
     pub lost: usize,
 }
 
-/// How a size is distributed; nothing without any.
+/// The distribution of a quantity; all `None` without values.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Distribution {
     /// Root mean square.
     pub rms: Option<f64>,
     /// Median.
     pub median: Option<f64>,
-    /// 95 % are at most this.
+    /// 95th percentile.
     pub p95: Option<f64>,
-    /// Greatest.
+    /// Maximum.
     pub max: Option<f64>,
 }
 
@@ -103,31 +103,31 @@ pub struct Distribution {
 pub struct FacetTolerance {
     /// The facet.
     pub name: String,
-    /// Elements that it deflects in the drawing.
+    /// Number of elements that it deflects in the drawing.
     pub elements: usize,
-    /// How far their directions are off, in degrees.
+    /// Errors of their directions, in degrees.
     pub direction_deg: Distribution,
-    /// How far their points at 4 m are off, in millimetres.
+    /// Errors of their points at 4 m, in millimeters.
     pub point_at_4m_mm: Distribution,
 }
 
 /// One kind of error alone.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Source {
-    /// The kind.
+    /// Name of the kind.
     pub name: String,
-    /// Root mean square of the directions' errors, in degrees.
+    /// Root mean square error of the directions, in degrees.
     pub direction_rms_deg: Option<f64>,
-    /// The same of points at 4 m, in millimetres.
+    /// Root mean square error of points at 4 m, in millimeters.
     pub point_at_4m_rms_mm: Option<f64>,
 }
 
-/// Directions by how far they are off.
+/// Histogram of the errors of the directions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Histogram {
     /// Width of a bar, in degrees; the first begins at 0.
     pub width_deg: f64,
-    /// Elements in each, over all structures.
+    /// Number of elements in each bar, over all structures.
     pub counts: Vec<usize>,
 }
 
@@ -172,7 +172,7 @@ impl Histogram {
         let width_deg = round_above(largest / BARS);
         let mut counts = Vec::new();
         for value in values {
-            // At most the number of bars.
+            // Bounded by the number of bars.
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             let bar = (value / width_deg) as usize;
             if bar >= counts.len() {
@@ -184,7 +184,7 @@ impl Histogram {
     }
 }
 
-/// The least of 1, 2 and 5 times a power of ten that is no smaller.
+/// Rounds up to 1, 2 or 5 times a power of ten.
 fn round_above(value: f64) -> f64 {
     let mut decade = 1.0;
     while decade > value {
@@ -198,7 +198,7 @@ fn round_above(value: f64) -> f64 {
 }
 
 impl Workshop {
-    /// What structures of this drawing have in common; in the order of their seeds.
+    /// Summarizes structures built from this drawing, given in the order of their seeds.
     pub fn summarize(&self, built: &[Built]) -> Tolerance {
         let bench = self.bench();
         let draws: Vec<&Draw> = built.iter().map(|b| &b.whole).collect();
@@ -214,7 +214,7 @@ impl Workshop {
             own.map(of).collect()
         };
         let degrees = |facet| values(|d| d.direction.to_degrees(), facet);
-        let millimetres = |facet| values(|d| 1e3 * d.point, facet);
+        let point_mm = |facet| values(|d| 1e3 * d.point, facet);
         let facets = bench.scene.superstructure.facet.iter().enumerate();
         let directions = degrees(None);
         Tolerance {
@@ -239,13 +239,13 @@ impl Workshop {
             changed_mean: mean(|d| d.changed),
             changed_worst: worst(|d| d.changed),
             direction_deg: Distribution::of(&directions),
-            point_at_4m_mm: Distribution::of(&millimetres(None)),
+            point_at_4m_mm: Distribution::of(&point_mm(None)),
             facets: facets
                 .map(|(number, facet)| FacetTolerance {
                     name: facet.name.clone(),
                     elements: bench.drawn_of(number),
                     direction_deg: Distribution::of(&degrees(Some(number))),
-                    point_at_4m_mm: Distribution::of(&millimetres(Some(number))),
+                    point_at_4m_mm: Distribution::of(&point_mm(Some(number))),
                 })
                 .collect(),
             sources: self.sources(built),
@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn a_histogram_counts_every_value_in_round_bars() {
+    fn a_histogram_counts_every_value_in_round_bins() {
         let values: Vec<f64> = (0..1000).map(|i| 7.3e-3 * f64::from(i)).collect();
         let found = Histogram::of(&values);
         assert_eq!(found.width_deg, 0.2);

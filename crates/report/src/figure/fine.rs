@@ -1,10 +1,11 @@
-//! Plots of small shapes: drawn four times as large and scaled down, since places on a plot are whole pixels.
+//! Plots of small shapes: drawn four times as large and scaled down, because plotters rounds coordinates to whole
+//! pixels.
 
-use super::{AXIS_ROOM, Axes, FONT, Failure, GRID, LABEL_SIZE, MARGIN, Stroke, Word, draw, tick};
+use super::{AXIS_ROOM, Axes, FONT, Failure, GRID, LABEL_SIZE, MARGIN, Stroke, Label, draw, tick};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-/// How much larger. The style sheet knows it too.
+/// Scale of the drawing. The style sheet depends on it too.
 const SCALE: u32 = 4;
 
 /// A filled outline.
@@ -13,24 +14,24 @@ pub(crate) struct Area {
     pub(crate) color: RGBColor,
 }
 
-/// What a plot of small shapes shows.
+/// The contents of a plot of small shapes.
 #[derive(Default)]
 pub(crate) struct Shapes {
     pub(crate) areas: Vec<Area>,
     pub(crate) strokes: Vec<Stroke>,
-    pub(crate) words: Vec<Word>,
-    /// Where the axes have numbers and the grid lines.
+    pub(crate) labels: Vec<Label>,
+    /// Positions of the axes' numbers and grid lines.
     pub(crate) ticks: [Vec<f64>; 2],
-    /// Names beside the vertical axis, where it has no numbers.
+    /// Names next to the vertical axis, where it has no numbers.
     pub(crate) row_names: Vec<(f64, &'static str)>,
-    /// Whether the horizontal axis holds the negative of what its numbers say: azimuth grows to the left.
+    /// Whether the horizontal axis holds the negatives of its numbers: azimuth grows to the left.
     pub(crate) mirrored: bool,
 }
 
-/// Draws filled outlines, lines and words over a grid.
+/// Draws filled outlines, lines and labels over a grid.
 pub(crate) fn fine(size: (u32, u32), axes: &Axes, title: &str, shapes: &Shapes) -> String {
     let (width, height) = size;
-    // Labels and lines, of a few pixels, times four.
+    // Label sizes and line widths are a few pixels, times four.
     #[allow(clippy::cast_possible_wrap)]
     let scale = SCALE as i32;
     let label = LABEL_SIZE * scale;
@@ -42,7 +43,7 @@ pub(crate) fn fine(size: (u32, u32), axes: &Axes, title: &str, shapes: &Shapes) 
             .build_cartesian_2d(axes.x.clone(), axes.y.clone())?;
         let (x, y) = (axes.x.clone(), axes.y.clone());
         let grid = GRID.mix(0.6).stroke_width(SCALE);
-        // Places on the margin cannot be said in the plot's own numbers.
+        // Points on the margin have no coordinates of the plot.
         let pixels = |x: f64, y: f64, aside: i32, below: i32| {
             let (column, row) = chart.backend_coord(&(x, y));
             (column + aside * scale, row + below * scale)
@@ -63,9 +64,9 @@ pub(crate) fn fine(size: (u32, u32), axes: &Axes, title: &str, shapes: &Shapes) 
             let beside = pixels(x.start, at, -6, 0);
             area.draw(&text(beside, tick(at), HPos::Right, VPos::Center))?;
         }
-        for (at, word) in &shapes.row_names {
+        for (at, name) in &shapes.row_names {
             let beside = pixels(x.start, *at, -6, 0);
-            area.draw(&text(beside, (*word).to_owned(), HPos::Right, VPos::Center))?;
+            area.draw(&text(beside, (*name).to_owned(), HPos::Right, VPos::Center))?;
         }
         let middle = pixels(0.5 * (x.start + x.end), y.start, 0, 30);
         area.draw(&text(middle, axes.x_label.clone(), HPos::Center, VPos::Top))?;
@@ -82,7 +83,7 @@ pub(crate) fn fine(size: (u32, u32), axes: &Axes, title: &str, shapes: &Shapes) 
         chart.draw_series([PathElement::new(border, BLACK.mix(0.6).stroke_width(SCALE))])?;
         for a in &shapes.areas {
             chart.draw_series([Polygon::new(a.points.clone(), a.color.filled())])?;
-            // What is thinner than a pixel is kept in sight by its outline.
+            // The outline keeps shapes thinner than a pixel visible.
             let closed = a.points.iter().chain(a.points.first()).copied();
             chart.draw_series(LineSeries::new(closed, a.color.stroke_width(SCALE)))?;
         }
@@ -90,10 +91,10 @@ pub(crate) fn fine(size: (u32, u32), axes: &Axes, title: &str, shapes: &Shapes) 
             let style = s.color.mix(s.opacity).stroke_width(s.width * SCALE);
             chart.draw_series(LineSeries::new(s.points.iter().copied(), style))?;
         }
-        for w in &shapes.words {
-            let style = (FONT, label).into_font().color(&w.color);
+        for l in &shapes.labels {
+            let style = (FONT, label).into_font().color(&l.color);
             let style = style.pos(Pos::new(HPos::Center, VPos::Center));
-            chart.draw_series([Text::new(w.text.clone(), w.at, style)])?;
+            chart.draw_series([Text::new(l.text.clone(), l.at, style)])?;
         }
         Ok::<(), Failure>(())
     });
@@ -106,7 +107,7 @@ pub(crate) fn fine(size: (u32, u32), axes: &Axes, title: &str, shapes: &Shapes) 
     )
 }
 
-/// Round numbers within limits, about as many as asked for.
+/// Returns about as many round numbers within limits as requested.
 pub(crate) fn round_numbers(limits: std::ops::Range<f64>, about: f64) -> Vec<f64> {
     let rough = (limits.end - limits.start) / about;
     let decade = 10_f64.powf(rough.log10().floor());
@@ -134,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fine_plot_is_as_wide_as_it_is_asked_to_be() {
+    fn a_fine_plot_is_as_wide_as_requested() {
         let axes = Axes {
             x: -1.0..1.0,
             y: 0.0..1.0,
@@ -148,7 +149,7 @@ mod tests {
         };
         let svg = fine((300, 100), &axes, "t", &shapes);
         assert!(svg.starts_with("<svg viewBox=\"0 0 1200 400\" class=\"fine\" style=\"max-width:300px\""));
-        // The number of a mirrored axis stands on its other side.
+        // The number of a mirrored axis is on its other side.
         let place = |svg: &str| -> Option<f64> {
             let text = svg[..svg.find("0.5")?].rfind("<text x=\"")? + 9;
             svg[text..].split('"').next()?.parse().ok()

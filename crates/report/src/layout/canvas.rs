@@ -1,4 +1,4 @@
-//! Triangles and lines against a depth buffer, several samples to a pixel.
+//! A rasterizer of triangles and lines with a depth buffer and several samples per pixel.
 
 use super::picture::Picture;
 use plotters::style::RGBColor;
@@ -9,7 +9,7 @@ pub(super) const SIZE: [u32; 2] = [960, 720];
 /// Samples per pixel along each axis.
 const SAMPLES: u32 = 3;
 
-/// Samples with the nearness of what they show.
+/// Samples, each with the nearness of what it shows.
 pub(super) struct Canvas {
     width: usize,
     height: usize,
@@ -52,7 +52,7 @@ impl Canvas {
         }
     }
 
-    /// Columns of a row, some more than are needed, between which the edges of a triangle lie.
+    /// Returns a range of columns of a row that covers the triangle between its edges, with a margin.
     fn within(&self, edges: [[[f64; 3]; 2]; 3], area: f64, y: f64) -> std::ops::Range<usize> {
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
         for [p, q] in edges {
@@ -67,7 +67,7 @@ impl Canvas {
         self.span([low - 2.0, low - 2.0, high + 2.0], self.width)
     }
 
-    /// Samples between the least and the greatest of some places.
+    /// Returns the samples between the minimum and maximum of three coordinates.
     fn span(&self, places: [f64; 3], limit: usize) -> std::ops::Range<usize> {
         let low = places.iter().copied().fold(f64::INFINITY, f64::min);
         let high = places.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -77,7 +77,7 @@ impl Canvas {
         sample(low.floor())..sample(high.ceil() + 1.0)
     }
 
-    /// A line of a width in pixels, a little nearer than it is, so that it shows on what it lies on.
+    /// Draws a line of a width in pixels, slightly nearer than it is, so that it is not hidden by its own surface.
     pub(super) fn line(&mut self, from: [f64; 3], to: [f64; 3], width: f64, color: RGBColor) {
         let along = [to[0] - from[0], to[1] - from[1]];
         let length = libm::hypot(along[0], along[1]);
@@ -103,7 +103,7 @@ impl Canvas {
         }
     }
 
-    /// The mean of each pixel's samples; what shows nothing is transparent.
+    /// Averages the samples of each pixel; pixels that show nothing are transparent.
     pub(super) fn picture(&self) -> Picture {
         let samples = SAMPLES as usize;
         let [columns, rows] = SIZE.map(|s| s as usize);
@@ -124,7 +124,7 @@ impl Canvas {
                     }
                 }
             }
-            // Means of bytes, and a share of 255.
+            // Means of bytes, and a fraction of 255.
             #[allow(clippy::cast_possible_truncation)]
             let mean = |value: u32| (value / count.max(1)) as u8;
             #[allow(clippy::cast_possible_truncation)]
@@ -133,13 +133,13 @@ impl Canvas {
         }
         Picture {
             size: SIZE,
-            color: png::ColorType::Rgba,
+            color: image::ExtendedColorType::Rgba8,
             bytes,
         }
     }
 }
 
-/// A color with a share of another.
+/// Mixes a color with a share of another.
 pub(super) fn mixed(color: RGBColor, other: RGBColor, share: f64) -> RGBColor {
     // Between two bytes.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]

@@ -1,4 +1,4 @@
-//! The depth image: the room in grey, what elements read in color, with a scale of ranges.
+//! The depth image: the room in gray, the elements' ranges in color, and a color scale.
 
 use super::Drawn;
 use super::perspective::base64;
@@ -7,13 +7,13 @@ use super::views;
 use crate::figure::{css, round_numbers, tick};
 use plotters::style::RGBColor;
 
-/// Size of the picture, and of the map in it with its upper left corner, in pixels.
+/// Size of the picture, and size and upper left corner of the map in it, in pixels.
 const SIZE: [f64; 2] = [1000.0, 590.0];
 const MAP: [f64; 2] = [900.0, 450.0];
 const CORNER: [f64; 2] = [70.0, 14.0];
 
-/// Colors of the scale, evenly spaced from near to far: perceptually even, and told apart without red and green
-/// (viridis, Smith and van der Walt 2015).
+/// Colors of the scale, evenly spaced from near to far: perceptually uniform, and distinguishable for the red-green
+/// color-blind (viridis, Smith and van der Walt 2015).
 const SCALE: [RGBColor; 6] = [
     RGBColor(0x44, 0x01, 0x54),
     RGBColor(0x41, 0x44, 0x87),
@@ -23,13 +23,13 @@ const SCALE: [RGBColor; 6] = [
     RGBColor(0xFD, 0xE7, 0x25),
 ];
 
-/// Greys of the room from near to far, lighter than any color of an element is dark.
+/// Grays of the room from near to far, light enough for the elements' colors to stand out.
 const GREYS: [u8; 2] = [0x96, 0xF0];
 
-/// Share of ranges that the scale leaves out at either end, so that one distant corner does not flatten the rest.
+/// Fraction of ranges that the scale ignores at either end, so that one distant corner does not flatten the rest.
 const BEYOND: f64 = 0.005;
 
-/// The depth image of a layout in its room.
+/// Draws the depth image of a layout in its room.
 pub(super) fn depth(drawn: &Drawn) -> String {
     let depth = &drawn.depth;
     let mut ranges: Vec<f64> = depth
@@ -61,7 +61,7 @@ pub(super) fn depth(drawn: &Drawn) -> String {
     );
     let place = |(x, y): (f64, f64)| (left + wide * (x + 180.0) / 360.0, top + high * (90.0 - y) / 180.0);
     for ray in drawn.drawing.rays.iter().filter(|r| r.class.sees()) {
-        // What reads nothing in this room is white, as the room is there.
+        // An element without a range in this room is white, as the room is there.
         let color = depth.read_m[ray.beam].map_or(RGBColor(255, 255, 255), |range| scale(part(range)));
         for outline in views::cell(drawn, ray) {
             let points: Vec<String> = outline
@@ -72,7 +72,7 @@ pub(super) fn depth(drawn: &Drawn) -> String {
                 })
                 .collect();
             let color = css(color);
-            // A hairline in the same color closes the seams between cells.
+            // A thin outline in the same color closes the seams between cells.
             svg += &format!(
                 "<polygon points=\"{}\" fill=\"{color}\" stroke=\"{color}\" stroke-width=\"0.6\"/>",
                 points.join(" ")
@@ -87,7 +87,7 @@ pub(super) fn depth(drawn: &Drawn) -> String {
     svg + "</svg>\n"
 }
 
-/// The room as a PNG file, one pixel for each direction; transparent where nothing is in the way.
+/// Returns the room as a PNG file, one pixel per direction; transparent where no surface is hit.
 fn room(drawn: &Drawn, part: impl Fn(f64) -> f64) -> Vec<u8> {
     let depth = &drawn.depth;
     let [near, far] = GREYS.map(f64::from);
@@ -99,13 +99,13 @@ fn room(drawn: &Drawn, part: impl Fn(f64) -> f64) -> Vec<u8> {
     };
     Picture {
         size: [depth.columns, depth.rows].map(|s| u32::try_from(s).unwrap_or(0)),
-        color: png::ColorType::GrayscaleAlpha,
+        color: image::ExtendedColorType::La8,
         bytes: depth.room_m.iter().flat_map(pixel).collect(),
     }
     .encoded()
 }
 
-/// Color of a place on the scale, 0 near and 1 far.
+/// Returns the color at a position on the scale, 0 near and 1 far.
 fn scale(part: f64) -> RGBColor {
     let steps = SCALE.len() - 1;
     let at = part.clamp(0.0, 1.0) * steps as f64;
@@ -115,7 +115,7 @@ fn scale(part: f64) -> RGBColor {
     super::canvas::mixed(SCALE[below], SCALE[below + 1], at - below as f64)
 }
 
-/// Ticks and names of the axes.
+/// Draws ticks and names of the axes.
 fn labels(place: &dyn Fn((f64, f64)) -> (f64, f64)) -> String {
     let mut svg = String::new();
     for azimuth in (-150..=150).step_by(30).map(f64::from) {
@@ -143,12 +143,12 @@ fn labels(place: &dyn Fn((f64, f64)) -> (f64, f64)) -> String {
     );
     let x = left - 48.0;
     svg + &format!(
-        "<text x=\"{x:.1}\" y=\"{half:.1}\" text-anchor=\"middle\" transform=\"rotate(-90 {x:.1} {half:.1})\">elevation, up \
-         (°)</text>"
+        "<text x=\"{x:.1}\" y=\"{half:.1}\" text-anchor=\"middle\" transform=\"rotate(-90 {x:.1} \
+         {half:.1})\">elevation, up (°)</text>"
     )
 }
 
-/// The scale of ranges below the map, colors above greys.
+/// Draws the scale of ranges below the map, colors above grays.
 fn bar(nearest: f64, farthest: f64) -> String {
     const PARTS: usize = 60;
     let ([left, top], wide) = ([CORNER[0], CORNER[1] + MAP[1] + 52.0], MAP[0]);

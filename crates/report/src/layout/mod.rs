@@ -1,4 +1,4 @@
-//! The page about mirror layouts, one or several side by side, and its pictures as files.
+//! The page on mirror layouts, one or several side by side, and its pictures as files.
 
 mod canvas;
 mod depth;
@@ -15,7 +15,7 @@ use catoptric_sim::{Scene, SimError};
 use sides::SIDES;
 use views::LOST;
 
-/// A layout with what was found out about it and the geometry to draw.
+/// A layout: its analysis, and the geometry to draw.
 #[derive(Debug, Clone)]
 pub struct Drawn {
     analysis: Analysis,
@@ -24,13 +24,13 @@ pub struct Drawn {
 }
 
 impl Drawn {
-    /// The geometry that an analysis is about.
+    /// Traces the geometry of an analyzed layout.
     ///
     /// # Errors
     /// As [`layout::analyze`](catoptric_design::layout::analyze).
     pub fn new(scene: &Scene, analysis: &Analysis) -> Result<Self, SimError> {
         let mut scene = scene.clone();
-        // As closely as the analysis looked; there are as many as a scene can hold.
+        // As many sub-rays as in the analysis; that number came from a scene.
         scene.scanner.sub_rays = u32::try_from(analysis.sub_rays).unwrap_or(scene.scanner.sub_rays);
         let drawing = Drawing::new(&scene, analysis.seed)?;
         Ok(Self {
@@ -41,7 +41,7 @@ impl Drawn {
     }
 }
 
-/// The page, as HTML.
+/// Returns the page, as HTML.
 pub fn layout(layouts: &[Drawn]) -> String {
     let names: Vec<&str> = layouts.iter().map(|l| l.analysis.name.as_str()).collect();
     let title = names.join(", ");
@@ -63,30 +63,30 @@ pub fn layout(layouts: &[Drawn]) -> String {
     html += &table(&headings, &rows);
     let chapters: [(&str, OfLayout); 6] = [
         ("Where it looks", field),
-        ("What it reads in its room", ranges),
-        ("What becomes of the scan", scan),
+        ("Ranges in its room", ranges),
+        ("Elements of the scan", scan),
         ("The structure", structure),
         ("From three sides", three_sides),
-        ("Where beams meet the mirrors", mirrors),
+        ("Footprints on the mirrors", mirrors),
     ];
     for (title, of) in chapters {
         html += &format!("<h2>{title}</h2>\n{}", chapter(layouts, of));
     }
-    html += "<h2>Facet by facet</h2>\n<p>How far a point that is read at 4 m moves if the facet is not where it is drawn: for \
-             0.1° of turn about the worst axis of its plane, and for 0.1 mm along its normal.</p>\n";
+    html += "<h2>Facet by facet</h2>\n<p>How far a point read at 4 m moves if the facet deviates from the drawing: for \
+             a turn of 0.1° about the worst axis in its plane, and for a shift of 0.1 mm along its normal.</p>\n";
     for drawn in layouts {
         let (headings, rows) = tables::facets(drawn);
         html += &(name_of(layouts, drawn) + &table(headings, &rows));
     }
-    html += "<footer>Field of regard: the share of all directions, 4π, that the cells of the elements cover, each direction \
-             counted once. An element's cell reaches half-way to its neighbors along the scan, and as far as the 1/e² contour \
-             of its own beam across it. Ranges are for face-on targets that fill the beam, by Eq. 1 with both passes over the \
-             mirrors, from the scanner. Margins are from the 1/e² contour of a beam to an edge. Sensor frame: x forward, y \
-             left, z up.</footer>\n";
+    html += "<footer>Field of regard: the share of all directions, 4π, that the cells of the elements cover, each \
+             direction counted once. An element's cell extends half-way to its neighbors along the scan, and to the \
+             1/e² contour of its own beam across it. Ranges are from the scanner, for face-on targets that fill the \
+             beam, by Eq. (1) with both passes via the mirrors. Margins are from the 1/e² contour of a beam to an edge. \
+             Sensor frame: x forward, y left, z up.</footer>\n";
     page(&format!("{title} – catoptric layout"), &html)
 }
 
-/// The pictures as files: name and content. With several layouts the names begin with each one's number.
+/// Returns the pictures as files, by name and content. With several layouts the names begin with the layout's number.
 pub fn layout_pictures(layouts: &[Drawn]) -> Vec<(String, Vec<u8>)> {
     let mut files = Vec::new();
     for (number, drawn) in layouts.iter().enumerate() {
@@ -119,7 +119,7 @@ pub fn layout_pictures(layouts: &[Drawn]) -> Vec<(String, Vec<u8>)> {
     files
 }
 
-/// A facet's name as part of a file's.
+/// Returns a facet's name with characters that are safe in file names.
 fn file_name(name: &str) -> String {
     let letter = |c: char| {
         if c.is_ascii_alphanumeric() || "-_".contains(c) {
@@ -131,29 +131,29 @@ fn file_name(name: &str) -> String {
     name.chars().map(letter).collect()
 }
 
-/// Radius about the scanner of everything that is built, in metres.
+/// Returns the radius about the scanner of everything built, in meters.
 fn radius(drawing: &Drawing) -> f64 {
     let faces = drawing.facets.iter().flat_map(|f| &f.face.corners);
     let bodies = drawing.parts.iter().flat_map(|p| p.skin.iter().flatten());
-    // With nothing around it, something to draw axes in.
+    // The lower limit leaves something to draw axes in if nothing is built.
     faces.chain(bodies).map(|p| p.coords.norm()).fold(0.05, f64::max)
 }
 
-/// Pictures of one layout, what to see in them, and their numbers.
+/// The pictures of one layout, with caption, legend and table.
 struct Chapter {
     pictures: String,
     caption: String,
     legend: Vec<(String, String)>,
     headings: &'static [&'static str],
     rows: Vec<Vec<String>>,
-    /// Whether the pictures fill the page, so that those of several layouts stand below one another.
+    /// Whether the pictures fill the page, so that several layouts are placed below one another.
     wide: bool,
 }
 
-/// What makes a chapter.
+/// A function that makes a chapter.
 type OfLayout = fn(&Drawn) -> Chapter;
 
-/// A chapter about every layout: of one as it is, of several side by side.
+/// Returns a chapter on every layout: a figure for a single one, pictures side by side for several.
 fn chapter(layouts: &[Drawn], of: OfLayout) -> String {
     let chapters: Vec<Chapter> = layouts.iter().map(of).collect();
     if layouts.len() == 1 || chapters.iter().any(|c| c.wide) {
@@ -182,7 +182,7 @@ fn chapter(layouts: &[Drawn], of: OfLayout) -> String {
     html
 }
 
-/// The name of a layout as a heading, if there are several.
+/// Returns the name of a layout as a heading, if there are several.
 fn name_of(layouts: &[Drawn], drawn: &Drawn) -> String {
     if layouts.len() == 1 {
         String::new()
@@ -195,11 +195,12 @@ fn field(drawn: &Drawn) -> Chapter {
     let (headings, rows) = tables::directions(drawn);
     Chapter {
         pictures: views::map(drawn),
-        caption: "Every direction around the scanner, forward in the middle, unrolled like a map of the world. Each element \
-                  is drawn as the cell of directions that it stands for: grey where the scan passes by the mirrors, in the \
-                  color of its facet where it is deflected. White is not looked at: gaps in the grey line are where mirrors \
-                  stand, and black marks are elements that are lost, at where they would look without the structure. The grey \
-                  line is thinnest where the scanner's spot lies along the scan."
+        caption: "Every direction around the scanner, forward in the center, unrolled like a map of the world. Each \
+                  element is drawn as the cell of directions that it represents: gray where the scan passes by the \
+                  mirrors, in the color of its facet where it is deflected. White directions are not covered: gaps in \
+                  the gray line are where mirrors are, and black marks are lost elements, drawn where they would look \
+                  without the structure. The gray line is thinnest where the long axis of the scanner's spot is along \
+                  the scan."
             .to_owned(),
         legend: perspective::legend(drawn),
         headings,
@@ -212,9 +213,9 @@ fn ranges(drawn: &Drawn) -> Chapter {
     let (headings, rows) = tables::ranges(drawn);
     Chapter {
         pictures: depth::depth(drawn),
-        caption: "The scene's room without its boards, unrolled like the map above: in grey how far everything is from the \
-                  scanner, darker where it is nearer, and in color what each element reads there, the way over its mirror \
-                  included and without errors of range."
+        caption: "The scene's room without its boards, unrolled like the map above: in gray the distance of every \
+                  surface from the scanner, darker where nearer, and in color the range of each element including the \
+                  path via its mirror, without range errors."
             .to_owned(),
         legend: Vec::new(),
         headings,
@@ -229,8 +230,8 @@ fn scan(drawn: &Drawn) -> Chapter {
     let (headings, rows) = tables::runs(drawn);
     Chapter {
         pictures: views::scan(drawn),
-        caption: "The elements of the scan over their azimuth: those with a direction of their own, those that an edge \
-                  splits, and those that end on the structure, stay between mirrors or are too faint."
+        caption: "The elements of the scan over azimuth: those with a direction of their own, those split by an edge, \
+                  and those that end on the structure, are trapped between mirrors or are too faint."
             .to_owned(),
         legend,
         headings,
@@ -244,8 +245,9 @@ fn structure(drawn: &Drawn) -> Chapter {
     Chapter {
         pictures: perspective::perspective(drawn).svg(),
         caption: format!(
-            "Mirrors, posts and the scanner's housing, with every {}th beam in the color of the last facet it meets and every \
-             {}th that passes by in grey, up to shortly after the mirrors. The back of a mirror is paler than its face.",
+            "Mirrors, posts and the scanner's housing, with every {}th beam in the color of the last facet it hits and \
+             every {}th undeflected beam in gray, up to shortly after the mirrors. The back of a mirror is paler than \
+             its face.",
             views::RAY_STEP,
             views::DIRECT_STEP
         ),
@@ -263,8 +265,8 @@ fn three_sides(drawn: &Drawn) -> Chapter {
     let (headings, rows) = tables::places(drawn);
     Chapter {
         pictures: format!("<div class=\"views\">\n{svgs}</div>"),
-        caption: "The same beams. Outlines are drawn whole, whatever stands before them: mirrors heavy and in their colors, \
-                  posts grey, the housing black."
+        caption: "The same beams. Outlines are drawn whole, even where hidden: mirrors thick and in their colors, posts \
+                  gray, the housing black."
             .to_owned(),
         legend: perspective::legend(drawn),
         headings,
@@ -284,11 +286,11 @@ fn mirrors(drawn: &Drawn) -> Chapter {
     let (headings, rows) = tables::margins(drawn);
     Chapter {
         pictures: svgs,
-        caption: "Each mirror seen from before it, its outline in black. An ellipse is the 1/e² contour of a beam, of every \
-                  second whole one and of every one that is lost. A whole ellipse may move by its margin before an edge cuts \
-                  it."
+        caption: "Each mirror seen from the front, its outline in black. An ellipse is the 1/e² contour of a beam; \
+                  every second unsplit one and every lost one are drawn. An unsplit ellipse may move by its margin \
+                  before an edge cuts it."
         .to_owned(),
-        legend: vec![(css(LOST), "split at an edge, or lost otherwise".to_owned())],
+        legend: vec![(css(LOST), "split at an edge, or otherwise lost".to_owned())],
         headings,
         rows,
         wide: true,

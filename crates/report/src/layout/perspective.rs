@@ -1,4 +1,4 @@
-//! The structure with its beams in perspective: triangles and lines against a depth buffer, shaded, as PNG.
+//! The structure with its beams in perspective: triangles and lines with a depth buffer, shaded, as PNG.
 
 use super::canvas::{Canvas, SIZE, mixed};
 use super::views::{DIRECT, is_drawn, ray_color};
@@ -10,24 +10,24 @@ use catoptric_model::beam;
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 use plotters::style::RGBColor;
 
-/// Where it is seen from: azimuth and elevation, in degrees.
+/// Direction to the eye: azimuth and elevation, in degrees.
 const FROM_DEG: [f64; 2] = [28.0, 32.0];
 
 /// Distance of the eye, in radii of the structure.
 const FAR: f64 = 6.0;
 
-/// Length of the axes that are drawn at the scanner, in metres.
+/// Length of the axes drawn at the scanner, in meters.
 const AXIS_M: f64 = 0.05;
 
-/// The picture without words, and where words stand on it.
+/// The picture, and the labels to put on it.
 pub(super) struct Perspective {
     /// A PNG file.
     pub(super) png: Vec<u8>,
-    words: Words,
+    labels: Labels,
 }
 
 impl Perspective {
-    /// An SVG that holds the picture and its words.
+    /// Returns an SVG of the picture with its labels.
     pub(super) fn svg(&self) -> String {
         let [width, height] = SIZE;
         let mut svg = format!(
@@ -35,7 +35,7 @@ impl Perspective {
              perspective</title><image width=\"{width}\" height=\"{height}\" href=\"data:image/png;base64,{}\"/>",
             base64(&self.png)
         );
-        for ([x, y], text) in &self.words {
+        for ([x, y], text) in &self.labels {
             svg += &format!(
                 "<text x=\"{x:.0}\" y=\"{y:.0}\" text-anchor=\"middle\" font-family=\"sans-serif\" font-size=\"14\" \
                  fill=\"#000000\">{}</text>",
@@ -46,7 +46,7 @@ impl Perspective {
     }
 }
 
-/// Where things fall on the picture.
+/// Projects points to the picture.
 struct Camera {
     turn: Matrix3<f64>,
     distance: f64,
@@ -62,12 +62,12 @@ impl Camera {
         Self {
             turn: Matrix3::from_rows(&[right.transpose(), up.transpose(), towards.transpose()]),
             distance: FAR * radius,
-            // The structure and as much around it as its radius fill the height.
+            // Half the height is 1.55 radii: the structure with a margin.
             scale: 0.5 * f64::from(SIZE[1]) * FAR / 1.55,
         }
     }
 
-    /// Place on the picture in pixels, and how near it is: larger is nearer.
+    /// Returns the position on the picture in pixels, and the nearness: larger is nearer.
     fn place(&self, p: &Point3<f64>) -> [f64; 3] {
         let v = self.turn * p.coords;
         let depth = (self.distance - v.z).max(1e-3 * self.distance);
@@ -102,7 +102,7 @@ pub(super) fn perspective(drawn: &Drawn) -> Perspective {
         let facing = (camera.turn * facet.face.normal.into_inner()).z;
         for triangle in facet.face.triangles() {
             let fill = shaded(color(number), &triangle, &camera);
-            // The back of a mirror is no mirror.
+            // The back of a mirror does not reflect.
             let fill = if facing > 0.0 {
                 fill
             } else {
@@ -135,22 +135,22 @@ pub(super) fn perspective(drawn: &Drawn) -> Perspective {
             );
         }
     }
-    let mut words = axes(&camera, &mut canvas);
-    add_names(drawn, &camera, radius, &mut words);
+    let mut labels = axes(&camera, &mut canvas);
+    add_names(drawn, &camera, radius, &mut labels);
     let png = canvas.picture().encoded();
-    Perspective { png, words }
+    Perspective { png, labels }
 }
 
-/// Words by their middle.
-type Words = Vec<([f64; 2], String)>;
+/// Centers and texts of labels.
+type Labels = Vec<([f64; 2], String)>;
 
-/// The axes of the sensor frame at the scanner, over everything, with their names and length.
-fn axes(camera: &Camera, canvas: &mut Canvas) -> Words {
-    // In sight on white and on black.
+/// Draws the axes of the sensor frame at the scanner, on top of everything; returns their names and length.
+fn axes(camera: &Camera, canvas: &mut Canvas) -> Labels {
+    // Visible on white and on black.
     let ink = RGBColor(0x70, 0x70, 0x70);
     let over = |p: [f64; 3]| [p[0], p[1], 2.0 * p[2]];
     let origin = over(camera.place(&Point3::origin()));
-    let mut words = Vec::new();
+    let mut labels = Vec::new();
     for (axis, name) in ["x, forward", "y, left", "z, up"].into_iter().enumerate() {
         let end = Point3::from(Vector3::ith(axis, AXIS_M));
         let tip = over(camera.place(&end));
@@ -164,20 +164,20 @@ fn axes(camera: &Camera, canvas: &mut Canvas) -> Words {
             ];
             canvas.line(tip, barb, 2.5, ink);
         }
-        // Half of the words beside the tip, where the axis points to a side.
+        // Where the axis points sideways, beside the tip by half the label's width.
         let aside = if along.x.abs() > 0.3 {
             66.0 * along.x.signum()
         } else {
             0.0
         };
         let at = [tip[0] + aside, tip[1] + 16.0 * along.y + 4.0];
-        words.push((at, format!("{name} ({:.0} mm)", 1e3 * AXIS_M)));
+        labels.push((at, format!("{name} ({:.0} mm)", 1e3 * AXIS_M)));
     }
-    words
+    labels
 }
 
-/// The names of the facets at the ends of their fans; a name that would stand on another moves down by a line.
-fn add_names(drawn: &Drawn, camera: &Camera, radius: f64, words: &mut Words) {
+/// Adds the names of the facets at the ends of their fans; a name that would overlap another moves down by one line.
+fn add_names(drawn: &Drawn, camera: &Camera, radius: f64, labels: &mut Labels) {
     for (number, facet) in drawn.drawing.facets.iter().enumerate() {
         let own: Vec<_> = drawn
             .drawing
@@ -194,17 +194,17 @@ fn add_names(drawn: &Drawn, camera: &Camera, radius: f64, words: &mut Words) {
             x.clamp(40.0, f64::from(SIZE[0]) - 40.0),
             y.clamp(16.0, f64::from(SIZE[1]) - 6.0),
         ];
-        while words
+        while labels
             .iter()
             .any(|(w, _)| (w[0] - at[0]).abs() < 90.0 && (w[1] - at[1]).abs() < 15.0)
         {
             at[1] += 15.0;
         }
-        words.push((at, facet.name.clone()));
+        labels.push((at, facet.name.clone()));
     }
 }
 
-/// A color as its triangle is lit from behind the eye, to the left and above.
+/// Shades a triangle's color as lit from behind the eye, from the upper left.
 fn shaded(color: RGBColor, [a, b, c]: &[Point3<f64>; 3], camera: &Camera) -> RGBColor {
     let light = Vector3::new(-0.4, 0.6, 0.7).normalize();
     let normal = camera.turn * (b - a).cross(&(c - a));
@@ -212,7 +212,7 @@ fn shaded(color: RGBColor, [a, b, c]: &[Point3<f64>; 3], camera: &Camera) -> RGB
     mixed(color, RGBColor(0, 0, 0), 0.45 * (1.0 - lit))
 }
 
-/// Bytes as RFC 4648 writes them.
+/// Encodes bytes in base64 (RFC 4648).
 pub(super) fn base64(bytes: &[u8]) -> String {
     const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
@@ -230,7 +230,7 @@ pub(super) fn base64(bytes: &[u8]) -> String {
     text
 }
 
-/// The colors of the facets with their names, as a legend shows them.
+/// Returns the colors and names of the facets for a legend.
 pub(super) fn legend(drawn: &Drawn) -> Vec<(String, String)> {
     let facets = drawn.analysis.facets.iter().enumerate();
     let mut legend: Vec<(String, String)> = facets.map(|(i, f)| (css(color(i)), f.name.clone())).collect();
@@ -243,12 +243,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bytes_are_written_as_rfc_4648_says() {
-        // The test vectors of its section 10.
-        let words = ["", "f", "fo", "foo", "foob", "fooba", "foobar"];
+    fn base64_agrees_with_rfc_4648() {
+        // The test vectors of section 10.
+        let texts = ["", "f", "fo", "foo", "foob", "fooba", "foobar"];
         let encoded = ["", "Zg==", "Zm8=", "Zm9v", "Zm9vYg==", "Zm9vYmE=", "Zm9vYmFy"];
-        for (word, expected) in words.into_iter().zip(encoded) {
-            assert_eq!(base64(word.as_bytes()), expected);
+        for (text, expected) in texts.into_iter().zip(encoded) {
+            assert_eq!(base64(text.as_bytes()), expected);
         }
     }
 }

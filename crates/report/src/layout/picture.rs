@@ -1,11 +1,14 @@
 //! Pictures as PNG files.
 
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+
 /// Bytes of a picture, row by row from the top.
 pub(super) struct Picture {
     /// Columns and rows.
     pub(super) size: [u32; 2],
     /// What the bytes of a pixel are.
-    pub(super) color: png::ColorType,
+    pub(super) color: ExtendedColorType,
     pub(super) bytes: Vec<u8>,
 }
 
@@ -13,15 +16,10 @@ impl Picture {
     /// The PNG file.
     pub(super) fn encoded(&self) -> Vec<u8> {
         let mut file = Vec::new();
-        let mut encoder = png::Encoder::new(&mut file, self.size[0], self.size[1]);
-        encoder.set_color(self.color);
-        encoder.set_compression(png::Compression::Fast);
-        encoder.set_filter(png::Filter::Adaptive);
-        let written = encoder
-            .write_header()
-            .and_then(|mut writer| writer.write_image_data(&self.bytes));
+        let encoder = PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Adaptive);
+        let [columns, rows] = self.size;
         // Writing to memory, of the size the picture has, cannot fail.
-        if written.is_err() {
+        if encoder.write_image(&self.bytes, columns, rows, self.color).is_err() {
             file.clear();
         }
         file

@@ -9,12 +9,12 @@ use plotters::style::BLACK;
 /// Size of a view, in pixels.
 const SQUARE: (u32, u32) = (500, 500);
 
-/// A side to look from.
+/// A side from which the structure is drawn.
 pub(super) struct Side {
-    /// Name of its file.
+    /// Name of the picture's file.
     pub(super) name: &'static str,
     pub(super) title: &'static str,
-    /// The axes of the sensor frame that run to the right and up, each with its sign.
+    /// The axes of the sensor frame that point right and up, each with its sign.
     axes: [(usize, f64); 2],
     labels: [&'static str; 2],
 }
@@ -40,7 +40,7 @@ pub(super) const SIDES: [Side; 3] = [
     },
 ];
 
-/// The structure with its beams from one side; everything within a square around it.
+/// Draws the structure with its beams from one side, clipped to a square around it.
 pub(super) fn side(drawn: &Drawn, side: &Side) -> String {
     let drawing = &drawn.drawing;
     let [(i, right), (j, up)] = side.axes;
@@ -81,13 +81,13 @@ pub(super) fn side(drawn: &Drawn, side: &Side) -> String {
     figure::plan(SQUARE, &axes, side.title, &strokes, &[])
 }
 
-/// The parts of a line within a square around the origin.
+/// Returns the parts of a line inside a square around the origin.
 fn clipped(points: &[(f64, f64)], half: f64) -> Vec<Vec<(f64, f64)>> {
     let mut parts: Vec<Vec<(f64, f64)>> = Vec::new();
     for pair in points.windows(2) {
         let (a, b) = (pair[0], pair[1]);
         let (dx, dy) = (b.0 - a.0, b.1 - a.1);
-        // Liang and Barsky: the stretch of the line's parameter that lies between each pair of borders.
+        // Liang–Barsky: the interval of the line's parameter between each pair of borders.
         let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
         for (at, along) in [(a.0, dx), (a.1, dy)] {
             if along == 0.0 {
@@ -108,7 +108,7 @@ fn clipped(points: &[(f64, f64)], half: f64) -> Vec<Vec<(f64, f64)>> {
     parts
 }
 
-/// The convex outline of points, closed (Andrew's monotone chain).
+/// Returns the convex hull of points as a closed line (Andrew's monotone chain).
 fn hull(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     points.dedup();

@@ -1,4 +1,4 @@
-//! The numbers beside the pictures of a layout.
+//! The tables next to the pictures of a layout.
 
 use super::Drawn;
 use crate::page::number;
@@ -7,7 +7,7 @@ use catoptric_design::layout::{Analysis, Class, FacetView};
 type Headings = &'static [&'static str];
 type Rows = Vec<Vec<String>>;
 
-/// A figure of a layout: what it is called, and what it is.
+/// A figure of a layout: its name, and the function that formats it.
 type KeyFigure = (&'static str, fn(&Analysis) -> String);
 
 const KEY_FIGURES: [KeyFigure; 22] = [
@@ -36,10 +36,10 @@ const KEY_FIGURES: [KeyFigure; 22] = [
     ("Elevation (°)", |a| pair(a.elevation_deg, 1)),
     ("Azimuth covered (of 360°)", |a| number(a.azimuth_covered_deg, 0)),
     ("Smallest margin on a mirror (mm)", |a| {
-        number(least(a, |f| f.margin_mm), 2)
+        number(smallest(a, |f| f.margin_mm), 2)
     }),
     ("Dark target (10 %) seen by all mirrors to (m)", |a| {
-        number(least(a, |f| f.range_max_dark_m), 1)
+        number(smallest(a, |f| f.range_max_dark_m), 1)
     }),
     ("Point at 4 m per 0.1° of facet, worst facet (mm)", |a| {
         let of = |f: &FacetView| f.point_at_4m_per_0_1_deg_rms_mm;
@@ -69,7 +69,7 @@ fn count(analysis: &Analysis, class: Class) -> String {
     analysis.counts.get(&class).copied().unwrap_or(0).to_string()
 }
 
-fn least(analysis: &Analysis, of: fn(&FacetView) -> Option<f64>) -> f64 {
+fn smallest(analysis: &Analysis, of: fn(&FacetView) -> Option<f64>) -> f64 {
     analysis.facets.iter().filter_map(of).fold(f64::NAN, f64::min)
 }
 
@@ -82,7 +82,7 @@ fn figure(value: Option<f64>, decimals: usize) -> String {
     number(value.unwrap_or(f64::NAN), decimals)
 }
 
-/// A layout in three sentences.
+/// Summarizes a layout in a few sentences.
 pub(super) fn summary(analysis: &Analysis) -> String {
     let of = |class| analysis.counts.get(&class).copied().unwrap_or(0);
     let accuracy = analysis.accuracy.as_ref();
@@ -92,8 +92,8 @@ pub(super) fn summary(analysis: &Analysis) -> String {
             format!(" A calibration from its own boards can reach {bound:.4}° per axis.")
         });
     format!(
-        "{}: of {} elements {} see, {} past the mirrors and {} by them; {} are lost, {} of those because an edge splits them. \
-         {} of {} facets serve an element, and all together cover {} % of all directions.{reach}",
+        "{}: of {} elements {} have a direction, {} past the mirrors and {} via mirrors; {} are lost, {} of these split \
+         by an edge. {} of {} facets serve an element, and together all elements cover {} % of all directions.{reach}",
         analysis.name,
         analysis.elements.len(),
         analysis.seeing,
@@ -107,7 +107,7 @@ pub(super) fn summary(analysis: &Analysis) -> String {
     )
 }
 
-/// Every key figure, a column for each layout.
+/// Returns every key figure, one column per layout.
 pub(super) fn key_figures(layouts: &[Drawn]) -> (Vec<String>, Rows) {
     let mut headings = vec!["Figure".to_owned()];
     headings.extend(layouts.iter().map(|l| l.analysis.name.clone()));
@@ -119,7 +119,7 @@ pub(super) fn key_figures(layouts: &[Drawn]) -> (Vec<String>, Rows) {
     (headings, rows.collect())
 }
 
-/// What the elements of every facet read in the room, and the undeflected ones.
+/// Returns the ranges in the room of every facet's elements, and of the undeflected ones.
 pub(super) fn ranges(drawn: &Drawn) -> (Headings, Rows) {
     let own = |facet: Option<usize>| {
         let rays = drawn.drawing.rays.iter();
@@ -144,7 +144,7 @@ pub(super) fn ranges(drawn: &Drawn) -> (Headings, Rows) {
     rows.push(row("undeflected".to_owned(), None));
     let headings = &[
         "facet",
-        "elements that read",
+        "elements with a range",
         "nearest (m)",
         "median (m)",
         "farthest (m)",
@@ -152,7 +152,7 @@ pub(super) fn ranges(drawn: &Drawn) -> (Headings, Rows) {
     (headings, rows)
 }
 
-/// Where each fan goes.
+/// Returns the extents of each fan.
 pub(super) fn directions(drawn: &Drawn) -> (Headings, Rows) {
     let row = |f: &FacetView| {
         vec![
@@ -177,7 +177,7 @@ pub(super) fn directions(drawn: &Drawn) -> (Headings, Rows) {
     (headings, drawn.analysis.facets.iter().map(row).collect())
 }
 
-/// Runs of neighboring elements.
+/// Returns the runs of neighboring elements.
 pub(super) fn runs(drawn: &Drawn) -> (Headings, Rows) {
     let rows = drawn.analysis.runs.iter().map(|run| {
         let [first, last] = run.beams;
@@ -194,9 +194,9 @@ pub(super) fn runs(drawn: &Drawn) -> (Headings, Rows) {
     });
     let headings = &[
         "Beams",
-        "What becomes of them",
-        "Facets met",
-        "Ended by",
+        "Class",
+        "Facets hit",
+        "Stopped by",
         "Elements",
         "Azimuth in the scan (°)",
         "Width (°)",
@@ -204,7 +204,7 @@ pub(super) fn runs(drawn: &Drawn) -> (Headings, Rows) {
     (headings, rows.collect())
 }
 
-/// Where each mirror stands.
+/// Returns the pose of each mirror.
 pub(super) fn places(drawn: &Drawn) -> (Headings, Rows) {
     let row = |facet: &catoptric_sim::build::BuiltFacet| {
         let (middle, m) = (
@@ -228,7 +228,7 @@ pub(super) fn places(drawn: &Drawn) -> (Headings, Rows) {
     (headings, drawn.drawing.facets.iter().map(row).collect())
 }
 
-/// Size, area, mass, and the spot.
+/// Returns size, area, mass and spot.
 pub(super) fn sizes(drawn: &Drawn) -> (Headings, Rows) {
     let size = &drawn.analysis.size;
     let mut rows: Rows = vec![
@@ -258,10 +258,10 @@ pub(super) fn sizes(drawn: &Drawn) -> (Headings, Rows) {
             ),
         ]
     }));
-    (&["What", "How much"], rows)
+    (&["Quantity", "Value"], rows)
 }
 
-/// What room each mirror leaves.
+/// Returns the margins on each mirror.
 pub(super) fn margins(drawn: &Drawn) -> (Headings, Rows) {
     let row = |f: &FacetView| {
         vec![
@@ -277,7 +277,7 @@ pub(super) fn margins(drawn: &Drawn) -> (Headings, Rows) {
     };
     let headings = &[
         "Facet",
-        "Whole",
+        "Unsplit",
         "Split",
         "Then blocked",
         "Margin (mm)",
@@ -288,7 +288,7 @@ pub(super) fn margins(drawn: &Drawn) -> (Headings, Rows) {
     (headings, drawn.analysis.facets.iter().map(row).collect())
 }
 
-/// What errors of each facet do, and how well it can be calibrated.
+/// Returns the sensitivity to errors of each facet, and how well it can be calibrated.
 pub(super) fn facets(drawn: &Drawn) -> (Headings, Rows) {
     let accuracy = drawn.analysis.accuracy.as_ref();
     let row = |f: &FacetView| {
@@ -308,7 +308,7 @@ pub(super) fn facets(drawn: &Drawn) -> (Headings, Rows) {
         "Facet",
         "Distance (mm)",
         "Per 0.1°, rms (mm)",
-        "most (mm)",
+        "max (mm)",
         "Per 0.1 mm (mm)",
         "Calibration can reach (° per axis)",
         "Elements left open",

@@ -1,29 +1,29 @@
-//! Flat pictures of a layout: the map of directions, the scan, footprints on the facets.
+//! Flat pictures of a layout: the map of directions, the scan, the footprints on the facets.
 
 use super::Drawn;
-use crate::figure::{Area, Axes, GRID, Shapes, Stroke, Word, color, fine, round_numbers};
+use crate::figure::{Area, Axes, GRID, Shapes, Stroke, Label, color, fine, round_numbers};
 use catoptric_design::layout::{Class, DrawnRay, Footprint, Run};
 use catoptric_model::beam;
 use nalgebra::{Matrix3, Point3, Vector3};
 use plotters::style::{BLACK, RGBColor};
 
-/// Size of the map, in pixels: twice as wide as high, but for the labels.
+/// Size of the map, in pixels: twice as wide as high, apart from the labels.
 const MAP: (u32, u32) = (1000, 540);
 
 /// Size of the strip, in pixels.
 const STRIP: (u32, u32) = (1000, 180);
 
-/// Undeflected directions on the map, and beams that pass by in the views.
+/// Color of undeflected directions on the map, and of undeflected beams in the views.
 pub(super) const DIRECT: RGBColor = RGBColor(0x7A, 0x80, 0x87);
 
-/// Elements that are lost.
+/// Color of lost elements.
 pub(super) const LOST: RGBColor = RGBColor(0x20, 0x20, 0x20);
 
-/// Every n-th beam is drawn as a ray; fewer of those that no mirror deflects.
+/// Every n-th beam is drawn as a ray; fewer of the undeflected ones.
 pub(super) const RAY_STEP: usize = 4;
 pub(super) const DIRECT_STEP: usize = 16;
 
-/// Color of a ray: of the last facet it meets, grey without any.
+/// Returns the color of a ray: that of the last facet it hits, gray without any.
 pub(super) fn ray_color(ray: &DrawnRay) -> RGBColor {
     match (ray.class, ray.facets.last()) {
         (Class::Direct, _) | (_, None) => GRID,
@@ -41,7 +41,7 @@ pub(super) fn is_drawn(ray: &DrawnRay) -> bool {
     ray.class.sees() && ray.beam.is_multiple_of(step)
 }
 
-/// All directions, and those that elements look into; azimuth grows to the left as it does for who looks forward.
+/// Draws the map of all directions and those of the elements; azimuth grows to the left, as seen looking forward.
 pub(super) fn map(drawn: &Drawn) -> String {
     let axes = Axes {
         x: -180.0..180.0,
@@ -58,7 +58,7 @@ pub(super) fn map(drawn: &Drawn) -> String {
         mirrored: true,
         ..Shapes::default()
     };
-    // Where a lost element would look without the structure.
+    // A lost element is drawn where it would look without the structure.
     for ray in drawing.rays.iter().filter(|r| !r.class.sees()) {
         let (at, half) = (
             around(drawing.scan.azimuth(ray.beam).to_degrees()),
@@ -96,13 +96,13 @@ pub(super) fn map(drawn: &Drawn) -> String {
         let (Some(first), Some(at), Some(last)) = (exit(0), exit(middle), exit(own.len().max(1) - 1)) else {
             continue;
         };
-        // Beside the fan, towards the middle of the map.
+        // Beside the fan, toward the middle of the map.
         let along = [first.0 - last.0, last.1 - first.1];
         let length = libm::hypot(along[0], along[1]).max(f64::MIN_POSITIVE);
         let (x, y) = (-at.0, at.1);
         let (across, up) = (-along[1] / length, along[0] / length);
         let sign = if across * x + up * y > 0.0 { -1.0 } else { 1.0 };
-        shapes.words.push(Word {
+        shapes.labels.push(Label {
             at: (
                 (x + 10.0 * sign * across).clamp(-165.0, 165.0),
                 y + 5.5 * sign * up,
@@ -114,7 +114,7 @@ pub(super) fn map(drawn: &Drawn) -> String {
     fine(MAP, &axes, "Field of regard", &shapes)
 }
 
-/// The outline of an element's cell on the map, in two parts at the seam; empty for one that does not leave.
+/// Returns the outline of an element's cell on the map, in two parts at the seam; empty if the ray does not leave.
 pub(super) fn cell(drawn: &Drawn, ray: &DrawnRay) -> Vec<Vec<(f64, f64)>> {
     let Some(turn) = turn(drawn, ray) else {
         return Vec::new();
@@ -128,23 +128,23 @@ pub(super) fn cell(drawn: &Drawn, ray: &DrawnRay) -> Vec<Vec<(f64, f64)>> {
     on_map(corners)
 }
 
-/// The product of the reflections on a ray's way: from directions of the scan to where it looks.
+/// Returns the product of the reflections along a ray path, which turns directions in the scan into exit directions.
 fn turn(drawn: &Drawn, ray: &DrawnRay) -> Option<Matrix3<f64>> {
     ray.exit?;
     Some(ray.facets.iter().fold(Matrix3::identity(), |turn, &facet| {
-        // Mirrors of the room are not part of the layout, so every facet met is one of the structure.
+        // The room's mirrors are not part of the layout, so every facet hit belongs to the structure.
         let m = drawn.drawing.facets[facet].face.normal.into_inner();
         (Matrix3::identity() - m * m.transpose() * 2.0) * turn
     }))
 }
 
-/// Azimuth and elevation, in degrees.
+/// Returns azimuth and elevation, in degrees.
 fn degrees(v: &Vector3<f64>) -> (f64, f64) {
     let elevation = libm::atan2(v.z, libm::hypot(v.x, v.y));
     (libm::atan2(v.y, v.x).to_degrees(), elevation.to_degrees())
 }
 
-/// A cell's outline on the map, whole on either side of the seam behind the scanner.
+/// Returns a cell's outline on the map, complete on either side of the seam behind the scanner.
 fn on_map(corners: [(f64, f64); 4]) -> Vec<Vec<(f64, f64)>> {
     let from = corners[0].0;
     let near = corners.map(|(azimuth, elevation)| {
@@ -169,7 +169,7 @@ fn on_map(corners: [(f64, f64); 4]) -> Vec<Vec<(f64, f64)>> {
         .collect()
 }
 
-/// The scan, with its left on the left: what becomes of every element.
+/// Draws the scan with its left on the left: the class of every element.
 pub(super) fn scan(drawn: &Drawn) -> String {
     /// Between ticks, in degrees.
     const TICK_DEG: f64 = 30.0;
@@ -202,7 +202,7 @@ pub(super) fn scan(drawn: &Drawn) -> String {
         mirrored: true,
         ..Shapes::default()
     };
-    fine(STRIP, &axes, "What becomes of the scan", &shapes)
+    fine(STRIP, &axes, "Elements of the scan", &shapes)
 }
 
 /// Multiples of a step between two values.

@@ -1,4 +1,4 @@
-//! The angles of every element: their errors where there is a truth, else the estimates.
+//! Plots of every element's angles: their errors where there is a truth, else the estimates.
 
 use super::super::figure::Dot;
 use super::super::page::{figure as block, number};
@@ -10,14 +10,14 @@ use catoptric_model::{Calibration, Dataset};
 /// Both angles of an element, or their errors, in degrees; σ is NaN where it is not stated.
 struct Angles {
     beam: usize,
-    /// Facet that colors it.
+    /// The facet whose color it has.
     facet: Option<usize>,
     mirror: String,
     values: [f64; 2],
     sigma: [f64; 2],
 }
 
-/// What the two angles are called, and how they are shown.
+/// Titles, names and caption of the plots of the two angles.
 struct Style {
     titles: [&'static str; 2],
     names: [&'static str; 2],
@@ -26,7 +26,7 @@ struct Style {
     caption: &'static str,
 }
 
-/// Errors of θ and φ with their ±2σ bands.
+/// Plots the errors of θ and φ with their ±2σ bands.
 pub(crate) fn errors(dataset: &Dataset, calibration: &Calibration, score: &Score) -> String {
     let elements = score.scored().map(|e| Angles {
         beam: e.beam,
@@ -40,14 +40,14 @@ pub(crate) fn errors(dataset: &Dataset, calibration: &Calibration, score: &Score
         names: ["cos φ·δθ (°)", "δφ (°)"],
         decimals: 4,
         with_bands: true,
-        caption: "Error of every solved, unsplit element against the truth, with the ±2σ band its covariance states. \
-                  19 of 20 dots should lie on their band. Dots that run together along a mirror share an error: a board, a \
-                  bias, the mounting; dots that jump do not. What is beyond the axis is drawn at its end.",
+        caption: "Error of every solved, unsplit element against the truth, with the ±2σ band of its stated covariance. \
+                  About 19 of 20 dots should be on their band. Dots that move together along a mirror share an error: a \
+                  board, a bias, the mounting; dots that scatter do not. Errors beyond the axis are drawn at its end.",
     };
     show(dataset, &elements.collect::<Vec<_>>(), &style)
 }
 
-/// Estimates of θ and φ, where there is no truth.
+/// Plots the estimates of θ and φ, where there is no truth.
 pub(crate) fn estimates(dataset: &Dataset, calibration: &Calibration) -> String {
     let solved = solved(dataset, calibration);
     let elements = solved.iter().map(|s| {
@@ -65,8 +65,8 @@ pub(crate) fn estimates(dataset: &Dataset, calibration: &Calibration) -> String 
         names: ["θ (°)", "φ (°)"],
         decimals: 3,
         with_bands: false,
-        caption: "What was estimated for every solved element. A plane mirror makes a smooth curve; a dot off the curve of \
-                  its mirror is an element to look at.",
+        caption: "Estimates for every solved element. A plane mirror gives a smooth curve; a dot off the curve of its \
+                  mirror is a suspect element.",
     };
     show(dataset, &elements.collect::<Vec<_>>(), &style)
 }

@@ -1,31 +1,31 @@
-//! Dots over the base azimuth of the elements.
+//! Plots of dots over the base azimuth of the elements.
 
 use super::super::figure::{self, Axes, Dot};
 use super::elements::azimuth_deg;
 use catoptric_model::Dataset;
 use std::ops::Range;
 
-/// Size of a plot over azimuth and of each half of one that is parted, in pixels.
+/// Size of a plot over azimuth, and of each half of a split one, in pixels.
 const WIDE: (u32, u32) = (980, 270);
 
 const HALF: (u32, u32) = (490, 270);
 
-/// Azimuths without an element beyond which a plot is parted in two, in degrees.
+/// Width of an interval of azimuth without elements beyond which a plot is split in two, in degrees.
 const WIDE_GAP_DEG: f64 = 40.0;
 
-/// Azimuths of all beams, with a margin.
+/// Returns the azimuth range of all beams, with a margin.
 pub(super) fn azimuth_axis(dataset: &Dataset) -> Range<f64> {
     let ends = [0, dataset.session.scanner.scan.beams() - 1].map(|beam| azimuth_deg(dataset, beam));
     ends[0].min(ends[1]) - 1.0..ends[0].max(ends[1]) + 1.0
 }
 
-/// Errors around zero over azimuth.
+/// Plots errors around zero over azimuth.
 pub(super) fn over_azimuth(dataset: &Dataset, title: &str, dots: &[Dot]) -> String {
     let y = figure::around_zero(dots.iter().flat_map(|d| [d.y, d.half_band]));
     parted(dataset, title, "(°)", &y, dots)
 }
 
-/// Dots over azimuth; in two plots side by side if a wide sector in the middle has none.
+/// Plots dots over azimuth; in two plots side by side if a wide sector in the middle has none.
 pub(super) fn parted(dataset: &Dataset, title: &str, unit: &str, y: &Range<f64>, dots: &[Dot]) -> String {
     let whole = azimuth_axis(dataset);
     // A clockwise scan has its elements the other way round.

@@ -1,4 +1,4 @@
-//! The cloud from above, and how much of it comes by which mirror.
+//! The point cloud from above, and how many of its points each mirror contributes.
 
 use super::super::figure::{self, Axes, GRID, Stroke};
 use super::super::page::{figure as block, number};
@@ -8,8 +8,8 @@ use catoptric_model::CloudFrame;
 use catoptric_model::{Calibration, Dataset, Pose, Status};
 use plotters::style::{BLACK, RGBColor};
 
-/// Points of a cloud that are drawn at most.
-pub const MOST_POINTS: usize = 6000;
+/// Maximum number of points of a cloud that are drawn.
+pub const MAX_POINTS: usize = 6000;
 
 /// The cloud from above.
 pub(crate) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud: &CloudSketch) -> String {
@@ -74,13 +74,13 @@ pub(crate) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud:
     let svg = figure::scatter(level_size(&axes), &axes, title, &points, &strokes);
     let rows = cloud_rows(dataset, calibration, cloud, &facets);
     let outline = if sheet.frame == CloudFrame::Room && surveyed.is_some() {
-        "The outline is the surveyed room: points belong on its walls, or inside on floor and ceiling; a wall of points that \
-         leaves the outline is a mirror whose directions are off. The cross is the scanner. "
+        "The outline is the surveyed room: points should be on its walls, or inside on floor and ceiling; a wall of \
+         points off the outline indicates a mirror whose directions are wrong. The cross is the scanner. "
     } else {
         ""
     };
     let caption = format!(
-        "Points of pose {} in the {} frame, colored by mirror; grey points were seen past the mirrors. {outline}{}",
+        "Points of pose {} in the {} frame, colored by mirror; gray points were seen past the mirrors. {outline}{}",
         sheet.pose,
         sheet.frame.word(),
         if cloud.step > 1 {
@@ -99,7 +99,7 @@ pub(crate) fn cloud(dataset: &Dataset, calibration: Option<&Calibration>, cloud:
     )
 }
 
-/// A cross where the rig stood.
+/// A cross at the position of the rig.
 fn cross(room_from_rig: &Pose) -> [Stroke; 2] {
     const ARM_M: f64 = 0.12;
     let (x, y) = (room_from_rig.translation.x, room_from_rig.translation.y);
@@ -111,20 +111,20 @@ fn cross(room_from_rig: &Pose) -> [Stroke; 2] {
     })
 }
 
-/// A size at which one metre is as long upward as across.
+/// Returns the size at which both axes have the same scale.
 fn level_size(axes: &Axes) -> (u32, u32) {
-    /// What margins and axis labels take, in pixels.
+    /// Space for margins and axis labels, in pixels.
     const FRAME: f64 = 72.0;
     let (width, height) = (axes.x.end - axes.x.start, axes.y.end - axes.y.start);
     let across = 800.0 - FRAME;
     let up = (across * height / width).clamp(150.0, 1200.0);
-    // Between 150 and 1272 by the clamp.
+    // The clamp limits it to 150…1272.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let up = (up + FRAME) as u32;
     (800, up)
 }
 
-/// Points and extent of the cloud, and of the part that each mirror shows.
+/// Returns number of points and extent for the cloud and for the part from each mirror.
 fn cloud_rows(
     dataset: &Dataset,
     calibration: Option<&Calibration>,
@@ -157,7 +157,7 @@ fn cloud_rows(
         row[1] = count.to_string();
         row
     };
-    rows.push(count("Left out: no direction", cloud.sheet.without_direction));
-    rows.push(count("Left out: no range", cloud.sheet.without_range));
+    rows.push(count("Omitted: no direction", cloud.sheet.without_direction));
+    rows.push(count("Omitted: no range", cloud.sheet.without_range));
     rows
 }

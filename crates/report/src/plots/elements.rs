@@ -12,7 +12,7 @@ pub(super) struct Solved<'a> {
     pub(super) facet: Option<usize>,
 }
 
-/// The elements that have one.
+/// Returns the elements that have a direction.
 pub(super) fn solved<'a>(dataset: &Dataset, calibration: &'a Calibration) -> Vec<Solved<'a>> {
     let with = |estimate: &'a BeamEstimate| {
         let deflection = estimate.deflection()?;
@@ -25,12 +25,12 @@ pub(super) fn solved<'a>(dataset: &Dataset, calibration: &'a Calibration) -> Vec
     calibration.beams.iter().filter_map(with).collect()
 }
 
-/// Color of an element by its facet; black for one of none.
+/// Returns the color of an element by its facet; black without one.
 pub(super) fn color_of(facet: Option<usize>) -> RGBColor {
     facet.map_or(BLACK, figure::color)
 }
 
-/// The facets and their colors.
+/// Returns the colors and names of the facets.
 pub(super) fn legend(dataset: &Dataset) -> Vec<(String, String)> {
     let entry = |(i, f): (usize, &NominalFacet)| (figure::css(figure::color(i)), f.name.clone());
     dataset.session.facets.iter().enumerate().map(entry).collect()
@@ -41,12 +41,12 @@ pub(super) fn azimuth_deg(dataset: &Dataset, beam: usize) -> f64 {
     dataset.session.scanner.scan.azimuth(beam).to_degrees()
 }
 
-/// Name of a facet by its number; a dash for an element of none.
+/// Returns the name of a facet by its number; a dash without one.
 pub(super) fn facet_name(dataset: &Dataset, facet: Option<usize>) -> String {
     facet.map_or_else(|| "–".to_owned(), |i| dataset.session.facets[i].name.clone())
 }
 
-/// Number of an element's facet in the session: as the calibration says, else as drawn.
+/// Returns the number of an element's facet in the session: as in the calibration, else as drawn.
 pub(super) fn facet_of(dataset: &Dataset, estimate: &BeamEstimate) -> Option<usize> {
     let facets = &dataset.session.facets;
     match &estimate.facet {

@@ -1,6 +1,6 @@
-//! Where the beams go: the fans from above, from the side and from behind.
+//! Plots of the fans from above, from the side and from behind.
 
-use super::super::figure::{self, Axes, GRID, Stroke, Word};
+use super::super::figure::{self, Axes, GRID, Stroke, Label};
 use super::super::page::{figure as block, number};
 use super::elements::{Solved, azimuth_deg, color_of, facet_name, legend, solved};
 use catoptric_model::{Calibration, Dataset, Status, beam};
@@ -10,24 +10,24 @@ use plotters::style::BLACK;
 /// Size of a view, in pixels.
 const SQUARE: (u32, u32) = (500, 500);
 
-/// How far rays are drawn, in metres, in the whole view and in the close-up.
+/// Length of the rays, in meters, in the whole view and in the close-up.
 const REACH_M: f64 = 1.5;
 
 const CLOSE_M: f64 = 0.16;
 
-/// Every n-th beam is drawn as a ray; fewer of those that no mirror deflects.
+/// Every n-th beam is drawn as a ray; fewer of the undeflected ones.
 const RAY_STEP: usize = 4;
 
 const DIRECT_STEP: usize = 16;
 
-/// Fans from above, from the side and from the front, and the mirrors close up.
+/// Plots the fans from above, from the side and from behind, with a close-up of the mirrors.
 pub(crate) fn fans(dataset: &Dataset, calibration: &Calibration) -> String {
     let solved = solved(dataset, calibration);
     let mut svgs = "<div class=\"views\">\n".to_owned();
     for (title, reach, [i, j], [x, y]) in [
         ("From above", REACH_M, [0, 1], ["x, forward (m)", "y, left (m)"]),
         (
-            "From above, the mirrors close up",
+            "From above, close-up of the mirrors",
             CLOSE_M,
             [0, 1],
             ["x, forward (m)", "y, left (m)"],
@@ -63,9 +63,9 @@ pub(crate) fn fans(dataset: &Dataset, calibration: &Calibration) -> String {
     }
     svgs += "</div>";
     let caption = format!(
-        "Every {RAY_STEP}th element as calibrated by “{}”, in the sensor frame: from the scanner at the origin to the mirror and on to {REACH_M} m. \
-         A fan should leave its mirror in one sheet; a ray that crosses its neighbours is an element to look at. \
-         Heavy lines are the mirrors as drawn, grey rays pass by them.",
+        "Every {RAY_STEP}th element as calibrated by “{}”, in the sensor frame: from the scanner at the origin to the \
+         mirror and on to {REACH_M} m. A fan should leave its mirror as one sheet; a ray that crosses its neighbors is \
+         a suspect element. Thick lines are the mirrors as drawn, gray rays are undeflected.",
         calibration.method
     );
     let mut rows = Vec::new();
@@ -130,14 +130,14 @@ fn strokes(
     strokes
 }
 
-/// Names of the facets at the ends of their fans.
+/// Returns the names of the facets, at the ends of their fans.
 fn labels(
     dataset: &Dataset,
     solved: &[Solved],
     reach: f64,
     view: impl Fn(&Point3<f64>) -> (f64, f64),
-) -> Vec<Word> {
-    let mut words: Vec<Word> = Vec::new();
+) -> Vec<Label> {
+    let mut labels: Vec<Label> = Vec::new();
     for (i, facet) in dataset.session.facets.iter().enumerate() {
         let of: Vec<&Solved> = solved.iter().filter(|s| s.facet == Some(i)).collect();
         let Some(middle) = of.get(of.len() / 2) else {
@@ -146,19 +146,19 @@ fn labels(
         let azimuth = dataset.session.scanner.scan.azimuth(middle.estimate.beam);
         let exit = middle.deflection.exit_direction(azimuth).into_inner();
         let mut at = view(&(middle.deflection.deflection_point(azimuth) + exit * reach * 0.98));
-        // A word that falls on another one moves towards the middle by a line.
+        // A label that would overlap another moves toward the middle by one line.
         let line = if at.1 < 0.0 { -0.08 } else { 0.08 } * reach;
-        let near = |w: &Word, at: (f64, f64)| {
+        let near = |w: &Label, at: (f64, f64)| {
             (w.at.0 - at.0).abs() < 5.0 * line.abs() && (w.at.1 - at.1).abs() < 0.9 * line.abs()
         };
-        while words.iter().any(|w| near(w, at)) {
+        while labels.iter().any(|w| near(w, at)) {
             at.1 -= line;
         }
-        words.push(Word {
+        labels.push(Label {
             at,
             text: facet.name.clone(),
             color: BLACK,
         });
     }
-    words
+    labels
 }

@@ -1,4 +1,4 @@
-//! What the fit left over the boards.
+//! The plot of the residuals of the fit.
 
 use super::super::figure::{self, Dot};
 use super::super::page::{count, figure as block, number};
@@ -6,7 +6,7 @@ use super::azimuth::parted;
 use super::elements::{Solved, azimuth_deg, color_of, facet_name, legend, solved};
 use catoptric_model::{Calibration, Dataset};
 
-/// Residual of every element that states one.
+/// Plots the residual of every element that states one.
 pub(crate) fn residuals(dataset: &Dataset, calibration: &Calibration) -> String {
     let solved = solved(dataset, calibration);
     let of: Vec<(&Solved, f64)> = solved
@@ -51,8 +51,8 @@ pub(crate) fn residuals(dataset: &Dataset, calibration: &Calibration) -> String 
         "Readings",
         "Steps",
     ];
-    let caption = "How far the ranges of an element are from the boards once its direction is fitted. Residuals should be the \
-                   size of drift and board errors; a mirror that stands out has a board that was tracked badly, an element \
-                   that stands out falls on an edge.";
+    let caption = "How far the ranges of an element are from the boards once its direction is fitted. Residuals should \
+                   be as large as drift and board errors; a mirror with larger ones has a badly tracked board, a single \
+                   element with larger ones is split by an edge.";
     block(&plot, caption, &legend(dataset), &headings, &rows)
 }

@@ -1,4 +1,4 @@
-//! What became of every element, as colored bars over azimuth.
+//! The status of every element, as colored bars over azimuth.
 
 use super::super::figure::{self, Axes, Bar};
 use super::super::page::figure as block;
@@ -14,7 +14,7 @@ use plotters::style::RGBColor;
 /// Size of the bars, in pixels.
 const STRIP: (u32, u32) = (980, 150);
 
-/// What the calibration says of every element, and what is true.
+/// Plots the status of every element in the calibration, and its class in the truth.
 pub(crate) fn statuses(dataset: &Dataset, calibration: &Calibration, truth: Option<&Truth>) -> String {
     let found = calibration.beams.iter().map(|b| (b.beam, status_color(b.status)));
     let mut bars = runs(dataset, 0, found);
@@ -44,12 +44,12 @@ pub(crate) fn statuses(dataset: &Dataset, calibration: &Calibration, truth: Opti
         y: 0.0..rows_drawn as f64,
         x_label: "Base azimuth of the element (°)".to_owned(),
         y_label: if truth.is_some() {
-            "truth · found".to_owned()
+            "truth · calibration".to_owned()
         } else {
             "found".to_owned()
         },
     };
-    let title = "What became of every element";
+    let title = "Status of every element";
     let svg = figure::strip(STRIP, &axes, title, &bars, rows_drawn);
     let mut rows: Vec<Vec<String>> = [Status::Solved, Status::Direct]
         .iter()
@@ -66,16 +66,16 @@ pub(crate) fn statuses(dataset: &Dataset, calibration: &Calibration, truth: Opti
         rows.push(vec!["absent".to_owned(), String::new(), absent.to_string()]);
     }
     let caption = if truth.is_some() {
-        "Upper row: what the calibration says of each element; lower row: what is true. Green over green is what is wanted; \
-         anything else over green was not solved, and the table says why."
+        "Upper row: the status in the calibration; lower row: the class in the truth. Green over green is as desired; \
+         anything else over green was not solved, and the table gives the reason."
     } else {
-        "What the calibration says of each element; the table says why those without a direction have none."
+        "The status of each element in the calibration; the table gives the reasons of those without a direction."
     };
     let plot = format!("<div class=\"plot\"><h4>{title}</h4>{svg}</div>\n");
     block(&plot, caption, &legend, &["Status", "Reason", "Elements"], &rows)
 }
 
-/// Colors of what became of an element: the good in green and blue, the undecided in warm tones.
+/// Returns the color of a status: green and blue for good results, warm tones for undecided ones.
 fn status_color(status: Status) -> RGBColor {
     match status {
         Status::Solved => RGBColor(0x00, 0x9E, 0x73),
@@ -87,7 +87,7 @@ fn status_color(status: Status) -> RGBColor {
     }
 }
 
-/// Color and name of what is true.
+/// Returns color and name of a class.
 fn class_color(class: BeamClass) -> (RGBColor, &'static str) {
     match class {
         BeamClass::Deflected => (RGBColor(0x00, 0x9E, 0x73), "deflected"),
@@ -106,7 +106,7 @@ fn runs(dataset: &Dataset, row: usize, elements: impl Iterator<Item = (usize, RG
     for (beam, color) in elements {
         let x = azimuth_deg(dataset, beam) - half..azimuth_deg(dataset, beam) + half;
         match bars.last_mut() {
-            // Neighbours share an edge up to rounding.
+            // Neighbors share an edge up to rounding.
             Some(last) if last.color == color && (last.x.end - x.start).abs() < half => last.x.end = x.end,
             Some(last) if last.color == color && (last.x.start - x.end).abs() < half => {
                 last.x.start = x.start

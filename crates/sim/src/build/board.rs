@@ -1,4 +1,4 @@
-//! A board: its outline, its markers, and how it stands in the room.
+//! A board: its outline, its markers, and its pose in the room.
 
 use crate::scene::{Board, Marker, Room, SensorTest};
 use catoptric_cast::Ray;
@@ -6,10 +6,10 @@ use catoptric_model::frame::tangent_basis;
 use catoptric_model::{Pose, Rectangle, beam};
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
-/// Least distance between a board and the shell of the room, in metres.
+/// Minimum distance between a board and the shell of the room, in meters.
 const WALL_CLEARANCE: f64 = 0.03;
 
-/// A board's outline, in metres.
+/// Outline of a board, in meters.
 pub(crate) fn outline(board: &Board) -> Rectangle {
     Rectangle {
         width: board.width_mm * 1e-3,
@@ -17,7 +17,7 @@ pub(crate) fn outline(board: &Board) -> Rectangle {
     }
 }
 
-/// Places of markers in their body's frame, in metres.
+/// Marker positions in the frame of their body, in meters.
 pub(crate) fn points(markers: &[Marker]) -> Vec<Point3<f64>> {
     markers
         .iter()
@@ -25,7 +25,7 @@ pub(crate) fn points(markers: &[Marker]) -> Vec<Point3<f64>> {
         .collect()
 }
 
-/// A board's own markers, or five near its edges in no symmetry.
+/// The board's own markers, or five placed asymmetrically near its edges.
 pub(crate) fn board_markers(board: &Board) -> Vec<Marker> {
     if !board.marker.is_empty() {
         return board.marker.clone();
@@ -50,7 +50,7 @@ pub(crate) fn board_markers(board: &Board) -> Vec<Marker> {
         .collect()
 }
 
-/// A board on a ray, tilted against it; its x axis lies along the fan as far as the tilt allows.
+/// Pose of a board centered on a ray and tilted against it. Its x axis follows the fan as far as the tilt allows.
 pub(crate) fn facing(ray: &Ray, fan: Vector3<f64>, distance: f64, tilt: f64, turn: f64) -> Pose {
     let (across, up) = tangent_basis(&ray.direction);
     let (sin_turn, cos_turn) = libm::sincos(turn);
@@ -60,7 +60,7 @@ pub(crate) fn facing(ray: &Ray, fan: Vector3<f64>, distance: f64, tilt: f64, tur
     attitude(ray.origin + ray.direction.into_inner() * distance, &normal, fan)
 }
 
-/// The pose of a board with a given center and normal whose x axis is as near to `along` as it can be.
+/// Pose of a board with a given center and normal, its x axis as close to `along` as possible.
 pub(crate) fn attitude(center: Point3<f64>, normal: &Unit<Vector3<f64>>, along: Vector3<f64>) -> Pose {
     let flat = |v: Vector3<f64>| Unit::try_new(v - normal.into_inner() * normal.dot(&v), 1e-9);
     let x = flat(along).unwrap_or_else(|| tangent_basis(normal).0);
@@ -73,7 +73,7 @@ pub(crate) fn attitude(center: Point3<f64>, normal: &Unit<Vector3<f64>>, along: 
     )
 }
 
-/// Whether all corners of a board lie inside the room.
+/// Whether all corners of a board are inside the room, clear of its shell.
 pub(crate) fn stands_in(board: &Board, room_from_board: &Pose, room: &Room) -> bool {
     let [x, y, z] = room.size_m;
     outline(board).corners().iter().all(|corner| {
@@ -85,7 +85,8 @@ pub(crate) fn stands_in(board: &Board, room_from_board: &Pose, room: &Room) -> b
     })
 }
 
-/// A board whose center is on the test's beam, in the room frame; its x axis is as nearly along the scan as can be.
+/// Pose, in the room frame, of a board centered on the test's beam. Its x axis is as close to the scan direction as
+/// possible.
 pub(crate) fn before_beam(
     test: &SensorTest,
     range: f64,
@@ -112,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_board_faces_its_ray_under_the_wanted_tilt() {
+    fn a_board_faces_its_ray_at_the_requested_tilt() {
         let ray = Ray {
             origin: Point3::new(0.1, 0.2, 1.5),
             direction: beam::spherical(1.0, 0.6),

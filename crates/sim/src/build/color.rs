@@ -1,17 +1,17 @@
-//! Surface colors: how much light they return, and how noisy their readings are.
+//! Surface colors: their reflectivity, and the noise of readings from them.
 
 use crate::error::SimError;
 use crate::scene::{Color, NoiseTable, Scene};
 use catoptric_model::paper;
 
-/// A color with everything the simulation needs of it.
+/// A color as the simulation uses it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Paint {
     /// Name.
     pub name: String,
     /// Share of the light that is scattered back, ρ_t.
     pub reflectivity: f64,
-    /// Noise of readings from it.
+    /// Noise of readings from this color.
     pub noise: NoiseTable,
 }
 
@@ -48,10 +48,10 @@ fn built_in(name: &str) -> Option<Color> {
     })
 }
 
-/// Looks a color up among the scene's own and the built-in ones.
+/// Looks up a color among the scene's own and the built-in ones.
 ///
 /// # Errors
-/// [`SimError::UnknownColor`] lists the names there are.
+/// [`SimError::UnknownColor`] lists the known names.
 pub fn paint(scene: &Scene, name: &str) -> Result<Paint, SimError> {
     let color = scene
         .color

@@ -1,12 +1,11 @@
-//! From a facet as a person describes it to its corners in the nominal sensor frame.
+//! Computes the corners of a facet, in the nominal sensor frame, from its description in the scene.
 
 use crate::scene::{FacetShape, Plate, RectangleShape, Wedge};
 use catoptric_cast::area_vector;
 use catoptric_model::{ScanGeometry, beam, mirror};
 use nalgebra::{Point3, Unit, Vector3};
 
-/// Corners of a facet as drawn, in metres, counter-clockwise seen from the reflecting side; the scan is that of beams named
-/// by their index.
+/// Corners of a facet as drawn, in meters, counter-clockwise seen from the reflecting side.
 ///
 /// `None` if the description spans no mirror: a beam that is not deflected, a plane that one of the two azimuths
 /// does not meet, a normal of zero length.
@@ -25,7 +24,7 @@ pub fn corners(shape: &FacetShape, scan: &ScanGeometry) -> Option<Vec<Point3<f64
     }
 }
 
-/// The plane mirror that sends the middle beam where it is wanted, cut where the two azimuths and heights meet it.
+/// The plane mirror that sends the middle beam in the requested direction, cut at the two azimuths and heights.
 fn wedge_corners(wedge: &Wedge) -> Option<Vec<Point3<f64>>> {
     let [first, last] = wedge.azimuth_deg.map(f64::to_radians);
     let u = beam::direction(0.5 * (first + last));
@@ -86,14 +85,14 @@ fn rectangle_corners(shape: &RectangleShape) -> Option<Vec<Point3<f64>>> {
     )
 }
 
-/// Corners of a rectangle whose width runs horizontally, in metres; `None` for a normal of no length.
+/// Corners of a rectangle whose width is horizontal, in meters; `None` for a zero-length normal.
 pub(crate) fn rectangle(
     center: Point3<f64>,
     normal: Vector3<f64>,
     [width, height]: [f64; 2],
 ) -> Option<Vec<Point3<f64>>> {
     let m = Unit::try_new(normal, f64::MIN_POSITIVE)?;
-    // A mirror parallel to the scan plane has no horizontal side of its own; x will do.
+    // A mirror parallel to the scan plane has no distinguished horizontal side; use x.
     let across = Unit::try_new(Vector3::z().cross(&m), 1e-9).unwrap_or(Vector3::x_axis());
     let along = m.cross(&across);
     let (x, y) = (across.into_inner() * (0.5 * width), along * (0.5 * height));
@@ -111,7 +110,7 @@ mod tests {
     use catoptric_model::MirrorPlane;
 
     #[test]
-    fn a_wedge_sends_its_middle_beam_where_it_is_wanted() {
+    fn a_wedge_sends_its_middle_beam_in_the_requested_direction() {
         let wedge = Wedge {
             azimuth_deg: [62.0, 77.0],
             distance_mm: 70.0,

@@ -1,4 +1,4 @@
-//! From the drawing to surfaces: mirrors, bodies, boards, walls, and the way of a flight.
+//! From the drawing to surfaces: mirrors, bodies, boards, walls; and the trajectory of a flight.
 
 pub(crate) mod board;
 pub mod color;
@@ -11,5 +11,5 @@ pub(crate) mod trajectory;
 
 pub use room::room_from_rig;
 pub use stage::Stage;
-pub use structure::{Back, BuiltFacet, Part, Structure, nominal_mount};
+pub use structure::{Back, BuiltFacet, OpaquePart, Structure, nominal_mount};
 pub use trajectory::Trajectory;

@@ -1,11 +1,11 @@
-//! The room: where the rig stands in it, and its walls.
+//! The room: the pose of the rig in it, and its walls.
 
 use crate::scene::{Room, Scene};
 use catoptric_model::Pose;
 use catoptric_model::frame::yaw_pitch_roll;
 use nalgebra::{Point3, Translation3, Vector3};
 
-/// Where rig and nominal sensor stand in the room.
+/// Pose of the rig in the room.
 pub fn room_from_rig(room: &Room) -> Pose {
     Pose::from_parts(
         Translation3::from(Vector3::from(room.rig_position_m)),
@@ -20,7 +20,7 @@ const WALLS: [[&str; 2]; 3] = [
     ["floor", "ceiling"],
 ];
 
-/// Names and corners of walls, floor and ceiling in the room frame, each counter-clockwise seen from inside.
+/// Names and corners of walls, floor and ceiling in the room frame; each outline is counter-clockwise seen from inside.
 pub(crate) fn walls(scene: &Scene) -> Vec<(&'static str, Vec<Point3<f64>>)> {
     let [x, y, z] = scene.room.size_m;
     let (low, high) = (
@@ -42,7 +42,7 @@ pub(crate) fn walls(scene: &Scene) -> Vec<(&'static str, Vec<Point3<f64>>)> {
                 corner(high[a], high[b]),
                 corner(low[a], high[b]),
             ];
-            // The axes a, b, axis are right-handed: this order faces along +axis, into the room from the low side.
+            // The axes a, b, axis are right-handed: on the low side, this order faces along +axis, into the room.
             if !inwards {
                 corners.reverse();
             }

@@ -1,10 +1,10 @@
-//! What stands in the room by itself: `[[room.mirror]]` and `[[room.surface]]`.
+//! Mirrors and surfaces fixed in the room: `[[room.mirror]]` and `[[room.surface]]`.
 //!
-//! All of it is exactly where the scene puts it. It is seen by every ray that is cast into the room; the drawing of
-//! the structure, its beams and the truth about them know nothing of it.
+//! They are exactly where the scene places them. Every ray cast into the room can hit them; the drawing of the
+//! structure, its beams and the truth about them do not include them.
 
 use crate::build::layout;
-use crate::build::structure::{BuiltFacet, Part, mesh_shape};
+use crate::build::structure::{BuiltFacet, OpaquePart, mesh_shape};
 use crate::error::SimError;
 use crate::scene::{PlaneRectangle, PlaneShape, RoomMirror, RoomSurface, Scene, SurfaceShape};
 use catoptric_cast::{Block, Cylinder, Polygon, Shape};
@@ -18,20 +18,20 @@ pub struct Stage {
     /// The mirrors.
     pub mirrors: Vec<BuiltFacet>,
     /// The surfaces.
-    pub surfaces: Vec<Part>,
+    pub surfaces: Vec<OpaquePart>,
 }
 
 impl Stage {
-    /// Everything that stands in a scene's room, moved into another frame.
+    /// Everything fixed in a scene's room, transformed into another frame.
     ///
     /// # Errors
-    /// A mirror or surface without a shape, a mesh that nobody has read.
+    /// A mirror or surface without a shape; a mesh that has not been read.
     pub fn new(scene: &Scene, frame_from_room: &Pose) -> Result<Self, SimError> {
         let mirrors = scene.room.mirror.iter().map(|m| mirror(m, frame_from_room));
         let surfaces = scene.room.surface.iter().map(|s| {
             let frame_from_surface =
                 frame_from_room * pose(s.position_m, [s.yaw_deg, s.pitch_deg, s.roll_deg]);
-            Ok(Part {
+            Ok(OpaquePart {
                 name: s.name.clone(),
                 shape: surface(scene, s, &frame_from_surface)?,
                 color: s.color.clone(),
@@ -95,7 +95,7 @@ fn surface(scene: &Scene, surface: &RoomSurface, place: &Pose) -> Result<Shape, 
     }
 }
 
-/// Corners of an outline in its own frame, in metres; `None` for a normal of no length.
+/// Corners of an outline in its own frame, in meters; `None` for a zero-length normal.
 pub(crate) fn plane_corners(shape: &PlaneShape) -> Option<Vec<Point3<f64>>> {
     match shape {
         PlaneShape::Rectangle(shape) => rectangle_corners(shape),

@@ -1,8 +1,8 @@
 //! The scanner with its mirrors, as drawn and as built.
 //!
-//! The drawing is made in the nominal sensor frame. As built, every facet is a little turned, shifted and uneven, and
-//! the laser's own frame sits a little off in its housing: everything bolted to the housing then moves in the true
-//! sensor frame.
+//! The drawing is made in the nominal sensor frame. As built, every facet is slightly turned, shifted and irregular,
+//! and the laser's own frame is slightly off in its housing: in the true sensor frame, everything bolted to the housing
+//! moves accordingly.
 
 use crate::build::layout;
 use crate::error::SimError;
@@ -21,18 +21,18 @@ pub struct BuiltFacet {
     pub name: String,
     /// The reflecting face.
     pub face: Polygon,
-    /// The bare structure behind the mirror, by its thickness.
+    /// The surface of the bare structure behind the mirror.
     pub backing: Polygon,
-    /// From the bare structure to the reflecting face, in metres.
+    /// Distance from the bare structure to the reflecting face, in meters.
     pub thickness: f64,
-    /// Glass before the reflecting surface.
+    /// Glass in front of the reflecting surface.
     pub glass: Option<Glass>,
-    /// What a mirror with two reflecting sides has beside its face.
+    /// The second reflecting side of a two-sided mirror.
     pub back: Option<Back>,
     slope: Slope,
 }
 
-/// The other side of a mirror.
+/// The second reflecting side of a mirror.
 #[derive(Debug, Clone)]
 pub enum Back {
     /// The face itself: the mirror has no thickness.
@@ -41,14 +41,14 @@ pub enum Back {
     Body {
         /// The outline, facing away from the face.
         face: Polygon,
-        /// One strip for every edge.
+        /// One strip per edge.
         rim: Vec<Polygon>,
     },
 }
 
 /// An opaque part in the sensor frame.
 #[derive(Debug, Clone)]
-pub struct Part {
+pub struct OpaquePart {
     /// Name.
     pub name: String,
     /// Its shape.
@@ -60,26 +60,26 @@ pub struct Part {
 /// The scanner's surroundings in the sensor frame.
 #[derive(Debug, Clone)]
 pub struct Structure {
-    /// Where the sensor sits in the rig.
+    /// Pose of the sensor in the rig.
     pub rig_from_sensor: Pose,
     /// The mirrors.
     pub facets: Vec<BuiltFacet>,
     /// Posts and housing.
-    pub parts: Vec<Part>,
+    pub parts: Vec<OpaquePart>,
 }
 
-/// Slope of a facet's surface about its plane: the gradient of a cubic height field over the facet.
+/// Slope of a facet's surface relative to its plane: the gradient of a cubic height field over the facet.
 #[derive(Debug, Clone, PartialEq)]
 struct Slope {
     center: Point3<f64>,
-    /// Axes of the facet's plane, over the facet's half extent.
+    /// Axes of the facet's plane, divided by the facet's half extent.
     axes: [Vector3<f64>; 2],
-    /// Coefficients of x², xy, y², x³, x²y, xy², y³ in the height over the half extent.
+    /// Coefficients of x², xy, y², x³, x²y, xy², y³ in the height divided by the half extent.
     height: [f64; 7],
 }
 
 impl Slope {
-    /// Steps of the grid over which the root mean square is taken.
+    /// Number of steps per axis of the grid over which the root mean square is taken.
     const GRID: i32 = 20;
 
     fn new(face: &Polygon, rms: f64, draws: &mut Draws) -> Self {
@@ -108,7 +108,7 @@ impl Slope {
         slope
     }
 
-    /// Slopes along the two axes at normalised coordinates.
+    /// Slopes along the two axes at normalized coordinates.
     fn gradient(&self, x: f64, y: f64) -> [f64; 2] {
         let [xx, xy, yy, xxx, xxy, xyy, yyy] = self.height;
         [
@@ -123,7 +123,7 @@ fn centroid(corners: &[Point3<f64>]) -> Point3<f64> {
 }
 
 impl Back {
-    /// The back of a mirror of some thickness, in metres. `None` for an outline without an area.
+    /// The back of a mirror of a given thickness, in meters. `None` for an outline without area.
     pub(crate) fn of(face: &Polygon, thickness: f64) -> Option<Self> {
         if thickness == 0.0 {
             return Some(Self::Face);
@@ -147,7 +147,7 @@ impl Back {
 }
 
 impl BuiltFacet {
-    /// An even mirror that is where it is said to be. `None` for an outline without an area.
+    /// A flat mirror at its nominal pose. `None` for an outline without area.
     pub(crate) fn exact(
         name: String,
         face: Polygon,
@@ -176,12 +176,12 @@ impl BuiltFacet {
         })
     }
 
-    /// Whether light that meets one of them where the other is goes on alike.
+    /// Whether both reflect identically.
     pub(crate) fn reflects_like(&self, other: &Self) -> bool {
         self.slope == other.slope && self.glass == other.glass && self.face.corners == other.face.corners
     }
 
-    /// Normal of the reflecting surface at one of its points.
+    /// Normal of the reflecting surface at a point on it.
     pub fn normal_at(&self, point: &Point3<f64>) -> Unit<Vector3<f64>> {
         if self.slope.height == [0.0; 7] {
             return self.face.normal;
@@ -189,12 +189,12 @@ impl BuiltFacet {
         let offset = point - self.slope.center;
         let [x, y] = self.slope.axes;
         let [a, b] = self.slope.gradient(x.dot(&offset), y.dot(&offset));
-        // The axes carry the length scale of the coordinates; the slope itself has none.
+        // The axes carry the length scale of the coordinates; the slope is dimensionless.
         Unit::new_normalize(self.face.normal.into_inner() - x.normalize() * a - y.normalize() * b)
     }
 }
 
-/// Where the drawing puts the sensor in the rig.
+/// Pose of the sensor in the rig, as drawn.
 pub fn nominal_mount(scene: &Scene) -> Pose {
     let mount = &scene.scanner.mount;
     Pose::from_parts(
@@ -207,16 +207,16 @@ impl Structure {
     /// The structure as drawn.
     ///
     /// # Errors
-    /// [`SimError::Facet`] for a facet that is no mirror, [`SimError::Patterns`] if [`crate::build::pattern::expand`] has not been
-    /// asked.
+    /// [`SimError::Facet`] for a facet that spans no mirror, [`SimError::Patterns`] if the patterns have not been
+    /// expanded by [`crate::build::pattern::expand`].
     pub fn nominal(scene: &Scene) -> Result<Self, SimError> {
         Self::build(scene, None)
     }
 
-    /// The structure as built under a seed.
+    /// The structure as built, with the manufacturing errors of a seed.
     ///
     /// # Errors
-    /// As [`Structure::nominal`].
+    /// As for [`Structure::nominal`].
     pub fn as_built(scene: &Scene, seed: u64) -> Result<Self, SimError> {
         Self::build(scene, Some(seed))
     }
@@ -246,7 +246,7 @@ impl Structure {
         })
     }
 
-    /// Nothing at all: for a scene of which only the room is looked at.
+    /// An empty structure, for scenes of which only the room is used.
     pub fn empty() -> Self {
         Self {
             rig_from_sensor: Pose::identity(),
@@ -256,7 +256,7 @@ impl Structure {
     }
 }
 
-/// How the true sensor frame sits in the nominal one: the data sheet's tolerances, uniform.
+/// Pose of the true sensor frame in the nominal one, drawn uniformly within the data sheet's tolerances.
 fn mount_error(scene: &Scene, seed: u64) -> Pose {
     let mount = &scene.scanner.mount;
     let mut draws = Draws::new(seed, Purpose::Mount, 0);
@@ -301,7 +301,7 @@ fn build_facet(
     if let Some((seed, index)) = seed_and_index
         && as_built.thickness_sd_mm > 0.0
     {
-        // The bare structure stays where it is. No mirror is thinner than nothing.
+        // The bare structure stays in place; a thickness cannot be negative.
         let draw = Draws::new(seed, Purpose::MirrorThickness, index).normal();
         let thicker = (draw * as_built.thickness_sd_mm * 1e-3).max(-thickness);
         let ahead = face.normal.into_inner() * thicker;
@@ -328,10 +328,10 @@ fn build_facet(
     })
 }
 
-/// The shape of a post, placed by the drawing; `frame_from_drawing` takes it further.
+/// The shape of a post: placed by the drawing, then transformed by `frame_from_drawing`.
 ///
 /// # Errors
-/// [`SimError::Mesh`] for a mesh that nobody has read.
+/// [`SimError::Mesh`] for a mesh that has not been read.
 pub(crate) fn post_shape(scene: &Scene, post: &Post, frame_from_drawing: &Pose) -> Result<Shape, SimError> {
     let turn = yaw_pitch_roll(
         post.yaw_deg.to_radians(),
@@ -341,7 +341,7 @@ pub(crate) fn post_shape(scene: &Scene, post: &Post, frame_from_drawing: &Pose) 
     let place = Pose::from_parts(Translation3::from(Vector3::from(post.center_mm) * 1e-3), turn);
     let frame_from_post = frame_from_drawing * place;
     Ok(match &post.shape {
-        // Without any size there is nothing; the checks of the scene say so.
+        // Without a size the block is empty; the checks of the scene report it.
         None => Shape::Block(Block::new(
             frame_from_post,
             Vector3::from(post.size_mm.unwrap_or_default()) * 1e-3,
@@ -355,25 +355,25 @@ pub(crate) fn post_shape(scene: &Scene, post: &Post, frame_from_drawing: &Pose) 
     })
 }
 
-/// A mesh in its place.
+/// A placed mesh.
 ///
 /// # Errors
-/// [`SimError::Mesh`] for a mesh that nobody has read.
+/// [`SimError::Mesh`] for a mesh that has not been read.
 pub(crate) fn mesh_shape(
     scene: &Scene,
     shape: &MeshShape,
     frame_from_mesh: &Pose,
 ) -> Result<Shape, SimError> {
     let mesh = scene.meshes.get(&shape.file)?;
-    let triangles = Triangles::new(mesh, shape.units.in_metres(), frame_from_mesh);
+    let triangles = Triangles::new(mesh, shape.units.in_meters(), frame_from_mesh);
     Ok(Shape::Mesh(Arc::new(triangles)))
 }
 
-fn parts(scene: &Scene, sensor_from_drawing: &Pose) -> Result<Vec<Part>, SimError> {
+fn parts(scene: &Scene, sensor_from_drawing: &Pose) -> Result<Vec<OpaquePart>, SimError> {
     let posts = scene.superstructure.post.iter();
-    let mut parts: Vec<Part> = posts
+    let mut parts: Vec<OpaquePart> = posts
         .map(|p| {
-            Ok(Part {
+            Ok(OpaquePart {
                 name: p.name.clone(),
                 shape: post_shape(scene, p, sensor_from_drawing)?,
                 color: p.color.clone(),
@@ -385,7 +385,7 @@ fn parts(scene: &Scene, sensor_from_drawing: &Pose) -> Result<Vec<Part>, SimErro
             Translation3::from(Vector3::from(part.center_mm) * 1e-3),
             UnitQuaternion::identity(),
         );
-        Part {
+        OpaquePart {
             name: "housing".to_owned(),
             shape: Shape::Block(Block::new(
                 sensor_from_drawing * place,
@@ -402,7 +402,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_surface_is_as_uneven_as_it_is_said_to_be() {
+    fn the_slope_error_of_a_surface_is_as_specified() {
         let corners = [(-0.02, -0.01), (0.02, -0.01), (0.02, 0.01), (-0.02, 0.01)];
         let corners = corners.map(|(x, y)| Point3::new(x, y, 0.0)).to_vec();
         let face = Polygon::new(corners).expect("it has an area");
@@ -416,7 +416,7 @@ mod tests {
             back: None,
             slope,
         };
-        // Over the square around the facet's circle, on which the root mean square is defined.
+        // Over the square around the facet's circumscribed circle, where the root mean square is defined.
         let extent = libm::hypot(0.02, 0.01);
         let n = 200;
         let at = |i: i32| extent * (2.0 * (f64::from(i) + 0.5) / f64::from(n) - 1.0);
@@ -426,7 +426,7 @@ mod tests {
             0.5 * (normal.x * normal.x + normal.y * normal.y)
         });
         let rms = (square.sum::<f64>() / f64::from(n * n)).sqrt();
-        // The definition's own grid of 21 × 21 is coarser: 7 % at most for a cubic.
+        // The definition uses a coarser grid of 21 × 21 points: at most 7 % off for a cubic.
         assert!((rms / 0.5e-3 - 1.0).abs() < 0.07 && rms != 0.0, "{rms}");
         assert!((facet.normal_at(&Point3::origin()).z - 1.0).abs() < 1e-15);
     }

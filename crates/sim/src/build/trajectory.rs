@@ -1,23 +1,23 @@
-//! The way of the rig through waypoints: cubic in position, slerp or squad in attitude.
+//! The trajectory of the rig through waypoints: cubic in position, slerp or squad in attitude.
 //!
-//! All of it is counted from the first waypoint, in its frame, so that a rig that stays there does so exactly.
+//! Everything is computed relative to the first waypoint, so that a rig that stays there rests exactly.
 //!
 //! **Position.** On the interval from tᵢ to tᵢ₊₁ = tᵢ + h, with u = (t − tᵢ)/h and chord d = (pᵢ₊₁ − pᵢ)/h, Hermite's
-//! cubic p = pᵢ + h·u·(mᵢ + u·(3d − 2mᵢ − mᵢ₊₁ + u·(mᵢ + mᵢ₊₁ − 2d))). The velocity mᵢ at a waypoint is that of the
-//! parabola through it and its two neighbors, at either end that of the parabola next to it: the velocity is continuous,
-//! and uniform acceleration is reproduced exactly.
+//! cubic is p = pᵢ + h·u·(mᵢ + u·(3d − 2mᵢ − mᵢ₊₁ + u·(mᵢ + mᵢ₊₁ − 2d))). The velocity mᵢ at a waypoint is that of the
+//! parabola through it and its two neighbors; at either end it is that of the adjacent parabola. The velocity is
+//! continuous, and uniform acceleration is reproduced exactly.
 //!
 //! **Attitude.** Slerp turns at a constant rate from one waypoint to the next. Squad is Shoemake's spherical cubic,
-//! slerp(slerp(qᵢ, qᵢ₊₁, u), slerp(aᵢ, bᵢ₊₁, u), 2u(1 − u)). With the mean rate ωᵢ at a waypoint (the same parabola's),
-//! aᵢ = qᵢ·exp(½(hᵢωᵢ − log(qᵢ⁻¹qᵢ₊₁))) and bᵢ = qᵢ·exp(−½(hᵢ₋₁ωᵢ + log(qᵢ⁻¹qᵢ₋₁))): for equal intervals these are one,
-//! Shoemake's intermediate quaternion, and for unequal ones the rate is continuous as well. Both go the shorter arc.
+//! slerp(slerp(qᵢ, qᵢ₊₁, u), slerp(aᵢ, bᵢ₊₁, u), 2u(1 − u)). With the mean rate ωᵢ at a waypoint, from the same
+//! parabola, aᵢ = qᵢ·exp(½(hᵢωᵢ − log(qᵢ⁻¹qᵢ₊₁))) and bᵢ = qᵢ·exp(−½(hᵢ₋₁ωᵢ + log(qᵢ⁻¹qᵢ₋₁))). For equal intervals both
+//! equal Shoemake's intermediate quaternion; for unequal ones the rate is still continuous. Both take the shorter arc.
 
 use crate::scene::{Attitude, Flight, Waypoint};
 use catoptric_model::Pose;
 use catoptric_model::frame::{Arc, slerp, yaw_pitch_roll};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
-/// A way through waypoints.
+/// A trajectory through waypoints.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     room_from_first: Pose,
@@ -25,20 +25,21 @@ pub struct Trajectory {
     times: Vec<f64>,
     positions: Vec<Vector3<f64>>,
     velocities: Vec<Vector3<f64>>,
-    /// From each attitude to the next.
+    /// Arc from each attitude to the next.
     chords: Vec<Arc>,
-    /// From squad's aᵢ to bᵢ₊₁ for every interval; none for slerp.
+    /// Arc from squad's aᵢ to bᵢ₊₁ for every interval; empty for slerp.
     controls: Vec<Arc>,
 }
 
 impl Trajectory {
-    /// The way of a flight; `None` for fewer than two waypoints or times that do not increase.
+    /// The trajectory of a flight; `None` for fewer than two waypoints or times that do not increase.
     pub fn of(flight: &Flight) -> Option<Self> {
         let waypoints: Vec<(f64, Pose)> = flight.waypoint.iter().map(|w| (w.time_s, pose(w))).collect();
         Self::through(&waypoints, flight.attitude)
     }
 
-    /// The way through poses of the rig in the room at given times, in seconds; `None` as for [`Trajectory::of`].
+    /// The trajectory through poses of the rig in the room at given times, in seconds; `None` as for
+    /// [`Trajectory::of`].
     pub fn through(waypoints: &[(f64, Pose)], attitude: Attitude) -> Option<Self> {
         let (start_s, room_from_first) = *waypoints.first()?;
         let increasing = waypoints.windows(2).all(|w| w[0].0 < w[1].0);
@@ -77,12 +78,12 @@ impl Trajectory {
         self.times.last().copied().unwrap_or(0.0)
     }
 
-    /// The rig at the first waypoint, in the room.
+    /// Pose of the rig in the room at the first waypoint.
     pub fn room_from_first(&self) -> Pose {
         self.room_from_first
     }
 
-    /// The rig at a time after the first waypoint, in the frame that it had there. It rests at the last waypoint.
+    /// Pose of the rig at a time after the first waypoint, relative to its pose there. It rests at the last waypoint.
     pub fn first_from_rig(&self, elapsed_s: f64) -> Pose {
         let elapsed = elapsed_s.clamp(0.0, self.duration_s());
         let after = self.times.partition_point(|t| *t <= elapsed);
@@ -92,7 +93,7 @@ impl Trajectory {
         Pose::from_parts(Translation3::from(self.position(i, h, u)), self.attitude(i, u))
     }
 
-    /// The rig in the room at a time after the first waypoint.
+    /// Pose of the rig in the room at a time after the first waypoint.
     pub fn room_from_rig(&self, elapsed_s: f64) -> Pose {
         self.room_from_first * self.first_from_rig(elapsed_s)
     }
@@ -114,7 +115,7 @@ impl Trajectory {
     }
 }
 
-/// Where a waypoint puts the rig in the room.
+/// Pose of the rig in the room at a waypoint.
 pub(crate) fn pose(waypoint: &Waypoint) -> Pose {
     let turn = [waypoint.yaw_deg, waypoint.pitch_deg, waypoint.roll_deg];
     let [yaw, pitch, roll] = turn.map(f64::to_radians);
@@ -124,7 +125,7 @@ pub(crate) fn pose(waypoint: &Waypoint) -> Pose {
     )
 }
 
-/// The turn from one attitude to another; exactly none between equal ones.
+/// The rotation from one attitude to another; exactly the identity for equal ones.
 fn between(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     if from == to {
         return UnitQuaternion::identity();
@@ -132,7 +133,8 @@ fn between(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>) -> UnitQuaterni
     from.inverse() * to
 }
 
-/// The derivative at every node of the parabolas through neighbors, given the intervals and the slopes of the chords.
+/// Derivatives at every node of the parabolas through neighboring nodes, given the intervals and the slopes of the
+/// chords.
 fn slopes(intervals: &[f64], chords: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let inner = |i: usize| {
         let (before, after) = (intervals[i - 1], intervals[i]);
@@ -142,7 +144,7 @@ fn slopes(intervals: &[f64], chords: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     if last == 1 {
         return vec![chords[0]; 2];
     }
-    // On a parabola a chord's slope is the mean of the slopes at its ends.
+    // On a parabola, the slope of a chord is the mean of the slopes at its ends.
     let mut slopes = vec![chords[0] * 2.0 - inner(1)];
     slopes.extend((1..last).map(inner));
     slopes.push(chords[last - 1] * 2.0 - inner(last - 1));
@@ -160,7 +162,7 @@ fn velocities(times: &[f64], positions: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     slopes(&intervals, &chords)
 }
 
-/// From squad's aᵢ to bᵢ₊₁ for every interval.
+/// Arc from squad's aᵢ to bᵢ₊₁ for every interval.
 fn controls(times: &[f64], attitudes: &[UnitQuaternion<f64>]) -> Vec<Arc> {
     let intervals = intervals(times);
     let turns: Vec<Vector3<f64>> = attitudes

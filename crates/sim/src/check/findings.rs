@@ -1,13 +1,13 @@
-//! What the checks have found, and how they say it.
+//! The problems that the checks find, and how they are worded.
 
 use catoptric_model::place::{Path, Problem, nearest};
 use std::fmt;
 
-/// What the checks have found so far.
+/// The problems found so far.
 pub(super) struct Findings(pub(super) Vec<Problem>);
 
 impl Findings {
-    /// Notes a problem; the message reads on from the key's name.
+    /// Records a problem; the message continues from the name of the key.
     pub(super) fn add(&mut self, path: &Path, message: impl fmt::Display, help: impl Into<Option<String>>) {
         self.0.push(Problem {
             path: path.clone(),
@@ -17,7 +17,7 @@ impl Findings {
     }
 }
 
-/// "did you mean …", or the list of what there is.
+/// Asks "did you mean …?" for a close name, or lists the known ones.
 pub(super) fn suggestion<'a>(
     found: &str,
     what: &str,

@@ -1,8 +1,8 @@
-//! Whether a scene makes sense: everything that takes more than one value, or some geometry, to see.
+//! Checks of scenes: everything that needs more than one value, or some geometry.
 //!
-//! The format itself (types, ranges of single values, unknown keys) is the schema's affair. All problems are found
-//! in one pass, each with the path of the key that it is about. Geometry is that of the drawing: errors of the
-//! structure as built are small against everything that is refused here.
+//! The format itself (types, ranges of single values, unknown keys) is up to the schema. All problems are found in one
+//! pass, each with the path of the key it concerns. Geometry is that of the drawing: errors of the structure as built
+//! are small compared with everything that is rejected here.
 
 mod experiment;
 mod findings;
@@ -19,7 +19,7 @@ use crate::scene::Scene;
 use catoptric_model::place::{Path, Problem};
 use findings::Findings;
 
-/// Everything that is wrong with a scene.
+/// All problems of a scene.
 pub fn problems(scene: &Scene) -> Vec<Problem> {
     let mut found = Findings(Vec::new());
     values::check(scene, &mut found);

@@ -1,4 +1,4 @@
-//! What every beam meets in the drawing.
+//! What every beam hits in the drawing.
 
 use crate::build::layout;
 use crate::build::room::room_from_rig;
@@ -11,18 +11,18 @@ use catoptric_model::frame::yaw_pitch_roll;
 use catoptric_model::{Deflection, MirrorPlane, Pose, ScanGeometry};
 use nalgebra::{Point3, Translation3, Unit, Vector3};
 
-/// What the beams of a scan are for, from the drawing alone.
+/// How the beams of a scan are used, by the drawing alone.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outline {
-    /// The facets and the beams that the drawing sends to them.
+    /// The facets, with the beams that the drawing sends to them.
     pub facets: Vec<ServedFacet>,
-    /// Beams that meet neither facet nor post.
+    /// Beams that hit neither facet nor post.
     pub direct_beams: usize,
     /// Beams that end on a post or on the back of a facet.
     pub blocked_beams: usize,
 }
 
-/// What a facet is for.
+/// A facet and its beams.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ServedFacet {
     /// Name.
@@ -31,7 +31,7 @@ pub struct ServedFacet {
     pub beams: usize,
 }
 
-/// What the beams of a scan are for, from the drawing alone.
+/// Determines from the drawing alone how the beams of a scan are used.
 pub fn outline(scene: &Scene) -> Outline {
     // Of a scanner that cannot be, the checks have said so.
     let scan = scene.scanner.scan().unwrap_or_default();
@@ -55,12 +55,12 @@ pub fn outline(scene: &Scene) -> Outline {
     }
 }
 
-/// What a beam meets first.
+/// What a beam hits first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Meets {
     /// The reflecting side of a facet.
     Facet(usize),
-    /// The other side of a facet.
+    /// The back of a facet.
     Back(usize),
     /// A post.
     Post(usize),
@@ -72,7 +72,7 @@ pub(super) struct Face {
     pub(super) plane: MirrorPlane,
 }
 
-/// An opaque box: its frame, its half extents.
+/// An opaque box: its frame and half extents.
 struct Block {
     post_from_sensor: Pose,
     half: Vector3<f64>,
@@ -93,7 +93,7 @@ enum Solid {
 }
 
 impl Solid {
-    /// Distance at which a beam meets it from outside.
+    /// Distance at which a beam hits it from outside.
     fn distance(&self, u: &Unit<Vector3<f64>>) -> Option<f64> {
         let ray = Ray {
             origin: Point3::origin(),
@@ -114,7 +114,7 @@ impl Face {
         Some(Self { corners, plane })
     }
 
-    /// Whether a point of the plane lies inside the convex outline.
+    /// Whether a point of the plane is inside the convex outline.
     fn contains(&self, point: &Point3<f64>) -> bool {
         let edges = self.corners.iter().zip(self.corners.iter().cycle().skip(1));
         edges
@@ -122,13 +122,13 @@ impl Face {
             .all(|(a, b)| (b - a).cross(&(point - a)).dot(&self.plane.normal) >= 0.0)
     }
 
-    /// Distance at which a beam meets the outline, from either side.
+    /// Distance at which a beam hits the outline, from either side.
     pub(super) fn distance(&self, u: &Unit<Vector3<f64>>) -> Option<f64> {
         let d = self.plane.offset / self.plane.normal.dot(u);
         (d.is_finite() && d > 0.0 && self.contains(&Point3::from(u.into_inner() * d))).then_some(d)
     }
 
-    /// What the facet does to a beam that meets its reflecting side.
+    /// How the facet deflects a beam that hits its reflecting side.
     pub(super) fn deflect(&self, u: &Unit<Vector3<f64>>) -> Option<Deflection> {
         self.distance(u)?;
         self.plane.deflect(*u)
@@ -136,8 +136,8 @@ impl Face {
 }
 
 impl Block {
-    /// Distance at which a beam meets the box (slab method). From inside there is none: that post is reported by
-    /// itself, and what it would hide is not worth a word.
+    /// Distance at which a beam hits the box (slab method). `None` from inside: that post is reported separately, and
+    /// what it would hide does not matter.
     fn distance(&self, u: &Unit<Vector3<f64>>) -> Option<f64> {
         let origin = self.post_from_sensor * Point3::origin();
         let v = self.post_from_sensor * u.into_inner();
@@ -186,7 +186,7 @@ impl Obstacles {
         }
     }
 
-    /// What one beam meets first.
+    /// What one beam hits first.
     pub(super) fn met_by(&self, u: &Unit<Vector3<f64>>) -> Option<Meets> {
         let facets = self.facets.iter().enumerate().filter_map(|(i, face)| {
             let face = face.as_ref()?;
@@ -205,7 +205,7 @@ impl Obstacles {
             .map(|(_, what)| what)
     }
 
-    /// What every beam of a scan meets first.
+    /// What every beam of a scan hits first.
     pub(super) fn met_by_beams(&self) -> Vec<Option<Meets>> {
         (0..self.scan.beams())
             .map(|i| self.met_by(&beam::direction(self.scan.azimuth(i))))
@@ -224,7 +224,7 @@ impl Obstacles {
     }
 }
 
-/// Where the drawing puts the sensor in the room.
+/// Pose of the sensor in the room, as drawn.
 pub(super) fn nominal_room_from_sensor(scene: &Scene) -> Pose {
     room_from_rig(&scene.room) * structure::nominal_mount(scene)
 }

@@ -1,4 +1,4 @@
-//! Mirrors, posts and markers: whether each is a body, and whether light can reach it.
+//! Checks of mirrors, posts and markers: whether each is a valid body, and whether light can reach it.
 
 use super::findings::Findings;
 use super::outline::{Face, Meets, Obstacles};
@@ -9,11 +9,12 @@ use catoptric_model::place::Path;
 use catoptric_model::{ScanGeometry, beam};
 use nalgebra::{Point3, Unit, Vector3};
 
-/// Corners nearer than this are one corner, and a polygon narrower than this is a line: no cutter is better.
-/// Corners that are written to 0.01 mm lie in a plane to within this.
+/// Corners closer than this coincide, and a polygon narrower than this is a line: no cutter is more precise. Corners
+/// written to 0.01 mm lie in a plane to within this.
 const CUTTING_ERROR_M: f64 = 1e-5;
 
-/// Markers nearer than this to one line do not fix the turn about it: cameras see a marker to some tenths of it.
+/// Markers closer than this to one line do not determine the rotation about it: cameras locate a marker to a few tenths
+/// of it.
 const MARKER_SPREAD_M: f64 = 1e-3;
 
 pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
@@ -21,8 +22,8 @@ pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     if !scene.superstructure.pattern.is_empty() {
         found.add(
             &structure.key("pattern"),
-            "is not worked out into facets yet",
-            "io::scene does so as it reads a file, sim::pattern::expand by itself".to_owned(),
+            "has not been expanded into facets",
+            "a scene read from a file is expanded; otherwise call `build::pattern::expand`".to_owned(),
         );
     }
     let obstacles = Obstacles::of(scene, scan);
@@ -42,7 +43,7 @@ pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
                 }
             }
         }
-        // What light does at a facet that is none would only repeat what was said.
+        // For an invalid facet this would only repeat what has been reported.
         if found.0.len() == before
             && let Some(face) = &obstacles.facets[i]
         {
@@ -59,7 +60,7 @@ pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
             ),
             (Some(_), Some(_)) => found.add(
                 &path.key("size_mm"),
-                "is the size of a box, and `shape` makes the post something else",
+                "is the size of a box, but `shape` makes the post something else",
                 "delete one of the two".to_owned(),
             ),
             _ => {}
@@ -79,7 +80,7 @@ pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     let path = structure.key("marker");
     check_markers(&scene.superstructure.marker, &path, "the rig", found);
     for (i, board) in scene.board.iter().enumerate() {
-        // Without any, the laboratory puts five markers itself.
+        // Without any, the laboratory places five markers itself.
         if !board.marker.is_empty() {
             let path = Path::of("board").index(i).key("marker");
             check_markers(&board.marker, &path, &format!("board {:?}", board.name), found);
@@ -93,8 +94,8 @@ fn check_housing(scanner: &Scanner, found: &mut Findings) {
     if !scanner.housing && !boxes.is_empty() {
         found.add(
             &path,
-            "describes a housing, and `scanner.housing` is false",
-            "leave out one of the two".to_owned(),
+            "describes a housing, but `scanner.housing` is false",
+            "delete one of the two".to_owned(),
         );
     }
     for (i, part) in boxes.iter().enumerate() {
@@ -157,8 +158,8 @@ fn check_wedge(wedge: &Wedge, scan: &ScanGeometry, path: &Path, found: &mut Find
         found.add(
             path,
             format_args!(
-                "describes no mirror: turning the beam at {middle}° by {}° takes a plane that not all beams \
-                 from {first}° to {last}° meet",
+                "describes no mirror: turning the beam at {middle}° by {}° needs a plane that not all beams \
+                 from {first}° to {last}° hit",
                 rounded(turn)
             ),
             "turn the beam farther, narrow azimuth_deg or lower height_mm".to_owned(),
@@ -170,7 +171,7 @@ fn check_plate(plate: &Plate, scan: &ScanGeometry, path: &Path, found: &mut Find
     match (plate.azimuth_deg, plate.beam) {
         (Some(_), Some(_)) => found.add(
             &path.key("beam"),
-            "names a beam, and `azimuth_deg` another",
+            "names a beam, and `azimuth_deg` names another",
             "delete one of the two".to_owned(),
         ),
         (None, Some(beam)) if beam as usize >= scan.beams() => {
@@ -183,8 +184,8 @@ fn check_plate(plate: &Plate, scan: &ScanGeometry, path: &Path, found: &mut Find
         }
         (None, None) => found.add(
             path,
-            "says of no beam that it meets its center",
-            "give it azimuth_deg, or beam".to_owned(),
+            "does not name the beam that hits its center",
+            "set azimuth_deg or beam".to_owned(),
         ),
         _ => {}
     }
@@ -194,8 +195,8 @@ fn check_plate(plate: &Plate, scan: &ScanGeometry, path: &Path, found: &mut Find
     if !matches!((given(&exit), given(&normal)), (2, 0) | (0, 2)) {
         found.add(
             path,
-            "needs one direction, and has none, half of one, or two",
-            "give it exit_azimuth_deg and exit_elevation_deg, or normal_azimuth_deg and normal_elevation_deg"
+            "needs exactly one direction, but has none, half of one, or two",
+            "set exit_azimuth_deg and exit_elevation_deg, or normal_azimuth_deg and normal_elevation_deg"
                 .to_owned(),
         );
         return;
@@ -203,12 +204,12 @@ fn check_plate(plate: &Plate, scan: &ScanGeometry, path: &Path, found: &mut Find
     let one_beam = plate.azimuth_deg.is_some() != plate.beam.is_some();
     match layout::corners(&FacetShape::Plate(plate.clone()), scan) {
         Some(corners) => {
-            let help = "turn the normal round: it points from the mirror towards the scanner's side";
+            let help = "reverse the normal: it points from the mirror toward the scanner's side";
             check_side(&corners, path, help, found);
         }
         None if one_beam => found.add(
             path,
-            "describes no mirror: its beam leaves as it comes",
+            "describes no mirror: its beam leaves undeflected",
             "turn exit_azimuth_deg or exit_elevation_deg away from the beam".to_owned(),
         ),
         None => {}
@@ -225,7 +226,7 @@ fn check_rectangle(shape: &RectangleShape, scan: &ScanGeometry, path: &Path, fou
         );
         return;
     };
-    let help = "turn the normal round: it points from the mirror towards the scanner's side";
+    let help = "reverse the normal: it points from the mirror toward the scanner's side";
     check_side(&corners, &path.key("normal"), help, found);
 }
 
@@ -237,7 +238,7 @@ fn check_polygon(corners: &[Point3<f64>], path: &Path, found: &mut Findings) {
     check_side(corners, path, help, found);
 }
 
-/// Whether corners go round a convex plane polygon.
+/// Checks that corners outline a convex plane polygon, and returns whether they do.
 pub(super) fn check_outline(corners: &[Point3<f64>], path: &Path, found: &mut Findings) -> bool {
     let count = distinct_points(corners);
     if count < 3 {
@@ -260,7 +261,7 @@ pub(super) fn check_outline(corners: &[Point3<f64>], path: &Path, found: &mut Fi
         return false;
     }
     let area = catoptric_cast::area_vector(corners);
-    // The two lobes of a bow tie cancel; what rounding leaves of them has no direction.
+    // The two lobes of a bow tie cancel; the rounding error that remains has no direction.
     let Some(normal) = Unit::try_new(area, CUTTING_ERROR_M * spread(corners)) else {
         found.add(
             path,
@@ -280,23 +281,23 @@ pub(super) fn check_outline(corners: &[Point3<f64>], path: &Path, found: &mut Fi
                 rounded(worst * 1e3),
                 CUTTING_ERROR_M * 1e3
             ),
-            "mirrors are plane; three corners always are".to_owned(),
+            "mirrors are flat; three corners always lie in a plane".to_owned(),
         );
         return false;
     }
     if let Some(corner) = outside_corner(corners, &normal) {
         found.add(
             &path.index(corner),
-            "makes the outline concave, or it is out of order; corners go round a convex polygon",
-            "a concave mirror is two convex facets".to_owned(),
+            "makes the outline concave, or is out of order; the corners must form a convex polygon",
+            "describe a concave mirror as two convex facets".to_owned(),
         );
         return false;
     }
     true
 }
 
-/// A corner that makes the outline other than convex: one at which it turns the wrong way, or else one that is on the
-/// wrong side of some edge. There is neither in a convex polygon that goes round once.
+/// A corner at which the outline is not convex: one where it turns in the wrong direction, or else one on the wrong
+/// side of some edge. A convex polygon that winds around once has neither.
 fn outside_corner(corners: &[Point3<f64>], normal: &Unit<Vector3<f64>>) -> Option<usize> {
     let n = corners.len();
     let outside = |corner: usize, edge: usize| {
@@ -310,7 +311,7 @@ fn outside_corner(corners: &[Point3<f64>], normal: &Unit<Vector3<f64>>) -> Optio
         .or_else(|| (0..n).find(|c| (0..n).any(|edge| outside(*c, edge))))
 }
 
-/// The scanner must be on the reflecting side.
+/// Checks that the scanner is on the reflecting side.
 fn check_side(corners: &[Point3<f64>], path: &Path, help: &str, found: &mut Findings) {
     let Some(face) = Face::new(corners.to_vec()) else {
         return;
@@ -400,7 +401,7 @@ fn check_markers(markers: &[Marker], path: &Path, body: &str, found: &mut Findin
         found.add(
             path,
             format_args!(
-                "puts all markers of {body} within {} mm of one line; its turn about that line would not show",
+                "puts all markers of {body} within {} mm of one line; its rotation about that line cannot be determined",
                 MARKER_SPREAD_M * 1e3
             ),
             "move at least one marker off the line".to_owned(),
@@ -418,7 +419,7 @@ fn distinct_points(points: &[Point3<f64>]) -> usize {
     seen.len()
 }
 
-/// Greatest distance of a point from the line through the two that are farthest apart, in metres.
+/// Largest distance of a point from the line through the two that are farthest apart, in meters.
 fn spread(points: &[Point3<f64>]) -> f64 {
     let pairs = points
         .iter()

@@ -1,10 +1,10 @@
-//! What step 1 believes the biases to be.
+//! Beliefs about the biases, as found in step 1.
 
 use crate::noise::{Draws, Purpose};
 use crate::scene::Scene;
 use catoptric_model::RangeBias;
 
-/// The biases as step 1 found them: the true ones, missed by the characterization's uncertainty.
+/// The biases as found in step 1: the true ones plus random errors of the size of the characterization's uncertainty.
 pub(super) fn believed_bias(scene: &Scene, seed: u64, truth: &RangeBias) -> RangeBias {
     let mut believed = truth.clone();
     if *truth == RangeBias::default() {

@@ -1,4 +1,4 @@
-//! What the experimenter knows: the drawing, the surveys, and what steps 1 and 3 found out.
+//! What the experimenter knows: the drawing, the surveys, and the results of steps 1 and 3.
 
 use super::setup::Laboratory;
 use crate::build::board::board_markers;
@@ -12,17 +12,17 @@ use catoptric_model::session::{self, Session};
 use catoptric_model::{PoseData, PoseKind, PoseRecord, Summary, beam};
 use nalgebra::{Unit, Vector3};
 
-/// Bare readings beyond this are not of the structure, in metres.
+/// Bare readings beyond this do not come from the structure, in meters.
 const FARTHEST_STRUCTURE: f64 = 0.3;
 
-/// How many beams beyond the drawn ones a bare distance is still noted for: as built, the edges move.
+/// Number of beams beyond the drawn ones for which a bare distance is still recorded: as built, the edges move.
 const NEAR_FACET: usize = 12;
 
 impl Laboratory {
-    /// What the experimenter knows.
+    /// The session: everything the experimenter knows.
     ///
     /// # Errors
-    /// As [`Laboratory::returns`]: the bare structure is measured here.
+    /// As for [`Laboratory::returns`]: the bare structure is measured here.
     pub fn session(&self) -> Result<Session, SimError> {
         let scene = &self.scene;
         let mount = &scene.scanner.mount;
@@ -115,16 +115,16 @@ impl Laboratory {
             .collect())
     }
 
-    /// Step 3: mean ranges to the bare structure, corrected with the incidence that the drawing gives.
+    /// Step 3: mean ranges to the bare structure, corrected with the incidence from the drawing.
     fn bare_structure(&self) -> Result<session::BareStructure, SimError> {
         let thickness = self.scene.superstructure.mirror.thickness_mm;
         let facet_normals = self.drawn_normals()?;
         let number = self.planned.iter().position(|p| p.kind == PoseKind::Bare);
         let stretch = number.map(|number| self.stretch(number)).transpose()?;
         let record = stretch.and_then(|s| s.into_record().ok());
-        // The experimenter looks at his readings before he averages them.
+        // The experimenter examines the readings before averaging them.
         let noise_sd = self.beliefs().range_noise_sd_mm * 1e-3;
-        let looked_at = |record: &PoseRecord, beam: usize, plain: Summary| {
+        let examined = |record: &PoseRecord, beam: usize, plain: Summary| {
             let ranges = record.readings.held().unwrap_or_default().iter();
             let readings = ranges.skip(beam).step_by(record.beams()).copied();
             let found = Summary::of_main_body(readings, noise_sd);
@@ -132,7 +132,7 @@ impl Laboratory {
         };
         let summaries: Vec<Summary> = record.map_or_else(Vec::new, |r| {
             let plain = r.summarize().into_iter().enumerate();
-            plain.map(|(beam, plain)| looked_at(&r, beam, plain)).collect()
+            plain.map(|(beam, plain)| examined(&r, beam, plain)).collect()
         });
         if let Some(sd_mm) = self.scene.experiment.bare_distance_sd_mm {
             return self.measured_bare(sd_mm);
@@ -160,7 +160,7 @@ impl Laboratory {
         })
     }
 
-    /// Step 3 with another instrument: the distances of a facet's beams all share one error.
+    /// Step 3 with another instrument: the distances of all beams of a facet share one error.
     fn measured_bare(&self, sd_mm: f64) -> Result<session::BareStructure, SimError> {
         let served = self.nominal_facets()?;
         let scan = self.sensor.scan();
@@ -189,7 +189,7 @@ impl Laboratory {
         })
     }
 
-    /// For every beam, the drawn normal of the facet that serves it or is nearest to it within a few beams.
+    /// For every beam, the drawn normal of the facet that serves it or, within a few beams, of the nearest facet.
     fn drawn_normals(&self) -> Result<Vec<Option<Unit<Vector3<f64>>>>, SimError> {
         let facets = self.nominal_facets()?;
         let scan = self.sensor.scan();
@@ -205,10 +205,10 @@ impl Laboratory {
             .collect())
     }
 
-    /// Variance that the experimenter ascribes to a bare distance, in square metres.
+    /// Variance that the experimenter assigns to a bare distance, in square meters.
     fn bare_variance(&self, readings: usize, cos: f64) -> f64 {
         let believed = self.beliefs();
-        // The drawing gives the incidence; facet and scanner both stand a little off it.
+        // The incidence comes from the drawing; facet and scanner are both slightly off it.
         let mount = self.scene.scanner.mount.tilt_tolerance_deg / 3.0_f64.sqrt();
         let tilt = libm::hypot(self.scene.superstructure.as_built.tilt_sd_deg, mount).to_radians();
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
@@ -219,7 +219,7 @@ impl Laboratory {
             believed.color_bias_sd_mm,
             believed.angle_gain_sd_mm * (1.0 - cos),
             believed.bias.angle.gain_mm * sin * tilt,
-            // The mirror's own thickness is added, whatever it really is.
+            // The nominal thickness of the mirror is added, whatever the true one is.
             self.scene.superstructure.as_built.thickness_sd_mm / cos.max(f64::EPSILON),
         ];
         terms.iter().map(|mm| mm * mm * 1e-6).sum()

@@ -1,14 +1,14 @@
-//! What is written down beside a stretch.
+//! What is noted about a stretch.
 
 use super::setup::Laboratory;
 use crate::noise::{Draws, Purpose};
 use catoptric_model::{PoseLabel, SpotNote, TestKind, TestNote};
 
-/// Neighbouring beams whose spot is measured: the paper's triple beam.
+/// Number of neighboring beams whose spot is measured: the paper's triple beam.
 const SPOT_BEAMS: usize = 3;
 
 impl Laboratory {
-    /// What a person notes of a stretch.
+    /// The label that a person writes for a stretch.
     pub(super) fn label(&self, number: usize) -> PoseLabel {
         let planned = &self.planned[number];
         let board = planned.board.as_ref().map(|(board, _)| &self.scene.board[*board]);
@@ -32,7 +32,7 @@ impl Laboratory {
         }
     }
 
-    /// The spot of three neighbouring beams around a board's center, as a person reads its edges off the board.
+    /// The spot of three neighboring beams around a board's center, as a person reads its edges off the board.
     fn spot_note(&self, number: usize) -> Option<SpotNote> {
         let sensor_from_board = self.room_from_sensor().inverse() * self.boards[number]?;
         let spot = self.sensor.spot(&sensor_from_board, SPOT_BEAMS)?;

@@ -1,4 +1,4 @@
-//! The motion-capture room: labelled markers, their errors, and poses solved from them.
+//! Motion capture: labeled markers, their errors, and poses solved from them.
 
 use crate::noise::{Draws, Purpose};
 use crate::scene::{Mocap, MocapProfile};
@@ -8,12 +8,12 @@ use catoptric_model::{Pose, Track, TrackedFrame};
 use nalgebra::{Point3, Vector3};
 use std::ops::Range;
 
-/// Errors of a marker, 1σ along the room's x, y and z, in metres.
+/// Errors of a marker, 1σ along the room's x, y and z, in meters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MarkerErrors {
-    /// Constant while the body stays where it is.
+    /// Constant while the body does not move.
     pub constant: Vector3<f64>,
-    /// New in every frame.
+    /// Drawn anew in every frame.
     pub jitter: Vector3<f64>,
 }
 
@@ -48,21 +48,20 @@ impl Mocap {
 pub struct Body<'a> {
     /// Name.
     pub subject: &'a str,
-    /// Its place among the scene's bodies, the rig first: keys its draws.
+    /// Its index among the scene's bodies, the rig first; keys its draws.
     pub index: usize,
-    /// Its markers in its own frame, in metres.
+    /// Its markers in its own frame, in meters.
     pub template: &'a [Point3<f64>],
-    /// Where it really is, at a time in seconds since its first frame.
+    /// Its true pose at a time in seconds since its first frame.
     pub room_from_body: &'a (dyn Fn(f64) -> Pose + Sync),
-    /// Number of the placement: a body that stays where it is keeps its constant errors, and so does one in flight.
+    /// Number of the placement: a body at rest keeps its constant errors, and so does one in flight.
     pub placement: usize,
 }
 
-/// Largest number of markers of one body.
+/// Maximum number of markers of one body.
 pub const MAX_MARKERS: usize = 64;
 
-/// Tracks a body for some of its frames, of which frame 0 is at `start_s`. `first_frame` numbers the frames of the whole
-/// recording.
+/// Tracks a body for some of its frames. Frame 0 is at `start_s` and has number `first_frame` in the whole recording.
 pub fn track(
     mocap: &Mocap,
     seed: u64,
@@ -131,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_body_that_stays_keeps_its_constant_error() {
+    fn a_body_at_rest_keeps_its_constant_error() {
         let mocap = Mocap {
             dropout: 0.0,
             ..Mocap::default()

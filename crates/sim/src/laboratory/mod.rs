@@ -1,9 +1,9 @@
 //! The virtual laboratory: a scene and a seed become stretches of scans, the session, and the truth.
 //!
-//! Every stretch is a pure function of (scene, seed, number), so that they can be computed in any order.
+//! Every stretch is a pure function of (scene, seed, number), so stretches can be computed in any order.
 
 mod belief;
-mod chance;
+mod effects;
 mod excerpt;
 mod knowledge;
 mod label;
@@ -19,7 +19,7 @@ mod tracks;
 mod true_values;
 pub mod truth;
 
-pub use chance::{Chances, Memory};
+pub use effects::{Memory, StretchEffects};
 pub use excerpt::{Drawn, ExcerptRecorder};
 pub use recorder::Recorder;
 pub use setup::Laboratory;

@@ -1,4 +1,4 @@
-//! Stretches recorded, and the whole experiment as a dataset in memory.
+//! Records stretches, and the whole experiment as a dataset in memory.
 
 use super::setup::Laboratory;
 use super::sight::Returns;
@@ -8,7 +8,7 @@ use catoptric_model::{Dataset, PoseRecord, Stretch};
 use rayon::prelude::*;
 
 impl Laboratory {
-    /// What every beam meets during a stretch, traced once since nothing moves; in a flight, during its first scan.
+    /// What every beam receives during a stretch, traced once since nothing moves; for a flight, during its first scan.
     ///
     /// # Errors
     /// An unknown color.
@@ -33,7 +33,7 @@ impl Laboratory {
         Ok(recorder.finish())
     }
 
-    /// Records a stretch in which nothing moves from what [`Laboratory::returns`] found for it.
+    /// Records a stretch in which nothing moves, given its [`Laboratory::returns`].
     pub fn record(&self, number: usize, returns: &Returns) -> Stretch {
         let mut recorder = self.recorder(number);
         for _ in 0..self.scans_of(number) {
@@ -42,11 +42,11 @@ impl Laboratory {
         recorder.finish()
     }
 
-    /// What a calibration needs of a stretch.
+    /// Everything a calibration needs of a stretch.
     ///
     /// # Errors
-    /// As [`Laboratory::stretch`], and [`SimError::Markers`] if motion capture never saw the rig during it, which only a
-    /// dropout of nearly 1 brings about.
+    /// As for [`Laboratory::stretch`], and [`SimError::Markers`] if motion capture never saw the rig during it, which
+    /// takes a dropout of nearly 1.
     pub fn pose_record(&self, number: usize) -> Result<PoseRecord, SimError> {
         let record = self.stretch(number)?.into_record();
         record.map_err(|_| SimError::Markers {
@@ -57,7 +57,7 @@ impl Laboratory {
     /// The whole experiment in memory.
     ///
     /// # Errors
-    /// As [`Laboratory::pose_record`].
+    /// As for [`Laboratory::pose_record`].
     pub fn dataset(&self) -> Result<Dataset, SimError> {
         let numbers = (0..self.stretches()).into_par_iter();
         let poses = numbers

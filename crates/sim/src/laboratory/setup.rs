@@ -1,4 +1,4 @@
-//! The experiment set up: a structure as built, a sensor, a procedure.
+//! Sets up the experiment: a structure as built, a sensor, a procedure.
 
 use super::belief::believed_bias;
 use crate::build::board;
@@ -24,26 +24,26 @@ pub struct Laboratory {
     pub(super) seed: u64,
     pub(super) sensor: Sensor,
     pub(super) structure: Structure,
-    /// What stands in the room, as the sensor sees it from where the rig stands; nothing if it never does.
+    /// Everything fixed in the room, in the frame of the sensor at rest; `None` if all stretches are flights.
     pub(super) stage: Option<Stage>,
     pub(super) planned: Vec<Planned>,
-    /// Where each planned board really stands, in the room frame.
+    /// True pose of each planned board, in the room frame.
     pub(super) boards: Vec<Option<Pose>>,
-    /// The ways of the flights.
+    /// Trajectories of the flights.
     pub(super) trajectories: Vec<Trajectory>,
-    /// What step 1 believes the biases to be.
+    /// Beliefs about the biases, from step 1.
     pub(super) believed: RangeBias,
-    /// The ways of all sub-rays over the structure, with its mirrors and without, once they are known.
+    /// Paths of all sub-rays via the structure, with its mirrors and without, once they are compiled.
     pub(super) rigs: [OnceLock<Rig>; 2],
 }
 
 impl Laboratory {
-    /// Builds the structure, sets up the procedure.
+    /// Builds the structure and plans the procedure.
     ///
     /// # Errors
-    /// A facet without a shape, an unknown color, a board that fits nowhere, a flight that is none.
+    /// A facet without a shape, an unknown color, a board that fits nowhere, an invalid flight.
     pub fn new(scene: &Scene, seed: u64) -> Result<Self, SimError> {
-        // Boards stand in a room; a flight needs none.
+        // Boards need a room; a flight does not.
         if scene.has_no_laboratory() || !(scene.room.has_walls() || scene.only_flies()) {
             return Err(SimError::NoLaboratory);
         }
@@ -127,7 +127,7 @@ impl Laboratory {
         self.boards.iter().flatten().count()
     }
 
-    /// Scans of all stretches together.
+    /// Number of scans of all stretches together.
     pub fn scans(&self) -> usize {
         self.planned.iter().map(|p| p.scans).sum()
     }
@@ -137,12 +137,12 @@ impl Laboratory {
         &self.sensor
     }
 
-    /// Scans of one stretch.
+    /// Number of scans of one stretch.
     pub fn scans_of(&self, number: usize) -> usize {
         self.planned[number].scans
     }
 
-    /// Sub-rays of a beam.
+    /// Number of sub-rays of a beam.
     pub fn sub_rays(&self) -> usize {
         self.sensor.sub_rays()
     }
@@ -151,7 +151,7 @@ impl Laboratory {
         room_from_rig(&self.scene.room) * self.structure.rig_from_sensor
     }
 
-    /// Drift of a stretch, in metres.
+    /// Drift of a stretch, in meters.
     pub(super) fn drift(&self, number: usize) -> f64 {
         if self.scene.errors.model == ErrorModel::None {
             return 0.0;
@@ -160,19 +160,19 @@ impl Laboratory {
         draws.normal() * self.scene.errors.drift_sd_mm * 1e-3
     }
 
-    /// Number of a stretch's first scan, counted over the whole recording.
+    /// Number of a stretch's first scan within the whole recording.
     pub(super) fn first_scan(&self, number: usize) -> usize {
         self.planned[..number].iter().map(|p| p.scans).sum()
     }
 
-    /// When a stretch begins, in seconds since the recording began.
+    /// Start of a stretch, in seconds since the recording began.
     pub(super) fn start_s(&self, number: usize) -> f64 {
         let scan_period_s = self.sensor.scan().scan_period_s();
         self.first_scan(number) as f64 * scan_period_s + number as f64 * self.scene.experiment.pause_s
     }
 }
 
-/// Where a board really stands when a person means to put it somewhere.
+/// True pose of a board that a person tries to place at a given pose.
 fn misplaced(scene: &Scene, seed: u64, number: usize, meant: &Pose) -> Pose {
     let mut draws = Draws::new(seed, Purpose::Placement, number as u64);
     let shift = draws.normal3() * (scene.experiment.placement_sd_mm * 1e-3);

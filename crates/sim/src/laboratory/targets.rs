@@ -1,4 +1,4 @@
-//! What stands around the sensor: the room's walls, and a stretch's board.
+//! Targets around the sensor: the room's walls, and a stretch's board.
 
 use super::setup::Laboratory;
 use crate::build::board::outline;
@@ -12,7 +12,7 @@ use catoptric_model::Pose;
 use nalgebra::Point3;
 
 impl Laboratory {
-    /// Walls and the stretch's board where it stands, in the sensor frame.
+    /// Walls, and the stretch's board at a given pose, in the sensor frame.
     pub(super) fn targets(
         &self,
         number: usize,
@@ -36,7 +36,7 @@ impl Laboratory {
     }
 }
 
-/// Walls, floor and ceiling, moved into another frame.
+/// Walls, floor and ceiling, transformed into another frame.
 pub(crate) fn wall_targets(scene: &Scene, frame_from_room: &Pose, paint: &Paint) -> Vec<Target> {
     room::walls(scene)
         .into_iter()
@@ -51,7 +51,7 @@ pub(crate) fn wall_targets(scene: &Scene, frame_from_room: &Pose, paint: &Paint)
         .collect()
 }
 
-/// The polygon of corners that are moved into another frame.
+/// A polygon whose corners are transformed into another frame.
 fn placed(frame_from_room: &Pose, corners: Vec<Point3<f64>>) -> Option<Polygon> {
     Polygon::new(corners.iter().map(|c| frame_from_room * c).collect())
 }

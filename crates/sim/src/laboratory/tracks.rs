@@ -9,7 +9,7 @@ use catoptric_model::dataset::RIG_SUBJECT;
 use std::ops::Range;
 
 impl Laboratory {
-    /// Frames of motion capture during a stretch.
+    /// Number of motion-capture frames during a stretch.
     pub(super) fn frames_of(&self, number: usize) -> u64 {
         let duration_s = self.planned[number].scans as f64 * self.sensor.scan().scan_period_s();
         // Frame numbers and counts of a recording of hours stay far below 2³².
@@ -18,7 +18,7 @@ impl Laboratory {
         frames.max(1)
     }
 
-    /// The rig, and the stretch's board, during some of its frames.
+    /// Tracks of the rig and of the stretch's board during some of its frames.
     pub(super) fn tracks(&self, number: usize, frames: Range<u64>) -> Vec<Track> {
         let mocap = &self.scene.mocap;
         let start_s = self.start_s(number);
@@ -34,7 +34,7 @@ impl Laboratory {
             index: 0,
             template: &rig,
             room_from_body: &|elapsed_s| trajectory.map_or(at_rest, |t| t.room_from_rig(elapsed_s)),
-            // The rig stays where it is for the whole experiment, one placement, and is taken up for each flight.
+            // The rig rests for the whole experiment, which is one placement, and is picked up for each flight.
             placement: if trajectory.is_some() { number + 1 } else { 0 },
         })];
         if let (Some((board, _)), Some(room_from_board)) = (&self.planned[number].board, &self.boards[number])

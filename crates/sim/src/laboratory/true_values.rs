@@ -1,4 +1,4 @@
-//! The truth as the laboratory knows it.
+//! Collects the truth of an experiment.
 
 use super::setup::Laboratory;
 use crate::build::room::room_from_rig;
@@ -10,7 +10,7 @@ use catoptric_model::{Deflection, PoseData};
 use rayon::prelude::*;
 
 impl Laboratory {
-    /// The truth beside it all.
+    /// The truth of the experiment.
     ///
     /// # Errors
     /// An unknown color.
@@ -58,7 +58,7 @@ impl Laboratory {
         })
     }
 
-    /// Where the sensor was at the start of every scan of a flight.
+    /// Pose of the sensor at the start of every scan of a flight.
     fn flown(&self, number: usize) -> Vec<PoseData> {
         let planned = &self.planned[number];
         let trajectory = planned.flight.map(|flight| &self.trajectories[flight]);

@@ -1,4 +1,4 @@
-//! The truth: what was really simulated, kept apart from what was observed.
+//! The truth: what was simulated, kept apart from what was observed.
 
 pub use crate::receive::reading::BeamClass;
 
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// Version of `truth.json`.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// Everything a score is counted against.
+/// Everything that a score is computed from on the side of the truth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Truth {
@@ -21,17 +21,17 @@ pub struct Truth {
     pub name: String,
     /// Seed of the run.
     pub seed: u64,
-    /// Where the rig stood, flights aside.
+    /// Pose of the rig, except in flights.
     pub room_from_rig: PoseData,
-    /// Where the sensor sat in the rig.
+    /// Pose of the sensor in the rig.
     pub rig_from_sensor: PoseData,
-    /// The biases the sensor had.
+    /// Biases of the sensor.
     pub bias: RangeBias,
     /// The mirrors as built.
     pub facets: Vec<TrueFacet>,
-    /// What became of every beam's light at the structure, boards aside.
+    /// What the structure does to the light of every beam, boards aside.
     pub beams: Vec<TrueBeam>,
-    /// What was true of every stretch.
+    /// True values of every stretch.
     pub poses: Vec<TruePose>,
 }
 
@@ -43,60 +43,60 @@ pub struct TrueFacet {
     pub name: String,
     /// Unit normal m of its plane, on the reflecting side.
     pub normal: [f64; 3],
-    /// h of the plane m·x = h, in metres.
+    /// h of the plane m·x = h, in meters.
     pub offset_m: f64,
-    /// Corners, in metres.
+    /// Corners, in meters.
     pub corners_m: Vec<[f64; 3]>,
 }
 
-/// What became of a beam's light at the structure. Angles are those of the chief ray.
+/// What the structure does to the light of a beam. Angles are those of the chief ray.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrueBeam {
     /// Index of the beam.
     pub beam: usize,
-    /// What the structure does to it.
+    /// Class of the beam.
     pub status: BeamClass,
-    /// Facets the chief ray meets, in order.
+    /// Facets that the chief ray hits, in order.
     pub facets: Vec<String>,
-    /// Where it meets them, in the sensor frame, in metres.
+    /// Where it hits them, in the sensor frame, in meters.
     pub points_m: Vec<[f64; 3]>,
-    /// θ_a, in radians; absent where the chief ray does not leave.
+    /// θ_a, in radians; absent if the chief ray does not leave.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub azimuth_rad: Option<f64>,
     /// φ, in radians.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub elevation_rad: Option<f64>,
-    /// d: distance to the first facet, in metres.
+    /// d: distance to the first facet, in meters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distance_m: Option<f64>,
-    /// Share of the beam's energy that goes the chief ray's way.
+    /// Share of the beam's energy that takes the same path as the chief ray.
     pub chief_energy: f64,
 }
 
-/// What was true of a stretch.
+/// True values of a stretch.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TruePose {
     /// Number of the pose.
     pub pose: usize,
-    /// What it was recorded for.
+    /// Kind of the stretch.
     pub kind: PoseKind,
-    /// Where the board stood.
+    /// Pose of the board.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub room_from_board: Option<PoseData>,
-    /// Where the board stood after it had moved during the stretch.
+    /// Pose of the board after it moved during the stretch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub room_from_board_after: Option<PoseData>,
     /// What went wrong.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mishap: Option<Mishap>,
-    /// Where the sensor was at the start of every scan of a flight; in other stretches it is where it always is.
+    /// Pose of the sensor at the start of every scan of a flight; empty for other stretches, in which the sensor rests.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub room_from_sensor: Vec<PoseData>,
-    /// Drift of all its readings, in metres.
+    /// Drift of all its readings, in meters.
     pub drift_m: f64,
-    /// What the scanner was off at its first and its last scan because it was not warm, in metres.
+    /// Warm-up error of the scanner at its first and its last scan, in meters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub warm_up_m: Option<[f64; 2]>,
 }

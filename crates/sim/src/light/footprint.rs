@@ -1,21 +1,22 @@
-//! A beam as a bundle of sub-rays over its turning ellipse.
+//! A beam as sub-rays distributed over its rotating ellipse.
 //!
-//! The light of a Gaussian beam, exp(−2ρ²) with ρ = 1 on the 1/e² contour, is cut into rings of equal-energy rays. One
-//! cut lies on the contour itself, so that the energy inside it is 1 − e⁻² for any number of rays but one. Every ring
-//! has an even number of evenly spaced rays: the bundle's center of light is the chief ray, exactly.
+//! The light of a Gaussian beam, exp(−2ρ²) with ρ = 1 on the 1/e² contour, is cut into rings of rays with equal energy.
+//! From nine rays on, one cut is the contour itself, so that the energy inside it is 1 − e⁻² for any number of rays.
+//! Every ring has an even number of evenly spaced rays, which puts the center of energy exactly on the chief ray.
 //!
-//! What is smooth over the spot (path, incidence, power on one plane) is integrated exactly up to second order; of an
-//! integrand that grows by e³ across the spot 0.7 % is missing with 61 rays, 0.5 % with 1024 and 0.2 % with 4096. What is
-//! not smooth, an edge that cuts the spot, converges with order 0.6 in the number of rays, as measured by the test below:
-//! the share beyond an edge anywhere in the spot is wrong by at most 5.6, 2.6, 0.7 and 0.3 % of the beam's energy with 61,
-//! 256, 1024 and 4096 rays. Outside the contour the light is one ring up to 1056 rays, then two and three.
+//! What is smooth over the spot (path length, incidence, power on one plane) is integrated exactly up to second order;
+//! for an integrand that grows by e³ across the spot, 0.7 % is missing with 61 rays, 0.5 % with 1024 and 0.2 % with
+//! 4096. What is not smooth, an edge that cuts the spot, converges with order 0.6 in the number of rays, as measured by
+//! a test below: the share beyond an edge anywhere in the spot is wrong by at most 5.6, 2.6, 0.7 and 0.3 % of the
+//! beam's energy with 61, 256, 1024 and 4096 rays. Outside the contour there is one ring with up to 1056 rays, then
+//! there are two and three.
 
 use crate::scene::BeamShape;
 use catoptric_cast::Ray;
 use catoptric_model::beam;
 use nalgebra::{Point3, Unit, Vector3};
 
-/// A sub-ray's place in the ellipse, in units of the 1/e² half-axes, and its share of the energy.
+/// Position of a sub-ray in the ellipse, in units of the 1/e² half-axes, and its share of the energy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SubRay {
     /// Along the long axis.
@@ -29,19 +30,19 @@ pub struct SubRay {
 /// Energy of a Gaussian beam inside its 1/e² contour: 1 − e⁻².
 pub const ENERGY_INSIDE: f64 = 0.864_664_716_763_387_3;
 
-/// Fewest rays for which some can be put outside the contour.
+/// Smallest number of rays of which some are placed outside the contour.
 const FEWEST_SPLIT: usize = 9;
 
-/// How the root of the number of rays outside the contour makes rings: two of them from 144 rays on.
+/// Number of rings outside the contour per square root of the number of rays there: two rings from 144 rays on.
 ///
-/// Without a second ring a bundle never learns of the beam's tail, however large it is. Fewer rays to a ring would serve
-/// smaller bundles too, but change what is recorded with up to a thousand rays.
+/// Without a second ring the tail of the beam is never resolved, however many rays there are. Fewer rays per ring would
+/// improve smaller numbers of rays too, but change what is recorded with up to a thousand rays.
 const ROOT_PER_RING: f64 = 6.0;
 
-/// The sub-rays of a beam; the first is the chief ray for odd numbers, and alone it is the whole beam.
+/// The sub-rays of a beam. For odd numbers the first is the chief ray, and a single ray is the whole beam.
 ///
-/// The weights sum to one to rounding. From five rays on the mean squares of `wide` and `narrow` are the Gaussian's,
-/// 1/4; from nine on the energy inside the contour is too.
+/// The weights sum to one to within rounding. From five rays on, the mean squares of `wide` and `narrow` are those of
+/// the Gaussian, 1/4; from nine on, so is the energy inside the contour.
 pub fn sub_rays(count: usize) -> Vec<SubRay> {
     let chief = SubRay {
         wide: 0.0,
@@ -94,7 +95,7 @@ pub fn sub_rays(count: usize) -> Vec<SubRay> {
     rays
 }
 
-/// How many rays lie inside and outside the contour: in proportion to the energy, the outside an even number.
+/// Numbers of rays inside and outside the contour: in proportion to the energy, with an even number outside.
 fn split_at_contour(count: usize) -> (usize, usize) {
     // At least four, for a ring whose spread is the same in all directions; rounding of a small positive number.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
@@ -102,12 +103,12 @@ fn split_at_contour(count: usize) -> (usize, usize) {
     (count - outside, outside)
 }
 
-/// Sizes of the rings that hold an even number of rays: growing like the radius, each even and at least four.
+/// Sizes of the rings that hold an even number of rays: proportional to the radius, each even and at least four.
 fn rings(total: usize) -> Vec<usize> {
     if total < 4 {
         return if total == 0 { Vec::new() } else { vec![total] };
     }
-    // Rings of 6, 12, 18, … rays hold 3k(k + 1): take the k that comes nearest.
+    // Rings of 6, 12, 18, … rays hold 3k(k + 1): take the closest k.
     let count = (1..)
         .take_while(|k| 3 * k * (k + 1) <= total + 2)
         .last()
@@ -119,7 +120,7 @@ fn rings(total: usize) -> Vec<usize> {
     sizes
 }
 
-/// Sizes of the rings outside the contour: equal, even, and four times as many rays to make twice as many rings.
+/// Sizes of the rings outside the contour: equal and even; four times as many rays make twice as many rings.
 fn rings_outside(total: usize) -> Vec<usize> {
     // The root of a count that fits in memory.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
@@ -145,7 +146,7 @@ fn mean_square_radius(inner: f64, outer: f64) -> f64 {
 
 fn push_ring(rays: &mut Vec<SubRay>, ring: usize, size: usize, weight: f64, mean_square: f64) {
     let radius = mean_square.sqrt();
-    // Odd rings are turned by half a step so that rays do not line up along radii.
+    // Odd rings are rotated by half a step, so that rays do not line up along radii.
     let turn = if ring % 2 == 1 { 0.5 } else { 0.0 };
     rays.extend((0..size).map(|k| {
         let (sin, cos) = libm::sincos(std::f64::consts::TAU * (k as f64 + turn) / size as f64);
@@ -157,9 +158,9 @@ fn push_ring(rays: &mut Vec<SubRay>, ring: usize, size: usize, weight: f64, mean
     }));
 }
 
-/// Moves what lies outside, the rays from index `inside` on, so that the bundle's spread is the Gaussian's.
+/// Scales the positions of the outer rays, from index `inside` on, so that the spread of all rays is the Gaussian's.
 ///
-/// The chief ray stands for a small disc but has no spread itself; the rays outside make up for it.
+/// The chief ray represents a small disk but has no spread itself; the outer rays compensate for it.
 fn correct_spread(rays: &mut [SubRay], inside: usize) {
     let spread = |rays: &[SubRay]| -> f64 {
         rays.iter()
@@ -176,8 +177,8 @@ fn correct_spread(rays: &mut [SubRay], inside: usize) {
 
 /// The ray of a sub-ray of the beam at a given azimuth, in the sensor frame.
 ///
-/// Behind a spinning 45° mirror the spot turns with the azimuth θ: its long axis lies along
-/// cos θ·(horizontal) + sin θ·(vertical), its short axis along −sin θ·(horizontal) + cos θ·(vertical).
+/// Behind a spinning 45° mirror the spot rotates with the azimuth θ: its long axis is along cos θ·(horizontal) + sin
+/// θ·(vertical), its short axis along −sin θ·(horizontal) + cos θ·(vertical).
 pub fn ray(shape: &BeamShape, azimuth: f64, sub_ray: &SubRay) -> Ray {
     let direction = beam::direction(azimuth);
     if sub_ray.wide == 0.0 && sub_ray.narrow == 0.0 {
@@ -210,7 +211,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_bundle_has_the_moments_of_the_beam() {
+    fn sub_rays_have_the_moments_of_the_beam() {
         for count in (1..=70).chain([127, 256, 999, 4096]) {
             let rays = sub_rays(count);
             assert_eq!(rays.len(), count);
@@ -254,8 +255,8 @@ mod tests {
         assert!((side.z / side.y - 0.008).abs() < 1e-6 && side.x.abs() < 1e-15);
     }
 
-    /// Worst error, over edges within so many radii of the contour, of the share of energy on one side of an edge along
-    /// an axis.
+    /// Worst error of the share of energy on one side of an edge along an axis, over edges up to `reach` contour radii
+    /// from the center.
     fn worst_edge(count: usize, reach: f64) -> f64 {
         let rays = sub_rays(count);
         let mut worst: f64 = 0.0;
@@ -271,12 +272,12 @@ mod tests {
     }
 
     #[test]
-    fn an_edge_converges_with_the_order_that_is_stated() {
+    fn an_edge_converges_with_the_stated_order() {
         let errors = [61, 256, 1024, 4096].map(|n| worst_edge(n, 1.0));
         let order = libm::log(errors[0] / errors[3]) / libm::log(4096.0 / 61.0);
         assert!(order > 0.6, "{errors:?}: order {order}");
         assert!(errors[0] < 0.056 && errors[3] < 0.003, "{errors:?}");
-        // From the single ray on, which has all of its energy on one side or the other.
+        // Starting with a single ray, whose energy is entirely on one side.
         for count in [
             1, 2, 3, 5, 7, 9, 12, 19, 37, 61, 127, 256, 500, 1000, 1024, 2000, 4096,
         ] {
@@ -289,10 +290,10 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_outside_of_the_contour_is_one_ring_in_small_bundles_alone() {
+    fn the_rays_outside_the_contour_are_one_ring_only_if_few() {
         let outside = |count: usize| -> std::collections::BTreeSet<i64> {
             let radii = sub_rays(count).into_iter().map(|r| libm::hypot(r.wide, r.narrow));
-            // Whole micro-radii tell rings apart and one ring's rounding not.
+            // Rounding to micro-radii separates rings, but not the rounding errors within a ring.
             #[allow(clippy::cast_possible_truncation)]
             radii
                 .filter(|r| *r > 1.0)
@@ -306,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_smooth_converges_too() {
+    fn smooth_integrands_converge_too() {
         // The mean of exp(a·x + b·y) over the beam is exp((a² + b²)/8).
         let (a, b) = (1.5, -0.8);
         let exact = libm::exp((a * a + b * b) / 8.0);

@@ -1,8 +1,8 @@
-//! A mirror behind glass: how far light goes in the glass, where it comes out, and what the front turns back.
+//! A mirror behind glass: the optical path in the glass, where light leaves it, and what its front reflects.
 //!
 //! Light enters a plane-parallel plate of thickness t and index n at incidence θ, is refracted to sin θ′ = sin θ / n,
 //! reflected at the silver, and leaves the front parallel to the light that a front-surface mirror would reflect: the
-//! direction is unchanged. In the glass it covers t/cos θ′ twice, n times slower.
+//! direction is unchanged. In the glass it travels t/cos θ′ twice, n times slower.
 
 use crate::scene::Glass;
 use nalgebra::{Unit, Vector3};
@@ -10,17 +10,17 @@ use nalgebra::{Unit, Vector3};
 /// What a plate of glass does to one ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Passage {
-    /// From where the ray enters to where it meets the silver, in metres.
+    /// From the entry point to where the ray hits the silver, in meters.
     pub to_silver: Vector3<f64>,
-    /// From where the ray enters to where it leaves, along the front, in metres: 2·t·tan θ′ long.
+    /// From the entry point to the exit point along the front, in meters: its length is 2·t·tan θ′.
     pub walk: Vector3<f64>,
-    /// Optical path in the glass, 2·n·t/cos θ′, in metres.
+    /// Optical path in the glass, 2·n·t/cos θ′, in meters.
     pub path: f64,
-    /// Share of unpolarised light that the front reflects.
+    /// Share of unpolarized light that the front reflects.
     pub fresnel: f64,
 }
 
-/// The way through the glass of a ray that meets a front with a normal.
+/// The path through the glass of a ray that hits a front with a given normal.
 ///
 /// Snell: the direction in the glass is u/n − (cos θ′ − cos θ/n)·m, with the normal m on the ray's side.
 pub fn pass(glass: &Glass, direction: &Unit<Vector3<f64>>, normal: &Unit<Vector3<f64>>) -> Passage {
@@ -38,7 +38,7 @@ pub fn pass(glass: &Glass, direction: &Unit<Vector3<f64>>, normal: &Unit<Vector3
     }
 }
 
-/// Share of unpolarised light that is reflected where light enters a medium of index n (Fresnel):
+/// Share of unpolarized light that is reflected on entering a medium of index n (Fresnel):
 /// ½·[((cos θ − n cos θ′)/(cos θ + n cos θ′))² + ((n cos θ − cos θ′)/(n cos θ + cos θ′))²].
 fn fresnel(n: f64, cos: f64, cos_inside: f64) -> f64 {
     let across = (cos - n * cos_inside) / (cos + n * cos_inside);

@@ -1,4 +1,4 @@
-//! Light on its way: the footprint of a beam, its path over mirrors and through glass, and what power comes back.
+//! Paths of light: the footprint of a beam, its path via mirrors and through glass, and the power that returns.
 
 pub mod footprint;
 pub mod glass;

@@ -1,33 +1,33 @@
-//! How much light comes back: Cooper, Eq. (1).
+//! Received power: Cooper, Eq. (1).
 
 use crate::scene::Light;
 
-/// What Eq. 1 needs to know of a target.
+/// Properties of a target that Eq. (1) depends on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Illumination {
     /// Reflectivity of the target, ρ_t.
     pub reflectivity: f64,
     /// Cosine of the incidence on it (Lambert's law, which the paper's equation leaves to dA).
     pub cos_incidence: f64,
-    /// Share of the beam's area that falls on it: dA over (θ_d·R)².
+    /// Share of the beam's area that falls on it: dA / (θ_d·R)².
     pub share: f64,
-    /// Path length R, in metres.
+    /// Path length R, in meters.
     pub range: f64,
-    /// Mirror reflectivity met on the way out; paid again on the way back.
+    /// Reflectivity of the mirrors on the outgoing path; it applies again to the return.
     pub mirrors: f64,
 }
 
 /// Power at the detector, in watts: P = τ_o·τ_a²·D_R²·ρ_t·dA·P_t / (R²·θ_R·(θ_d·R)²) — Eq. (1).
 ///
-/// dA is the part of the spot (θ_d·R)² that a sub-ray stands for, so that the spot's size cancels and the sub-rays of
-/// a beam whose spot the target fills add up to the closed form. Unlike the paper, the cosine of the incidence and the
-/// mirrors' losses are written out.
+/// dA is the part of the spot (θ_d·R)² that a sub-ray represents, so that the size of the spot cancels and the sub-rays
+/// of a beam whose spot is entirely on the target add up to the closed form. Unlike the paper, the cosine of the
+/// incidence and the losses at the mirrors are written out.
 #[doc(alias = "P_detector")]
 pub fn received(light: &Light, on: &Illumination) -> f64 {
     Target::new(light, on.reflectivity, on.mirrors).received(on.share, on.range, on.cos_incidence)
 }
 
-/// A target and the mirrors before it: what is the same for all sub-rays that go there.
+/// A target and the mirrors in front of it: everything that is the same for all sub-rays that go there.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Target {
     /// τ_o·τ_a²·D_R²·ρ_t.
@@ -50,7 +50,7 @@ impl Target {
         }
     }
 
-    /// [`received`] from there.
+    /// [`received`] from this target.
     #[inline]
     pub(crate) fn received(&self, share: f64, range: f64, cos_incidence: f64) -> f64 {
         self.sent_back * share * self.power / (range * range * self.dispersion) * cos_incidence * self.mirrors

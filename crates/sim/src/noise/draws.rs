@@ -4,41 +4,41 @@ use rand::SeedableRng;
 use rand::rand_core::Rng;
 use rand::rngs::ChaCha8Rng;
 
-/// What a draw is for. The numbers are part of the file format: they never change, new ones are added.
+/// What a draw is for. The numbers are part of the file format: they never change; new ones are added.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Purpose {
-    /// Where the sensor sits in the rig.
+    /// Pose of the sensor in the rig.
     Mount = 1,
     /// Pose of a facet as built; row = facet.
     FacetPose = 2,
     /// Surface of a facet; row = facet.
     FacetSlope = 3,
-    /// How far a person misses a board's place; row = pose.
+    /// Errors of a person who places a board; row = pose.
     Placement = 4,
     /// Constant error of a marker; row = placement, column = subject and marker.
     MarkerConstant = 5,
-    /// Jitter of a marker; row = frame, column = subject and marker.
+    /// Jitter of a marker; row = motion-capture frame, column = subject and marker.
     MarkerJitter = 6,
     /// Drift of a pose; row = pose.
     Drift = 7,
     /// Noise and dropout of a reading; row = scan, column = beam.
     Reading = 8,
-    /// What step 1 got wrong.
+    /// Errors of the characterization in step 1.
     Characterization = 9,
     /// Whether echoes near the threshold are detected; row = scan, column = beam, one draw per echo.
     Detection = 10,
     /// Innovation of the correlated noise; row = scan, column = beam.
     Correlated = 11,
-    /// Steps by interference; row = scan, column = beam.
+    /// Steps due to interference; row = scan, column = beam.
     Interference = 12,
-    /// How a person misreads the edges of a spot; row = pose.
+    /// Errors of a person who reads the edges of a spot; row = pose.
     SpotReading = 13,
     /// Constant error of a beam in a pose; row = pose, column = beam.
     Element = 14,
     /// Board poses that are set up at random; row = group, column = pose and attempt.
     Design = 15,
-    /// A distance to the bare structure that was measured without the scanner; row = facet.
+    /// Distance to the bare structure, measured without the scanner; row = facet.
     BareDistance = 16,
     /// Thickness of a mirror as built; row = facet.
     MirrorThickness = 17,
@@ -65,12 +65,12 @@ impl Draws {
         }
     }
 
-    /// Goes to the first draw of a column.
+    /// Moves to the first draw of a column.
     pub fn seek(&mut self, column: u64) {
         const WORDS: u128 = WORDS_PER_COLUMN as u128;
         let word = u128::from(column) * WORDS;
         match word.checked_sub(self.rng.get_word_pos()) {
-            // The next column in turn: its words are most likely computed already, and to jump would compute them anew.
+            // The next column: its words have most likely been computed already, and a jump would compute them again.
             Some(ahead) if ahead <= WORDS => {
                 for _ in 0..ahead {
                     self.rng.next_u32();
@@ -107,12 +107,12 @@ impl Draws {
     }
 }
 
-/// A number from the open interval (0, 1) from 64 random bits.
+/// A number in the open interval (0, 1) from 64 random bits.
 pub(super) fn standard_uniform(bits: u64) -> f64 {
     ((bits >> 11) as f64 + 0.5) * (1.0 / (1_u64 << 53) as f64)
 }
 
-/// Box and Muller's transform of two numbers from (0, 1].
+/// The Box–Muller transform of two numbers in (0, 1].
 pub(super) fn box_muller(first: f64, second: f64) -> f64 {
     let radius = (-2.0 * libm::log(first)).sqrt();
     radius * libm::cos(std::f64::consts::TAU * second)
@@ -169,7 +169,7 @@ mod tests {
             lagged += x * before;
             before = x;
         }
-        // 4.4172 standard errors of each statistic: together a false alarm once in 25 000 seeds.
+        // 4.4172 standard errors of each statistic: a false alarm by any of them once in 25 000 seeds.
         let (n, z) = (n as f64, 4.4172);
         assert!((sum / n).abs() < z / n.sqrt());
         assert!((squares / n - 1.0).abs() < z * (2.0 / n).sqrt());

@@ -1,9 +1,9 @@
-//! The echoes of a beam, and the place in each that a detector takes for its range.
+//! The echoes of a beam, and the point of each that a detector takes for its range.
 //!
 //! The waveform over range is w(x) = Σ Pᵢ·exp(−(x − rᵢ)²/2σ²); a receiver that saturates at S sees min(w, S). Each
-//! local maximum of w is an echo of its own, from the valley before it to the valley after it, but two within a pulse's
-//! full width at half maximum (c·τ/2 in range) are one. A comparator needs w to fall below its level before it can fire
-//! again: `leading_edge` and `constant_fraction` merge what they cannot tell apart.
+//! local maximum of w is an echo of its own, from the valley before it to the valley after it, but two maxima within a
+//! pulse's full width at half maximum (c·τ/2 in range) are one. A comparator needs w to fall below its level before it
+//! can fire again: `leading_edge` and `constant_fraction` merge what they cannot separate.
 //!
 //! | detector | takes | one Gaussian pulse of height A reads early by | clipped at S < A |
 //! |---|---|---|---|
@@ -16,55 +16,56 @@ use crate::receive::detect::root::{bisect, crossing, turning};
 use crate::receive::detect::{self, Pulse, height, slope, walk};
 use crate::scene::Detector;
 
-/// What turns a waveform into ranges.
+/// A receiver, which turns a waveform into ranges.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Receiver {
-    /// Which place of an echo it takes.
+    /// The point of an echo that it takes.
     pub detector: Detector,
     /// The fraction of [`Detector::ConstantFraction`].
     pub fraction: f64,
-    /// Standard deviation σ of a pulse in range, in metres.
+    /// Standard deviation σ of a pulse in range, in meters.
     pub sd: f64,
     /// The threshold V, in watts.
     pub threshold: f64,
-    /// The height S above which echoes are clipped, in watts; infinite if none is.
+    /// The height S above which echoes are clipped, in watts; infinite without clipping.
     pub saturation: f64,
 }
 
 /// An echo as a detector sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Echo {
-    /// The place it takes, in metres of range.
+    /// The point that it takes, in meters of range.
     pub place: f64,
-    /// That place, with what the detector does to a single Gaussian pulse of this height undone, in metres.
+    /// That point, corrected for what the detector does to a single Gaussian pulse of this height, in meters.
     pub compensated: f64,
     /// Height of its highest point before clipping, in watts.
     pub peak: f64,
-    /// Where its light begins: the valley before it, or −∞, in metres.
+    /// Where its light begins: the valley before it, or −∞, in meters.
     pub start: f64,
-    /// Where its light ends, in metres.
+    /// Where its light ends, in meters.
     pub end: f64,
 }
 
-/// A stretch of the waveform from valley to valley.
+/// The part of the waveform from one valley to the next.
 #[derive(Debug, Clone, Copy)]
 struct Hill {
     start: f64,
     end: f64,
-    /// Its first local maximum, where a comparator that fired on it takes its height.
+    /// Its first local maximum, whose height is known to a comparator that fired on it.
     first: f64,
-    /// Its last one: the next is told apart by the distance from it.
+    /// Its last local maximum, from which the distance to the next hill is measured.
     last: f64,
-    /// Its highest one.
+    /// Its highest local maximum.
     top: f64,
     peak: f64,
 }
 
-/// Fraction of σ in which the waveform is searched: local maxima of a sum of equal Gaussians are 2σ apart or more.
+/// Step of the search through the waveform, as a fraction of σ: local maxima of a sum of equal Gaussians are 2σ apart
+/// or more.
 const STEP: f64 = 0.25;
 
 impl Receiver {
-    /// How far before its top a single Gaussian pulse of a height is taken, in metres.
+    /// How far before its peak a single Gaussian pulse of a given height is taken, in meters.
     pub fn lead(&self, peak: f64) -> f64 {
         match self.detector {
             Detector::LeadingEdge => self.sd * walk(peak, self.threshold),
@@ -89,7 +90,7 @@ impl Receiver {
             .collect()
     }
 
-    /// Whether the detector takes two neighbouring hills for one echo.
+    /// Whether the detector takes two neighboring hills for one echo.
     fn is_one(&self, pulses: &[Pulse], before: &Hill, after: &Hill) -> bool {
         let valley = height(pulses, self.sd, after.start);
         let cannot_fire_again = match self.detector {
@@ -100,7 +101,7 @@ impl Receiver {
         cannot_fire_again || after.first - before.last < detect::pulse_length(self.sd)
     }
 
-    /// The waveform from valley to valley.
+    /// Splits the waveform at its valleys.
     fn hills(&self, pulses: &[Pulse]) -> Vec<Hill> {
         let nearest = pulses.iter().map(|p| p.range).fold(f64::INFINITY, f64::min);
         let farthest = pulses.iter().map(|p| p.range).fold(f64::NEG_INFINITY, f64::max);
@@ -145,7 +146,7 @@ impl Receiver {
             Detector::Peak => self.middle(pulses, hill),
             Detector::Centroid => self.centroid(pulses, hill),
         };
-        // A comparator knows the first top that it fires on, not a higher one that follows.
+        // A comparator knows the first peak that it fires on, not a higher one that follows.
         let seen = match self.detector {
             Detector::LeadingEdge => {
                 let first = height(pulses, self.sd, hill.first);
@@ -162,12 +163,12 @@ impl Receiver {
         }
     }
 
-    /// Where a hill rises through a level; its top if it never does.
+    /// Where a hill rises through a level; its peak if it never does.
     fn rise(&self, pulses: &[Pulse], hill: &Hill, level: f64) -> f64 {
         let reaches = |x: f64| height(pulses, self.sd, x) >= level;
         let total: f64 = pulses.iter().map(|p| p.power).sum();
         let nearest = pulses.iter().map(|p| p.range).fold(f64::INFINITY, f64::min);
-        // Before this place even all pulses together at the nearest range stay below the level.
+        // Before this position even all pulses together at the nearest range stay below the level.
         let mut below = hill.start.max(nearest - self.sd * walk(total, level) - 1e-12);
         while below < hill.top {
             let next = (below + STEP * self.sd).min(hill.top);
@@ -179,7 +180,7 @@ impl Receiver {
         hill.top
     }
 
-    /// The top, or the middle of a clipped one.
+    /// The peak, or the middle of a clipped one.
     fn middle(&self, pulses: &[Pulse], hill: &Hill) -> f64 {
         if hill.peak <= self.saturation {
             return hill.top;
@@ -189,9 +190,9 @@ impl Receiver {
         run.map_or(hill.top, |(from, to)| 0.5 * (from + to))
     }
 
-    /// The center of light of what the receiver passes on.
+    /// The centroid of what the receiver passes on.
     fn centroid(&self, pulses: &[Pulse], hill: &Hill) -> f64 {
-        // Moments about the top: about 0 the first would lose digits.
+        // Moments about the peak: about 0, the first moment would lose digits.
         let (mut area, mut moment) = self.moments(pulses, hill.top, hill.start, hill.end);
         if hill.peak > self.saturation {
             for (from, to) in self.clipped(pulses, hill) {
@@ -204,7 +205,7 @@ impl Receiver {
         hill.top + moment / area
     }
 
-    /// ∫w and ∫(x − about)·w between two places, by their closed forms.
+    /// ∫w and ∫(x − about)·w between two positions, in closed form.
     fn moments(&self, pulses: &[Pulse], about: f64, from: f64, to: f64) -> (f64, f64) {
         let root = std::f64::consts::SQRT_2 * self.sd;
         let bell = |x: f64| libm::exp(-(x / root) * (x / root));
@@ -217,7 +218,7 @@ impl Receiver {
         })
     }
 
-    /// Where a hill is above the saturation: from, to.
+    /// The intervals in which a hill is above the saturation.
     fn clipped(&self, pulses: &[Pulse], hill: &Hill) -> Vec<(f64, f64)> {
         let over = |x: f64| height(pulses, self.sd, x) > self.saturation;
         let step = STEP * self.sd;
@@ -246,7 +247,7 @@ impl Receiver {
 }
 
 impl Hill {
-    /// Takes in the hill that follows.
+    /// Merges the following hill into this one.
     fn join(&mut self, next: &Self) {
         self.end = next.end;
         self.last = next.last;
@@ -327,12 +328,13 @@ mod tests {
                 let range = found[0].compensated;
                 assert!(range > 2.0 - 1e-9 && range < 2.0 + apart, "{detector:?}: {range}");
             }
-            // Far apart they are two, and neither knows of the other.
+            // Far apart they are two, and neither affects the other.
             let found = receiver(detector).echoes(&[at(2.0, 5.0), at(6.0, 4.0)], 1.0);
             assert_eq!(found.len(), 2);
             assert!((found[0].compensated - 2.0).abs() < 1e-9 && (found[1].compensated - 6.0).abs() < 1e-9);
         }
-        // A little more than the pulse: a digitizer tells them apart, a comparator has not fallen back.
+        // A little farther than the pulse length: a digitizer separates them, a comparator has not fallen below its
+        // level.
         let close = [at(2.0, 5.0), at(2.7, 5.0)];
         let count = |detector| receiver(detector).echoes(&close, 1.0).len();
         assert_eq!(ALL.map(count), [1, 1, 2, 2]);

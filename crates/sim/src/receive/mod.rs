@@ -1,4 +1,4 @@
-//! From light that comes home to a reading: pulses, echoes, ranges.
+//! From returning light to a reading: pulses, echoes, ranges.
 
 pub mod detect;
 pub mod echo;
@@ -7,5 +7,5 @@ pub(crate) mod reading;
 mod spot;
 
 pub use reading::{
-    BeamClass, Chance, MAX_ECHOES, Parts, Return, Sensor, Share, Stop, SubRayEnd, SubRayLight, class,
+    BeamClass, MAX_ECHOES, Parts, RandomEffects, Return, Sensor, Share, Stop, SubRayEnd, SubRayLight, class,
 };

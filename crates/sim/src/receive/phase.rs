@@ -1,38 +1,39 @@
-//! Ranging by the phase of amplitude-modulated light (AMCW): one phasor for everything that a beam meets.
+//! Ranging by the phase of amplitude-modulated light (AMCW): one phasor for everything that a beam hits.
 //!
-//! Light of modulation frequency f that has gone out and back over r is late by the phase 4πf·r/c. The receiver sees
-//! the sum Σ Pᵢ·exp(j·4πf·rᵢ/c) and takes its argument for one range: it repeats every c/2f, and where two surfaces
-//! are more than c/4f apart the sum of their phasors can point outside the two (Godbaz, Cree & Dorrington 2012).
+//! Light of modulation frequency f that has made the round trip over r is delayed by the phase 4πf·r/c. The receiver
+//! sees the sum Σ Pᵢ·exp(j·4πf·rᵢ/c) and takes its argument for one range: it repeats every c/2f, and where two
+//! surfaces are more than c/4f apart the sum of their phasors can point outside the two (Godbaz, Cree & Dorrington
+//! 2012).
 
 use crate::receive::detect::{Pulse, SPEED_OF_LIGHT};
 
-/// What the phase of a sum of returns says.
+/// The sum of the phasors of some returns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Phasor {
-    /// Its range, in metres, from 0 to the ambiguity.
+    /// Its range, in meters, from 0 to the ambiguity.
     pub range: f64,
     /// Its length, in watts.
     pub amplitude: f64,
 }
 
-/// The range after which ranges repeat, in metres: c/2f.
+/// The distance after which ranges repeat, in meters: c/2f.
 pub fn ambiguity(modulation_hz: f64) -> f64 {
     0.5 * SPEED_OF_LIGHT / modulation_hz
 }
 
-/// A range as the phase tells it: less whole ambiguities.
+/// A range as the phase shows it: minus whole multiples of the ambiguity.
 pub fn fold(range: f64, ambiguity: f64) -> f64 {
     range - ambiguity * (range / ambiguity).floor()
 }
 
-/// The difference of two ranges as phases tell it: within half an ambiguity of 0.
+/// The difference of two ranges as phases show it: within half an ambiguity of 0.
 pub fn wrap(difference: f64, ambiguity: f64) -> f64 {
     difference - ambiguity * (difference / ambiguity).round()
 }
 
 /// The sum of the returns' phasors; `None` without light.
 pub fn sum(pulses: &[Pulse], ambiguity: f64) -> Option<Phasor> {
-    // Phases are counted from the strongest return: a single one keeps its range to the last bit.
+    // Phases are relative to the strongest return, so that a single one keeps its range bit for bit.
     let strongest = pulses.iter().max_by(|a, b| a.power.total_cmp(&b.power))?;
     let (mut real, mut imaginary) = (0.0, 0.0);
     for pulse in pulses {

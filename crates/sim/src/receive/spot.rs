@@ -1,8 +1,8 @@
-//! The spot that neighbouring beams make on a board: Cooper, Figures 2 and 3.
+//! The spot of neighboring beams on a board: Cooper, Figures 2 and 3.
 //!
-//! A beam's extent is four standard deviations of where its light falls (D4σ, ISO 11146): for a Gaussian beam the full
-//! width of its 1/e² contour, which a bundle of five or more sub-rays has exactly. The spot of several beams reaches from
-//! the first edge to the last.
+//! A beam's extent is four standard deviations of the distribution of its light (D4σ, ISO 11146): for a Gaussian beam
+//! this is the full width of its 1/e² contour, which five or more sub-rays reproduce exactly. The spot of several beams
+//! extends from the first edge to the last.
 
 use crate::light::footprint;
 use crate::receive::reading::Sensor;
@@ -10,9 +10,9 @@ use catoptric_model::{BoardPlane, Pose};
 use nalgebra::Vector2;
 
 impl Sensor {
-    /// Extents along a board's x and y, in metres, of the spot of the beams nearest to its center.
+    /// Extents along a board's x and y, in meters, of the spot of the beams nearest to its center.
     ///
-    /// `None` if part of the light misses the board's plane, or the scan has not so many beams there.
+    /// `None` if part of the light misses the board's plane, or if the scan does not have that many beams there.
     pub fn spot(&self, sensor_from_board: &Pose, beams: usize) -> Option<[f64; 2]> {
         let plane = BoardPlane::of_pose(sensor_from_board);
         let scan = self.scan();
@@ -27,7 +27,7 @@ impl Sensor {
         for beam in of_spot {
             let azimuth = scan.azimuth(beam);
             let (mut mean, mut square) = (Vector2::zeros(), Vector2::zeros());
-            for sub_ray in self.bundle() {
+            for sub_ray in self.sub_ray_list() {
                 let ray = footprint::ray(self.shape(), azimuth, sub_ray);
                 let distance = plane.distance_along(&ray.origin, &ray.direction)?;
                 let point = sensor_from_board
@@ -61,7 +61,7 @@ mod tests {
         Sensor::new(&scene).expect("white is a color")
     }
 
-    /// A board ahead whose x axis is along the scan.
+    /// A board straight ahead whose x axis is along the scan.
     fn ahead(range: f64, tilt: f64) -> Pose {
         let facing = UnitQuaternion::from_basis_unchecked(&[-Vector3::y(), Vector3::z(), -Vector3::x()]);
         let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), tilt);
@@ -83,7 +83,7 @@ mod tests {
                 let wide = 2.0 * range * half(shape.wide_full_mrad)
                     + 2.0 * range * libm::tan(ScanGeometry::default().step());
                 let high = 1e-3 * shape.narrow_aperture_mm + 2.0 * range * half(shape.narrow_full_mrad);
-                // The outer two beams meet the board 0.25° off its normal, and the spot turns by as much.
+                // The outer two beams hit the board 0.25° off its normal, and the spot rotates by as much.
                 assert!(
                     (width / wide - 1.0).abs() < 1e-3,
                     "{preset}: {width} against {wide}"
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turned_board_stretches_it() {
+    fn a_turned_board_stretches_the_spot() {
         let sensor = sensor("ust-20lx", 61);
         let face_on = sensor.spot(&ahead(2.0, 0.0), 1).expect("it is met");
         let turned = sensor.spot(&ahead(2.0, 1.0), 1).expect("it is met");

@@ -1,4 +1,4 @@
-//! What stands in the room by itself.
+//! Mirrors and surfaces fixed in the room.
 
 use super::omit::{is_false, is_zero};
 use super::shape::MeshShape;
@@ -6,7 +6,7 @@ use super::superstructure::Glass;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A mirror that stands in the room by itself, in any attitude. It is exactly where it is said to be.
+/// A mirror fixed in the room, in any orientation. It is exactly at its stated pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RoomMirror {
@@ -14,7 +14,7 @@ pub struct RoomMirror {
     pub name: String,
     /// Its outline, in its own frame.
     pub shape: PlaneShape,
-    /// Origin of its own frame in the room, in metres.
+    /// Origin of its own frame in the room, in meters.
     #[serde(default)]
     pub position_m: [f64; 3],
     /// Yaw of its own frame, in degrees.
@@ -32,16 +32,16 @@ pub struct RoomMirror {
     /// Whether its back reflects too.
     #[serde(default, skip_serializing_if = "is_false")]
     pub two_sided: bool,
-    /// Thickness of its body, in millimetres: the back lies so far behind the face.
+    /// Thickness of its body, in millimeters: the distance between the face and the back.
     #[serde(default, skip_serializing_if = "is_zero")]
     #[schemars(range(min = 0.0, max = 100.0))]
     pub thickness_mm: f64,
-    /// Glass before the reflecting surface.
+    /// Glass in front of the reflecting surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub glass: Option<Glass>,
 }
 
-/// A surface that stands in the room by itself and scatters light.
+/// A surface fixed in the room that scatters light.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RoomSurface {
@@ -49,7 +49,7 @@ pub struct RoomSurface {
     pub name: String,
     /// Its shape, in its own frame.
     pub shape: SurfaceShape,
-    /// Origin of its own frame in the room, in metres.
+    /// Origin of its own frame in the room, in meters.
     #[serde(default)]
     pub position_m: [f64; 3],
     /// Yaw of its own frame, in degrees.
@@ -73,7 +73,7 @@ fn white() -> String {
     "white".to_owned()
 }
 
-/// A plane outline, in metres.
+/// A plane outline, in meters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum PlaneShape {
@@ -87,16 +87,16 @@ pub enum PlaneShape {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlaneRectangle {
-    /// Center, in metres.
+    /// Center, in meters.
     #[serde(default)]
     pub center_m: [f64; 3],
     /// Normal of its face; any length.
     #[serde(default = "up")]
     pub normal: [f64; 3],
-    /// Extent parallel to the x–y plane, along x if the normal is ±z, in metres.
+    /// Extent parallel to the x–y plane, along x if the normal is ±z, in meters.
     #[schemars(range(min = 0.0001, max = 1000.0))]
     pub width_m: f64,
-    /// Extent along the other side, in metres.
+    /// Extent along the other side, in meters.
     #[schemars(range(min = 0.0001, max = 1000.0))]
     pub height_m: f64,
 }
@@ -109,7 +109,7 @@ fn up() -> [f64; 3] {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlanePolygon {
-    /// Corners of a convex plane polygon, in metres, counter-clockwise seen from the face.
+    /// Corners of a convex plane polygon, in meters, counter-clockwise seen from the face.
     #[schemars(length(min = 3))]
     pub corners_m: Vec<[f64; 3]>,
 }
@@ -134,7 +134,7 @@ pub enum SurfaceShape {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RoomBox {
-    /// Extents along x, y and z, in metres.
+    /// Extents along x, y and z, in meters.
     #[schemars(inner(range(min = 0.0001, max = 1000.0)))]
     pub size_m: [f64; 3],
 }
@@ -143,10 +143,10 @@ pub struct RoomBox {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RoomCylinder {
-    /// Diameter, in metres.
+    /// Diameter, in meters.
     #[schemars(range(min = 0.0001, max = 1000.0))]
     pub diameter_m: f64,
-    /// Extent along z, in metres.
+    /// Extent along z, in meters.
     #[schemars(range(min = 0.0001, max = 1000.0))]
     pub height_m: f64,
 }

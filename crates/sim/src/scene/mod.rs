@@ -1,7 +1,7 @@
 //! The scene: everything that is simulated, as a person writes it in TOML.
 //!
-//! Every key carries its unit. Values that nobody published are defaults marked *assumed*. The checks that need more
-//! than one value are in [`crate::check`].
+//! Every key carries its unit. Unpublished values are defaults marked *assumed*. The checks that need more than one
+//! value are in [`crate::check`].
 
 mod body;
 mod detection;
@@ -57,13 +57,13 @@ pub struct Scene {
     /// Seed of every random draw; `--seed` overrides it.
     #[serde(default = "one")]
     pub seed: u64,
-    /// Numbers of the design with names and bounds, for expressions and searches.
+    /// Named numbers of the design with limits, for expressions and searches.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub parameters: BTreeMap<String, Parameter>,
     /// The scanner.
     #[serde(default = "ust_20lx")]
     pub scanner: Scanner,
-    /// Terms of Eq. 1.
+    /// Terms of Eq. (1).
     #[serde(default)]
     pub light: Light,
     /// From received light to a range.
@@ -72,10 +72,10 @@ pub struct Scene {
     /// Mirrors, posts and markers.
     #[serde(default)]
     pub superstructure: Superstructure,
-    /// Surface colors beside the built-in ones.
+    /// Surface colors in addition to the built-in ones.
     #[serde(default)]
     pub color: BTreeMap<String, Color>,
-    /// The target boards; poses take them in turn.
+    /// The target boards, which poses use in turn.
     #[serde(default)]
     pub board: Vec<Board>,
     /// The room.
@@ -96,7 +96,7 @@ pub struct Scene {
     /// How well step 1 knows those errors.
     #[serde(default)]
     pub characterization: Characterization,
-    /// The meshes that the scene names, as whoever read it has read them too. No part of the file.
+    /// The meshes that the scene names, supplied by the caller who read them. Not part of the file.
     #[serde(skip)]
     pub meshes: Meshes,
 }
@@ -105,7 +105,7 @@ fn one() -> u64 {
     1
 }
 
-/// A UST-20LX as its data sheet and the other defaults have it.
+/// A UST-20LX as given by its data sheet and the other defaults.
 fn ust_20lx() -> Scanner {
     Scanner {
         preset: Preset::Ust20lx,
@@ -119,7 +119,7 @@ fn ust_20lx() -> Scanner {
 }
 
 impl Scene {
-    /// Whether it holds nothing but what stands in the room, so that rays can be traced and nothing be recorded.
+    /// Whether the scene holds only what is fixed in the room, so that rays can be traced but nothing recorded.
     pub fn has_no_laboratory(&self) -> bool {
         let structure = &self.superstructure;
         let nothing_around =
@@ -127,12 +127,12 @@ impl Scene {
         nothing_around && self.board.is_empty() && self.flight.is_empty() && !self.room.has_walls()
     }
 
-    /// Whether flights are all that can be recorded, so that no walls are needed.
+    /// Whether only flights can be recorded, so that no walls are needed.
     pub fn only_flies(&self) -> bool {
         !self.flight.is_empty() && self.board.is_empty() && self.experiment.pose.is_empty()
     }
 
-    /// Every mesh that it names, with the key that does.
+    /// Every mesh that the scene names, with the key that names it.
     pub fn mesh_shapes(&self) -> Vec<(String, &MeshShape)> {
         let posts = self.superstructure.post.iter().enumerate();
         let posts = posts.filter_map(|(i, post)| match &post.shape {
@@ -147,7 +147,7 @@ impl Scene {
         posts.chain(surfaces).collect()
     }
 
-    /// The same meshes, to give them other files.
+    /// The same meshes, mutable, so that their files can be replaced.
     pub fn mesh_shapes_mut(&mut self) -> impl Iterator<Item = &mut MeshShape> {
         let posts = self.superstructure.post.iter_mut();
         let posts = posts.filter_map(|post| match &mut post.shape {

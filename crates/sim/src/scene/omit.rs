@@ -1,4 +1,4 @@
-//! What keeps out of files: values that say nothing.
+//! Default values that are omitted from files.
 
 pub(super) fn is_false(value: &bool) -> bool {
     !value

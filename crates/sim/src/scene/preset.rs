@@ -3,8 +3,8 @@
 use super::scanner::{BeamShape, HousingBox, Limits, Preset, Scanner};
 use catoptric_model::{ScanAngles, ScanDirection, ScanError, ScanGeometry};
 
-/// How the UST-20LX scans and what it reports (data sheet): 270° in steps of 0.25°, 40 Hz, 20 m, one echo. It vouches for 60 mm on, but reports ranges from
-/// 21 mm on.
+/// Limits of the UST-20LX (data sheet): 40 Hz, 20 m, one echo. Its accuracy is specified from 60 mm on, but it reports
+/// ranges from 21 mm on.
 const UST_20LX: Limits = Limits {
     range_min_m: 0.021,
     range_max_m: 20.0,
@@ -17,8 +17,8 @@ const UST_20LX: Limits = Limits {
     echoes: 1,
 };
 
-/// What the UTM-30LX-EW reports (data sheet): a scan in 25 ms, 0.1 to 30 m, up to three echoes of a beam, 905 nm. That it
-/// reports nothing nearer than the 0.1 m it vouches for is assumed.
+/// Limits of the UTM-30LX-EW (data sheet): 25 ms per scan, 0.1 to 30 m, up to three echoes per beam, 905 nm. It is
+/// assumed that it reports nothing closer than the specified 0.1 m.
 const UTM_30LX_EW: Limits = Limits {
     range_min_m: 0.1,
     range_max_m: 30.0,
@@ -40,8 +40,8 @@ const UST_20LX_HOUSING: [HousingBox; 2] = [
     },
 ];
 
-/// Housing of the UTM-30LX-EW, likewise: 62 × 62 × 87.5 mm (data sheet). The scan plane 55 mm above its foot is the one of
-/// common robot models of the UTM-30LX; the window, as high as the UST-20LX's, and the cap's width are assumed.
+/// Housing of the UTM-30LX-EW, likewise: 62 × 62 × 87.5 mm (data sheet). The scan plane 55 mm above its base is that of
+/// common robot models of the UTM-30LX; the window, as high as the UST-20LX's, and the width of the cap are assumed.
 const UTM_30LX_EW_HOUSING: [HousingBox; 2] = [
     HousingBox {
         center_mm: [0.0, 0.0, -34.5],
@@ -64,7 +64,7 @@ impl Preset {
         }
     }
 
-    /// What it can report.
+    /// What the scanner can report.
     pub fn limits(self) -> Limits {
         match self {
             Self::Ust20lx | Self::Ust20lxCooper | Self::Custom => UST_20LX,
@@ -72,7 +72,7 @@ impl Preset {
         }
     }
 
-    /// Boxes of its housing in the sensor frame. A custom scanner that gives none has the UST-20LX's.
+    /// Boxes of its housing in the sensor frame. A custom scanner without boxes has those of the UST-20LX.
     pub fn housing(self) -> &'static [HousingBox] {
         match self {
             Self::Ust20lx | Self::Ust20lxCooper | Self::Custom => &UST_20LX_HOUSING,
@@ -83,8 +83,8 @@ impl Preset {
     /// Shape of a beam.
     pub fn beam_shape(self) -> BeamShape {
         match self {
-            // 160 × 25 mm at 10 m to the front, 25 × 160 mm to the side (Hokuyo's manual). The UTM-30LX-EW, of the same
-            // maker and wavelength, publishes no spot: assumed equal. A custom scanner brings its own.
+            // 160 × 25 mm at 10 m to the front, 25 × 160 mm to the side (Hokuyo's manual). No spot is published for the
+            // UTM-30LX-EW, of the same maker and wavelength: assumed equal. A custom scanner defines its own.
             Self::Ust20lx | Self::Utm30lxEw | Self::Custom => BeamShape {
                 wide_full_mrad: 16.0,
                 narrow_full_mrad: 2.5,
@@ -92,9 +92,9 @@ impl Preset {
                 narrow_aperture_mm: 0.0,
                 turns: true,
             },
-            // Table 1 as the union of three neighbours: width 33.6 mrad·R less two steps of 0.25°, height
-            // 3.0 mm + 0.85 mrad·R. The reading as a union is assumed. 33.6 mrad is the slope through the origin of all
-            // widths but that at 2 m, which lies 12 mm under what its neighbours at 1 m and 3 m have between them.
+            // Table 1 as the union of three neighbors: width 33.6 mrad·R minus two steps of 0.25°, height 3.0 mm + 0.85
+            // mrad·R. The interpretation as a union is assumed. 33.6 mrad is the slope through the origin of all widths
+            // except that at 2 m, which is 12 mm below the line between its neighbors at 1 m and 3 m.
             Self::Ust20lxCooper => BeamShape {
                 wide_full_mrad: 24.9,
                 narrow_full_mrad: 0.85,
@@ -107,12 +107,12 @@ impl Preset {
 }
 
 impl Scanner {
-    /// Shape of a beam: the scene's, or else the preset's.
+    /// Shape of a beam: the scene's, otherwise the preset's.
     pub fn beam_shape(&self) -> BeamShape {
         self.beam.unwrap_or_else(|| self.preset.beam_shape())
     }
 
-    /// Boxes of the housing in the sensor frame: none, the scene's, or else the preset's.
+    /// Boxes of the housing in the sensor frame: none, the scene's, or otherwise the preset's.
     pub fn housing_boxes(&self) -> &[HousingBox] {
         match (self.housing, &self.housing_box) {
             (false, _) => &[],
@@ -121,7 +121,7 @@ impl Scanner {
         }
     }
 
-    /// How it scans and what it can report: the scene's for a scanner of one's own, or else the preset's.
+    /// What the scanner can report: the scene's limits for a custom scanner, otherwise the preset's.
     pub fn limits(&self) -> Limits {
         match self.preset {
             Preset::Custom => self.custom.unwrap_or(UST_20LX),

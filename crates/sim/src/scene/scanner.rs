@@ -4,46 +4,46 @@ use catoptric_model::ScanDirection;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Which scanner.
+/// The model of the scanner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Preset {
-    /// Hokuyo UST-20LX with the spot of its manual: 160 × 25 mm at 10 m.
+    /// Hokuyo UST-20LX with the spot given in its manual: 160 × 25 mm at 10 m.
     #[serde(rename = "ust-20lx")]
     Ust20lx,
-    /// The same with the spot of Cooper's Table 1 read as three neighbouring beams.
+    /// The same with the spot of Cooper's Table 1, read as three neighboring beams.
     #[serde(rename = "ust-20lx-cooper")]
     Ust20lxCooper,
-    /// Hokuyo UTM-30LX-EW: up to three echoes of a beam, 30 m. Its spot is assumed to be the UST-20LX's.
+    /// Hokuyo UTM-30LX-EW: up to three echoes per beam, 30 m. Its spot is assumed to be the UST-20LX's.
     #[serde(rename = "utm-30lx-ew")]
     Utm30lxEw,
-    /// A scanner of one's own: `scanner.custom` and `scanner.beam`.
+    /// A custom scanner: `scanner.custom` and `scanner.beam`. Its beams are the 1081 of the others, 0.25° apart.
     Custom,
 }
 
-/// The scanner and how it sits in the rig.
+/// The scanner and its mounting in the rig.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scanner {
     /// The preset.
     pub preset: Preset,
-    /// Sub-rays per beam.
+    /// Number of sub-rays per beam.
     #[serde(default = "Scanner::default_sub_rays")]
     #[schemars(range(min = 1, max = 4096))]
     pub sub_rays: u32,
     /// Shape of a beam, instead of the preset's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beam: Option<BeamShape>,
-    /// How a scanner of one's own scans and what it reports, with the preset "custom".
+    /// Limits of a custom scanner, for the preset "custom".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub custom: Option<Limits>,
-    /// Whether the scanner's own housing stands in the way of deflected beams.
+    /// Whether the scanner's own housing can block deflected beams.
     #[serde(default = "yes")]
     pub housing: bool,
-    /// Boxes of the housing, instead of the preset's; that of a custom scanner is the UST-20LX's.
+    /// Boxes of the housing, instead of the preset's; a custom scanner has the UST-20LX's by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub housing_box: Option<Vec<HousingBox>>,
-    /// Where the sensor sits in the rig body.
+    /// Pose of the sensor in the rig body.
     #[serde(default)]
     pub mount: Mount,
 }
@@ -62,10 +62,10 @@ impl Scanner {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Limits {
-    /// Shortest range that is reported, in metres; anything nearer is too close.
+    /// Shortest range that is reported, in meters; anything closer reads as too close.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub range_min_m: f64,
-    /// Longest range that is reported, in metres; anything farther is no return.
+    /// Longest range that is reported, in meters; anything farther reads as no return.
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub range_max_m: f64,
     /// Azimuth of beam 0, in degrees.
@@ -114,35 +114,35 @@ pub struct BeamShape {
     /// Full angle of the 1/e² contour along the short axis, in milliradians.
     #[schemars(range(min = 0.0, max = 200.0))]
     pub narrow_full_mrad: f64,
-    /// Full width of the beam along its long axis where it leaves, in millimetres.
+    /// Full width of the beam along its long axis as it leaves the scanner, in millimeters.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 50.0))]
     pub wide_aperture_mm: f64,
-    /// Full width of the beam along its short axis where it leaves, in millimetres.
+    /// Full width of the beam along its short axis as it leaves the scanner, in millimeters.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 50.0))]
     pub narrow_aperture_mm: f64,
-    /// Whether the ellipse turns with the azimuth, as behind a spinning 45° mirror.
+    /// Whether the ellipse rotates with the azimuth, as behind a spinning 45° mirror.
     #[serde(default = "yes")]
     pub turns: bool,
 }
 
-/// A box of the scanner's housing, its sides along the axes of the sensor frame.
+/// A box of the scanner's housing, aligned with the axes of the sensor frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HousingBox {
-    /// Its center in the sensor frame, in millimetres; the scan plane is z = 0.
+    /// Its center in the sensor frame, in millimeters; the scan plane is z = 0.
     pub center_mm: [f64; 3],
-    /// Its extents, in millimetres.
+    /// Its extents, in millimeters.
     #[schemars(inner(range(min = 0.01, max = 1000.0)))]
     pub size_mm: [f64; 3],
 }
 
-/// Where the sensor sits in the rig body: the drawing, and how far the real one may be from it.
+/// Pose of the sensor in the rig body: the drawing, and how far the true pose may be off.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mount {
-    /// Origin of the sensor in the rig frame, in millimetres.
+    /// Origin of the sensor in the rig frame, in millimeters.
     pub position_mm: [f64; 3],
     /// Yaw of the sensor in the rig frame, in degrees.
     #[schemars(range(min = -180.0, max = 180.0))]
@@ -153,7 +153,7 @@ pub struct Mount {
     /// Largest error of the optical axis in pitch and in roll, in degrees (data sheet: 1).
     #[schemars(range(min = 0.0, max = 10.0))]
     pub tilt_tolerance_deg: f64,
-    /// Largest offset of the optical center along each axis, in millimetres (assumed).
+    /// Largest offset of the optical center along each axis, in millimeters (assumed).
     #[schemars(range(min = 0.0, max = 20.0))]
     pub shift_tolerance_mm: f64,
 }
@@ -170,7 +170,7 @@ impl Default for Mount {
     }
 }
 
-/// The terms of Eq. 1. Only their product over the threshold matters to a range.
+/// The terms of Eq. (1). Only their product divided by the threshold affects a range.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Light {
@@ -183,7 +183,7 @@ pub struct Light {
     /// Transmission of the air τ_a, one way.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub air_transmission: f64,
-    /// Diameter of the receiver D_R, in millimetres (assumed).
+    /// Diameter of the receiver D_R, in millimeters (assumed).
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub receiver_diameter_mm: f64,
     /// Solid angle θ_R into which a target scatters, in steradians (π for a Lambertian surface).

@@ -3,13 +3,13 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The unit of a mesh file's numbers, which few formats tell.
+/// The unit of a mesh file's numbers, which few formats specify.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MeshUnits {
-    /// Metres.
+    /// Meters.
     M,
-    /// Millimetres.
+    /// Millimeters.
     #[default]
     Mm,
     /// Inches.
@@ -17,8 +17,8 @@ pub enum MeshUnits {
 }
 
 impl MeshUnits {
-    /// One unit, in metres.
-    pub fn in_metres(self) -> f64 {
+    /// One unit, in meters.
+    pub fn in_meters(self) -> f64 {
         match self {
             Self::M => 1.0,
             Self::Mm => 1e-3,
@@ -39,7 +39,7 @@ pub struct MeshShape {
     pub units: MeshUnits,
 }
 
-/// Shape of a post that is no box.
+/// Shape of a post that is not a box.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum PostShape {
@@ -53,10 +53,10 @@ pub enum PostShape {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PostCylinder {
-    /// Diameter, in millimetres.
+    /// Diameter, in millimeters.
     #[schemars(range(min = 0.01, max = 10000.0))]
     pub diameter_mm: f64,
-    /// Extent along its own z, in millimetres.
+    /// Extent along its own z, in millimeters.
     #[schemars(range(min = 0.01, max = 10000.0))]
     pub height_mm: f64,
 }

@@ -3,7 +3,7 @@
 use crate::Error;
 use catoptric_sim::laboratory::Returns;
 use catoptric_sim::light::Role;
-use catoptric_sim::receive::{Chance, Return};
+use catoptric_sim::receive::{RandomEffects, Return};
 use catoptric_sim::scene::ErrorModel;
 use catoptric_sim::{Laboratory, Scene};
 use std::fmt::Write as _;
@@ -125,7 +125,7 @@ pub(crate) fn rows_of_readings(
     laboratory: &Laboratory,
     (pose, scan): (usize, usize),
     returns: &Returns,
-    chances: &[Chance],
+    effects: &[RandomEffects],
     readings: &[f64],
 ) -> String {
     let errors = &laboratory.scene().errors;
@@ -134,19 +134,19 @@ pub(crate) fn rows_of_readings(
         _ => errors.dropout,
     };
     let mut text = String::new();
-    let beams = returns.iter().zip(chances).zip(readings).enumerate();
-    for (beam, ((found, chance), reading)) in beams {
-        let mut echoes = found.iter().flat_map(Return::echoes).zip(chance.detection);
-        let detected = echoes.position(|(echo, chance)| chance < echo.probability);
+    let beams = returns.iter().zip(effects).zip(readings).enumerate();
+    for (beam, ((found, effects), reading)) in beams {
+        let mut echoes = found.iter().flat_map(Return::echoes).zip(effects.detection);
+        let detected = echoes.position(|(echo, draw)| draw < echo.probability);
         let noise_sd = found.as_ref().zip(detected).and_then(|(r, k)| r.echoes().nth(k));
-        let noise = noise_sd.map_or(0.0, |echo| echo.noise_sd * chance.noise);
+        let noise = noise_sd.map_or(0.0, |echo| echo.noise_sd * effects.noise);
         let echo = detected.map_or(String::new(), |k| k.to_string());
-        let lost = u8::from(detected.is_some() && chance.dropout < dropout);
+        let lost = u8::from(detected.is_some() && effects.dropout < dropout);
         // Writing to a string never fails.
         let _ = writeln!(
             text,
             "{pose},{scan},{beam},{echo},{lost},{},{},{noise},{},{},{reading},{}",
-            chance.drift, chance.warm_up, chance.correlated, chance.interference, chance.element,
+            effects.drift, effects.warm_up, effects.correlated, effects.interference, effects.element,
         );
     }
     text

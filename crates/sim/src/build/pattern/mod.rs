@@ -1,12 +1,12 @@
-//! From patterns to facets: rings, mirror images, lists of copies.
+//! Expands patterns into facets: rings, mirror images, lists of copies.
 //!
-//! A copy keeps the shape its original is described by, with other numbers, so that a mirror image of a wedge is a wedge
-//! that a person can read:
+//! A copy has the same kind of shape as its original, with other numbers, so that the mirror image of a wedge is a
+//! readable wedge:
 //!
 //! ```text
-//! left and right:  y → −y      azimuths α → −α, the last first
+//! left and right:  y → −y      azimuths α → −α, in reverse order
 //! up and down:     z → −z      elevations ε → −ε
-//! a turn by τ:                 azimuths α → α + τ
+//! rotation by τ:                azimuths α → α + τ
 //! ```
 
 use crate::build::layout::plate_azimuth_deg;
@@ -17,19 +17,19 @@ use catoptric_model::place::{Path, Problem, Segment, nearest};
 /// Part of a step within which a beam is another one's mirror image: what rounding leaves.
 const SAME_PART_OF_STEP: f64 = 1e-6;
 
-/// A scene without patterns, and where its facets come from.
+/// A scene with its patterns expanded, and the origin of its facets.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expanded {
-    /// The scene, every copy a facet.
+    /// The scene, with a facet for every copy.
     pub scene: Scene,
-    /// Facets that the scene had before.
+    /// Number of facets drawn in the scene itself.
     pub drawn: usize,
     /// The pattern that made each of the facets after those.
     pub made_by: Vec<usize>,
 }
 
 impl Expanded {
-    /// The pattern that made what a path leads to, and the name of the copy.
+    /// The pattern that made the facet to which a path leads, and the name of the copy.
     pub fn origin(&self, path: &Path) -> Option<(Path, &str)> {
         let [Segment::Key(a), Segment::Key(b), Segment::Index(i), ..] = path.0.as_slice() else {
             return None;
@@ -43,10 +43,10 @@ impl Expanded {
     }
 }
 
-/// Makes facets of the patterns, in their order; a pattern may copy what an earlier one made.
+/// Expands the patterns into facets, in order; a pattern may copy what an earlier one made.
 ///
 /// # Errors
-/// Patterns of facets that there are not, and names for more or fewer copies than there are.
+/// A pattern of a facet that does not exist; a list of names whose length differs from the number of copies.
 pub fn expand(scene: &Scene) -> Result<Expanded, Vec<Problem>> {
     let mut scene = scene.clone();
     let patterns = std::mem::take(&mut scene.superstructure.pattern);
@@ -102,7 +102,7 @@ fn copies(
                 return Err(Problem {
                     message: format!("`{key}` lists {} names for {count} images", names.len()),
                     path: key,
-                    help: Some("name every image, or leave `names` out".to_owned()),
+                    help: Some("name every image, or omit `names`".to_owned()),
                 });
             }
             let one = |(i, of): (usize, &String)| {
@@ -128,11 +128,11 @@ fn find<'a>(facets: &'a [Facet], name: &str, path: &Path) -> Result<&'a Facet, P
     facets.iter().find(|f| f.name == name).ok_or_else(|| {
         let help = match nearest(name, facets.iter().map(|f| f.name.as_str())) {
             Some(near) => format!("did you mean {near:?}?"),
-            None => "a pattern copies facets, and what patterns before it made".to_owned(),
+            None => "a pattern copies facets of the scene or of an earlier pattern".to_owned(),
         };
         Problem {
             path: path.clone(),
-            message: format!("`{path}` is {name:?}, which no facet before this pattern is called"),
+            message: format!("`{path}` is {name:?}, but no facet before this pattern has that name"),
             help: Some(help),
         }
     })
@@ -163,7 +163,7 @@ pub fn turned(facet: &Facet, name: String, turn_deg: f64, scan: &ScanGeometry) -
     match &mut shape {
         FacetShape::Wedge(wedge) => {
             let middle = 0.5 * (wedge.azimuth_deg[0] + wedge.azimuth_deg[1]);
-            // Both by one amount, so that the wedge stays as wide as it is.
+            // Both by the same amount, which keeps the width of the wedge.
             let by = around(middle) - middle;
             wedge.azimuth_deg = wedge.azimuth_deg.map(|a| a + by);
             wedge.exit_azimuth_deg = around(wedge.exit_azimuth_deg);
@@ -244,7 +244,7 @@ fn up_down(mut shape: FacetShape) -> FacetShape {
     shape
 }
 
-/// A mirror image goes round the other way: the corners are listed backwards.
+/// Reflects the corners and reverses their order, since a reflection reverses the orientation.
 fn reflect_corners(corners: &mut [[f64; 3]], axis: usize) {
     for corner in corners.iter_mut() {
         corner[axis] = -corner[axis];

@@ -1,4 +1,4 @@
-//! Copies against the closed form of what they are: reflected and turned corners.
+//! Compares copies with closed forms: reflected and rotated corners.
 
 use super::*;
 use crate::build::layout;
@@ -34,7 +34,7 @@ fn plate() -> Plate {
     }
 }
 
-/// One of each kind, in no symmetry.
+/// One shape of each kind, without symmetry.
 fn shapes() -> Vec<FacetShape> {
     let wedge = FacetShape::Wedge(Wedge {
         azimuth_deg: [62.0, 77.0],
@@ -64,7 +64,7 @@ fn shapes() -> Vec<FacetShape> {
     vec![wedge, FacetShape::Plate(plate()), by_normal, rectangle, polygon]
 }
 
-/// Whether the same corners go round the same way, wherever the list begins.
+/// Whether two outlines have the same corners in the same cyclic order, wherever the lists begin.
 fn same_outline(found: &[Point3<f64>], wanted: &[Point3<f64>]) -> bool {
     let near = |start: usize| {
         (0..wanted.len()).all(|i| (found[(start + i) % found.len()] - wanted[i]).norm() < 1e-15)
@@ -87,7 +87,7 @@ fn a_mirror_image_has_the_reflected_corners() {
                 &ScanGeometry::default(),
             );
             let found = corners(&image.shape).expect("so is its image");
-            // Seen in a mirror, what went round counter-clockwise goes round clockwise.
+            // A reflection turns counter-clockwise order into clockwise order.
             let reflected = own
                 .iter()
                 .rev()
@@ -117,7 +117,7 @@ fn a_turned_facet_has_the_turned_corners() {
 }
 
 #[test]
-fn a_plate_sends_its_beam_where_it_is_wanted() {
+fn a_plate_sends_its_beam_in_the_requested_direction() {
     let corners = corners(&FacetShape::Plate(plate())).expect("it is a mirror");
     let normal = nalgebra::Unit::new_normalize(area_vector(&corners));
     let plane = catoptric_model::MirrorPlane::through(corners[0], normal);
@@ -191,7 +191,7 @@ fn patterns_make_facets_in_order_and_may_build_on_one_another() {
 }
 
 #[test]
-fn what_cannot_be_copied_is_said() {
+fn patterns_that_cannot_be_expanded_are_reported() {
     let problems = expand(&scene_with(vec![
         Pattern::Ring(Ring {
             of: "pedal".to_owned(),
@@ -204,7 +204,7 @@ fn what_cannot_be_copied_is_said() {
             names: Some(vec![]),
         }),
     ]))
-    .expect_err("one is misspelt, one has no name");
+    .expect_err("one is misspelled, one has no name");
     assert_eq!(problems[0].path.to_string(), "superstructure.pattern[0].ring.of");
     assert_eq!(problems[0].help.as_deref(), Some("did you mean \"petal\"?"));
     assert!(

@@ -1,4 +1,4 @@
-//! Which beams one board serves.
+//! Groups of beams that one board serves.
 
 use crate::light::optics::{End, Path};
 use crate::scene::Board;
@@ -6,8 +6,8 @@ use catoptric_cast::Ray;
 use catoptric_model::{Pose, Rectangle, ScanGeometry};
 use nalgebra::Unit;
 
-/// Part of a board's edge that no beam of its group should come near, in metres, and its growth with distance: beams
-/// leave up to a few degrees off the drawing.
+/// Margin of a board's edge that no beam of its group should hit, in meters, and its growth with distance: beams leave
+/// up to a few degrees off the drawing.
 const EDGE_MARGIN: (f64, f64) = (0.02, 0.05);
 
 /// Beams that one board serves.
@@ -15,14 +15,14 @@ pub(super) struct Group {
     pub(super) facet: Option<usize>,
     pub(super) first: usize,
     pub(super) last: usize,
-    /// The rays that leave towards the board, in the room frame, of every beam of the group.
+    /// The rays of the group's beams that leave toward the board, in the room frame.
     pub(super) rays: Vec<Ray>,
 }
 
-/// Narrowest undeflected sector in which a board is set up, in radians.
-const LEAST_SECTOR: f64 = 20.0 * std::f64::consts::PI / 180.0;
+/// Narrowest undeflected sector in which boards are set up, in radians.
+const MIN_SECTOR: f64 = 20.0 * std::f64::consts::PI / 180.0;
 
-/// The facet that a chief ray leaves by, if it leaves by one alone.
+/// The facet by which a chief ray leaves, if it leaves by exactly one.
 fn leaves_by(path: &Path) -> Option<usize> {
     match (path.end, path.facets()) {
         (End::Escaped, &[facet]) => Some(facet),
@@ -70,7 +70,7 @@ fn cut(scan: &ScanGeometry, run: [usize; 2], span_deg: f64) -> Vec<[usize; 2]> {
         .collect()
 }
 
-/// Runs of undeflected beams around the centers at which boards are set up, spread over the free sectors.
+/// Runs of undeflected beams around the board centers, spread over the free sectors.
 pub(super) fn direct_groups(
     paths: &[Path],
     scan: &ScanGeometry,
@@ -170,7 +170,7 @@ impl Group {
         self.rays.get(self.rays.len() / 2)
     }
 
-    /// Share of the group's rays that meet a board well inside its edges.
+    /// Share of the group's rays that hit a board well inside its edges.
     pub(super) fn caught(&self, board: &Board, room_from_board: &Pose) -> f64 {
         let outline = Rectangle {
             width: board.width_mm * 1e-3,

@@ -1,8 +1,8 @@
-//! Where the boards are put: Cooper, steps 1 and 7 to 10, carried out on the drawing as a person would.
+//! Plans where the boards are placed: Cooper, steps 1 and 7 to 10, carried out on the drawing as a person would.
 //!
-//! Every facet's beams are divided into groups that one board can serve. Before each group a board is set up in
-//! several poses: its tilt direction goes round evenly, its tilt and its distance vary, and it must stand in the room
-//! and catch the whole group with some margin. The mirrors as built are not known here.
+//! Every facet's beams are divided into groups that one board can serve. In front of each group a board is set up in
+//! several poses: its tilt direction rotates evenly, its tilt and distance vary, and it must be inside the room and
+//! catch the whole group with some margin. The mirrors as built are not known here.
 
 mod groups;
 mod planned;
@@ -24,14 +24,15 @@ use catoptric_model::frame::tangent_basis;
 use catoptric_model::{PoseKind, ScanGeometry};
 use groups::{Group, direct_groups, facet_groups};
 use nalgebra::{Point3, Unit, UnitQuaternion, Vector3};
-use planned::no_place_before;
+use planned::placement_error;
 use poses::{place, place_at_random};
 
-/// The whole procedure: bare structure, empty room, tests of the bare sensor, boards before undeflected beams, boards
-/// before every facet, flights.
+/// Plans the whole procedure: bare structure, empty room, tests of the bare sensor, boards in front of undeflected
+/// beams, boards in front of every facet, flights.
 ///
 /// # Errors
-/// [`SimError::Placement`] where a board fits nowhere, [`SimError::UnknownName`] for a pose that refers to nothing.
+/// [`SimError::Placement`] for a board that fits nowhere, [`SimError::UnknownName`] for a pose that refers to an
+/// unknown name.
 pub fn plan(scene: &Scene, sensor: &Sensor, seed: u64) -> Result<Vec<Planned>, SimError> {
     let mut planned = procedure(scene, sensor, seed)?;
     let scan_period_s = sensor.scan().scan_period_s();
@@ -48,7 +49,7 @@ pub fn plan(scene: &Scene, sensor: &Sensor, seed: u64) -> Result<Vec<Planned>, S
     Ok(planned)
 }
 
-/// Everything but flights.
+/// Plans everything except flights.
 fn procedure(scene: &Scene, sensor: &Sensor, seed: u64) -> Result<Vec<Planned>, SimError> {
     let structure = Structure::nominal(scene)?;
     let setting = Setting::new(scene, &structure, Mirrors::Attached, Vec::new())?;
@@ -70,7 +71,7 @@ fn procedure(scene: &Scene, sensor: &Sensor, seed: u64) -> Result<Vec<Planned>, 
     };
     let mut planned = Vec::new();
     let drawn = &scene.superstructure;
-    // Who only flies measures no structure that is not there.
+    // With flights but no structure there is nothing to measure.
     let measured_otherwise = experiment.bare_distance_sd_mm.is_some();
     if !measured_otherwise && (scene.flight.is_empty() || !(drawn.facet.is_empty() && drawn.post.is_empty()))
     {
@@ -153,7 +154,7 @@ fn no_place(scene: &Scene, board: usize, group: &Group, reason: String) -> SimEr
         Some(facet) => format!("facet {:?}", scene.superstructure.facet[facet].name),
         None => format!("beams {} to {}", group.first, group.last),
     };
-    no_place_before(scene, board, target, reason)
+    placement_error(scene, board, target, reason)
 }
 
 /// A pose that the scene gives itself.
@@ -182,7 +183,7 @@ fn given(
         ),
     };
     let normal = Unit::try_new(Vector3::from(pose.normal), f64::MIN_POSITIVE)
-        .ok_or_else(|| unknown("a direction without length".to_owned()))?;
+        .ok_or_else(|| unknown("a normal of nonzero length".to_owned()))?;
     let center = Point3::from(Vector3::from(pose.center_m));
     let level = attitude(center, &normal, tangent_basis(&normal).0.into_inner());
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), pose.turn_deg.to_radians());

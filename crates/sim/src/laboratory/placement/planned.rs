@@ -1,32 +1,32 @@
-//! A stretch as it is meant to be recorded.
+//! A stretch as planned.
 
 use crate::error::SimError;
 use crate::scene::Scene;
 use catoptric_model::{Pose, PoseKind, TestNote};
 
-/// A stretch as it is meant to be recorded.
+/// A stretch as planned.
 #[derive(Debug, Clone)]
 pub struct Planned {
-    /// What it is for.
+    /// Kind of the stretch.
     pub kind: PoseKind,
-    /// Scans.
+    /// Number of scans.
     pub scans: usize,
-    /// Facet in whose fan the board stands, by its index.
+    /// Index of the facet in whose fan the board is.
     pub facet: Option<usize>,
-    /// First and last beam it is set up for.
+    /// First and last beam for which the board is set up.
     pub beams: Option<[usize; 2]>,
-    /// The board, by its index, and where it is meant to stand.
+    /// Index of the board and its planned pose in the room.
     pub board: Option<(usize, Pose)>,
-    /// Whether it is put exactly there.
+    /// Whether the board is placed exactly there.
     pub exact: bool,
-    /// What is tested of the bare sensor.
+    /// The test of the bare sensor that it belongs to.
     pub test: Option<TestNote>,
-    /// The flight, by its index.
+    /// Index of the flight.
     pub flight: Option<usize>,
 }
 
-/// A board that fits nowhere.
-pub(super) fn no_place_before(scene: &Scene, board: usize, target: String, reason: String) -> SimError {
+/// The error for a board that fits nowhere.
+pub(super) fn placement_error(scene: &Scene, board: usize, target: String, reason: String) -> SimError {
     SimError::Placement {
         board: scene.board[board].name.clone(),
         target,

@@ -1,4 +1,4 @@
-//! Where one board stands, and how it is turned.
+//! Chooses position and orientation of one board.
 
 use super::groups::Group;
 use crate::build::board::{facing, stands_in};
@@ -6,18 +6,18 @@ use crate::noise::Draws;
 use crate::scene::{Board, Experiment, Room};
 use catoptric_model::Pose;
 
-/// Least distance between a board and the mirror it stands before, in metres.
-const LEAST_RANGE: f64 = 0.4;
+/// Minimum distance between a board and the mirror that it faces, in meters.
+const MIN_RANGE: f64 = 0.4;
 
-/// Fractions of a pose's tilt and distance to fall back on when it does not fit.
+/// Fractions of the planned tilt and distance that are tried when a pose does not fit.
 const TILT_FALLBACK: [f64; 4] = [1.0, 0.85, 0.7, 0.55];
 
 const RANGE_FALLBACK: [f64; 8] = [1.0, 0.93, 0.86, 0.79, 0.72, 0.65, 0.58, 0.5];
 
-/// A pose for a board before a group: number `index` of its series, `group` being the group's number.
+/// A pose for a board in front of a group: number `index` of its series, for group number `number`.
 ///
-/// Over a series of K poses the tilt direction goes once round in even steps, and every group starts elsewhere. Tilt
-/// and distance step through their bounds by the golden ratio, so that no two of them go together.
+/// Over a series of K poses the tilt direction makes one turn in even steps, with another start for every group. Tilt
+/// and distance step through their bounds by the golden ratio, so that no two of the three are correlated.
 pub(super) fn place(
     board: &Board,
     group: &Group,
@@ -27,7 +27,7 @@ pub(super) fn place(
     number: usize,
 ) -> Result<Pose, String> {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
-    let middle = group.middle().ok_or("no beam leaves towards it")?;
+    let middle = group.middle().ok_or("no beam leaves toward it")?;
     let series = match group.facet {
         Some(_) => experiment.poses_per_group,
         None => experiment.direct_poses,
@@ -46,7 +46,7 @@ pub(super) fn place(
     for tilt_fraction in TILT_FALLBACK {
         for range_fraction in RANGE_FALLBACK {
             let distance = range * range_fraction;
-            if distance < LEAST_RANGE {
+            if distance < MIN_RANGE {
                 continue;
             }
             let pose = facing(
@@ -71,18 +71,18 @@ pub(super) fn place(
     }
     match best {
         Some((caught, pose)) if caught > 0.0 => Ok(pose),
-        _ if fits => Err("no beam of the group would meet it well inside its edges".to_owned()),
+        _ if fits => Err("no beam of the group would hit it well inside its edges".to_owned()),
         _ => Err(format!(
-            "it would reach through a wall, floor or ceiling at every distance from {LEAST_RANGE} to {range:.2} m"
+            "it would reach through a wall, floor or ceiling at every distance from {MIN_RANGE} to {range:.2} m"
         )),
     }
 }
 
-/// Times that chance is asked for a pose that stands in the room.
+/// Maximum number of random poses tried until one is inside the room.
 const ATTEMPTS: u64 = 1000;
 
-/// A pose by chance for a board before a group: aimed at one of its beams, with tilt, direction of tilt and distance
-/// uniform within their bounds. What does not stand in the room is drawn anew.
+/// A random pose for a board in front of a group: aimed at one of its beams, with tilt, direction of tilt and distance
+/// uniform within their bounds. A pose that is not inside the room is drawn again.
 pub(super) fn place_at_random(
     board: &Board,
     group: &Group,
@@ -91,14 +91,14 @@ pub(super) fn place_at_random(
     index: usize,
     draws: impl Fn() -> Draws,
 ) -> Result<Pose, String> {
-    group.middle().ok_or("no beam leaves towards it")?;
+    group.middle().ok_or("no beam leaves toward it")?;
     let (first, last) = (&group.rays[0], &group.rays[group.rays.len() - 1]);
     let fan = last.direction.into_inner() - first.direction.into_inner();
     let mut draws = draws();
     let within = |[low, high]: [f64; 2], share: f64| low + (high - low) * share;
     for attempt in 0..ATTEMPTS {
         draws.seek(index as u64 * ATTEMPTS + attempt);
-        // Below the number of rays.
+        // Less than the number of rays.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let aimed = (draws.uniform() * group.rays.len() as f64) as usize;
         let range = within(experiment.range_m, draws.uniform());
@@ -110,6 +110,6 @@ pub(super) fn place_at_random(
         }
     }
     Err(format!(
-        "of {ATTEMPTS} poses by chance, none stands within the room's walls, floor and ceiling"
+        "none of {ATTEMPTS} random poses is inside the room's walls, floor and ceiling"
     ))
 }

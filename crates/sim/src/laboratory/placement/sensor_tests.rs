@@ -1,12 +1,12 @@
-//! Where the boards of step 1 are put: before one undeflected beam, at wanted distances under wanted incidences.
+//! Places the boards of step 1: in front of one undeflected beam, at given distances and incidences.
 
-use super::planned::{Planned, no_place_before};
+use super::planned::{Planned, placement_error};
 use crate::build::board::{before_beam, stands_in};
 use crate::error::SimError;
 use crate::scene::Scene;
 use catoptric_model::{Pose, PoseKind, TestNote};
 
-/// Every stretch of every test, trial after trial.
+/// Plans every stretch of every test, trial by trial.
 pub(super) fn plan(scene: &Scene, room_from_sensor: &Pose) -> Result<Vec<Planned>, SimError> {
     let mut planned = Vec::new();
     let mut setting = 0;
@@ -23,7 +23,7 @@ pub(super) fn plan(scene: &Scene, room_from_sensor: &Pose) -> Result<Vec<Planned
                     if !stands_in(&scene.board[board], &pose, &scene.room) {
                         let target = format!("the beam at azimuth {}°", test.azimuth_deg);
                         let reason = format!("at {range} m it would reach through a wall, floor or ceiling");
-                        return Err(no_place_before(scene, board, target, reason));
+                        return Err(placement_error(scene, board, target, reason));
                     }
                     for trial in 1..=test.trials as usize {
                         planned.push(Planned {

@@ -1,43 +1,43 @@
-//! What a change of the structure can change of ways that are known.
+//! Which of the known paths a change of the structure can affect.
 //!
-//! A way stays as it is, to the bit, if nothing of what it met has changed and nothing that is new comes between the ends of
-//! its legs. So a facet that is moved concerns the ways that met it where it was and those that pass the box around where it
-//! is now.
+//! A path stays the same, bit for bit, if no surface that it hit has changed and no new one comes between the ends of
+//! its legs. So moving a facet affects the paths that hit it where it was, and those that pass through the box around
+//! where it is now.
 
 use super::path::{End, Path};
 use super::setting::Setting;
 use catoptric_cast::Ray;
 use nalgebra::{Point3, Vector3};
 
-/// Where the rays of a beam went over the structure.
+/// Where the rays of a beam passed the structure.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Trail {
-    /// Each with its length, infinite in the open.
+    /// Each leg with its length, infinite in the open.
     legs: Vec<(Ray, f64)>,
     /// Surfaces at the ends of legs.
     met: Vec<usize>,
-    /// Whether a ray was trapped: what it met last is not known.
+    /// Whether a ray was trapped, whose last surface is not known.
     trapped: bool,
 }
 
-/// What is not the same in two structures with as many surfaces of the same kinds.
+/// The differences between two structures that have the same number of surfaces of the same kinds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Edit {
     /// Whether a surface has changed.
     changed: Vec<bool>,
-    /// Boxes around those that have, as they are now.
+    /// Boxes around the changed surfaces, as they are now.
     boxes: Vec<(Point3<f64>, Point3<f64>)>,
 }
 
-/// How much a box is larger than what is in it, in metres: far above rounding.
+/// Margin of a box around its contents, in meters: far above rounding.
 const SLACK: f64 = 1e-6;
 
 impl Setting<'_> {
-    /// The ways of the rays of a beam, as [`Setting::trace_beam`] has them, and where they went.
+    /// The paths of the rays of a beam, as from [`Setting::trace_beam`], and their trail.
     pub fn trace_with_trail(&self, rays: &[Ray]) -> (Vec<Path>, Trail) {
         let mut trail = Trail::default();
         let mut last = rays.to_vec();
-        let paths = self.trace_and_tell(rays, |ray, bounce| {
+        let paths = self.trace_and_visit(rays, |ray, bounce| {
             let length = (bounce.point - last[ray].origin).norm();
             trail.add(last[ray], length, Some(bounce.surface));
             last[ray] = bounce.after;
@@ -65,8 +65,8 @@ impl Trail {
 }
 
 impl Edit {
-    /// What has changed from one structure to another; `None` if they have not the same surfaces in the same order, or if
-    /// more is there than structures.
+    /// The changes from one structure to another; `None` if they do not have the same surfaces in the same order, or if
+    /// either setting holds more than a structure.
     pub fn between(old: &Setting<'_>, new: &Setting<'_>) -> Option<Self> {
         let (before, after) = (old.structure_alone()?.shapes(), new.structure_alone()?.shapes());
         if before.len() != after.len() || old.contents.max_bounces != new.contents.max_bounces {
@@ -80,7 +80,7 @@ impl Edit {
             if !old.is_same_kind(new, surface) {
                 return None;
             }
-            let same = was.is_same(is) && old.reflects_alike(new, surface);
+            let same = was.is_same(is) && old.reflects_identically(new, surface);
             edit.changed.push(!same);
             if !same {
                 let (low, high) = is.corners_of_box();
@@ -91,7 +91,7 @@ impl Edit {
         Some(edit)
     }
 
-    /// Whether the ways that left a trail may be others now.
+    /// Whether the paths that left a trail may be different now.
     pub fn may_change(&self, trail: &Trail) -> bool {
         let meets = |(leg, length): &(Ray, f64)| self.boxes.iter().any(|b| passes(leg, *length, b));
         !self.boxes.is_empty()
@@ -99,13 +99,13 @@ impl Edit {
     }
 }
 
-/// Whether a leg may pass a box.
+/// Whether a leg may pass through a box.
 fn passes(leg: &Ray, length: f64, (low, high): &(Point3<f64>, Point3<f64>)) -> bool {
     let (mut enters, mut leaves) = (-SLACK, length + SLACK);
     for k in 0..3 {
         let (from, per) = (leg.origin[k], 1.0 / leg.direction[k]);
         if per.is_infinite() {
-            // Along the sides: beside them or between them all the way.
+            // Parallel to these sides: outside of them or between them along the whole leg.
             if from < low[k] || from > high[k] {
                 return false;
             }

@@ -1,4 +1,4 @@
-//! A ray followed from mirror to mirror, and the ghosts that glass makes of it.
+//! Follows a ray from mirror to mirror, and the ghosts that glass makes of it.
 
 use super::path::{Bounce, Course, End, Meeting, Path};
 use super::setting::{Leg, Setting};
@@ -15,10 +15,11 @@ impl Setting<'_> {
         self.path(ray, None)
     }
 
-    /// The ghosts of a ray: for every glass on its way that has one, the way of the light that its front turned back.
+    /// The ghosts of a ray: for every glass on its path that makes ghosts, the path of the light that the front
+    /// reflects.
     ///
-    /// Light that is turned back twice or goes to and fro within a glass is left out, and so is what goes out by one
-    /// way and comes home by the other: the energy of all ways together is less than what was sent.
+    /// Light that is reflected by two fronts or repeatedly within a glass is omitted, and so is light that goes out
+    /// along one path and returns along another: the energy of all paths together is less than what was emitted.
     pub fn ghosts(&self, ray: &Ray, path: &Path) -> impl Iterator<Item = Path> {
         let fronts = path.facets().iter().enumerate();
         let fronts = fronts.filter(|(_, f)| self.contents.facets[**f].glass.is_some_and(|g| g.ghost));
@@ -32,19 +33,19 @@ impl Setting<'_> {
         path
     }
 
-    /// Follows a ray over at most `limit` mirrors and tells of every bounce; at bounce number `ghost` the light is
-    /// turned back by the front of the glass.
+    /// Follows a ray via at most `limit` mirrors and visits every bounce; at bounce number `ghost` the light is
+    /// reflected by the front of the glass.
     pub(crate) fn follow(
         &self,
         ray: &Ray,
         limit: usize,
         ghost: Option<usize>,
-        mut tell: impl FnMut(&Bounce),
+        mut visit: impl FnMut(&Bounce),
     ) -> Course {
         let mut course = Course::begin(ray);
         let mut left = None;
         while let Some(leg) = self.cast(&course.last, left) {
-            left = self.step(&mut course, &leg, limit, ghost, &mut tell);
+            left = self.step(&mut course, &leg, limit, ghost, &mut visit);
             if left.is_none() {
                 break;
             }
@@ -52,14 +53,15 @@ impl Setting<'_> {
         course
     }
 
-    /// Takes a course to the end of a leg, and over the mirror there; the surface that it leaves if it goes on.
+    /// Takes a course to the end of a leg and, if a mirror is there, past it; returns the surface that it leaves if it
+    /// continues.
     pub(super) fn step(
         &self,
         course: &mut Course,
         leg: &Leg<'_>,
         limit: usize,
         ghost: Option<usize>,
-        tell: &mut impl FnMut(&Bounce),
+        visit: &mut impl FnMut(&Bounce),
     ) -> Option<usize> {
         let Some((facet, back)) = self.reflecting(leg.hit.surface, leg.hit.front()) else {
             course.length += leg.hit.distance;
@@ -74,10 +76,10 @@ impl Setting<'_> {
             course.end = End::Trapped;
             return None;
         };
-        tell(&bounce);
+        visit(&bounce);
         let glass = self.contents.facets[facet].glass.filter(|g| g.ghost);
         if ghost == Some(course.count) {
-            // No glass in the way turns nothing back.
+            // Without glass there is no front to reflect anything.
             course.gain *= bounce.passage.map_or(0.0, |p| p.fresnel);
         } else {
             course.silvered += 1;
@@ -93,7 +95,7 @@ impl Setting<'_> {
         Some(bounce.meeting.surface)
     }
 
-    /// A reflection; `None` if the light comes to the rim of the glass.
+    /// A reflection; `None` if the light hits the rim of the glass.
     fn bounce(
         &self,
         course: &Course,

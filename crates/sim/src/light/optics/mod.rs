@@ -1,4 +1,4 @@
-//! The way of a ray: from the scanner over mirrors to whatever stops it.
+//! The path of a ray: from the scanner via mirrors to whatever stops it.
 
 mod clearance;
 mod edit;
@@ -11,6 +11,6 @@ mod together;
 pub use edit::{Edit, Trail};
 pub use path::{Bounce, Course, End, MAX_BOUNCES, Meeting, Path};
 pub use rig::Rig;
-pub(crate) use rig::{Run, Then, Ways};
+pub(crate) use rig::{BeamPaths, Run, Then};
 pub(crate) use setting::Beyond;
 pub use setting::{Mirrors, Role, Setting, Target};

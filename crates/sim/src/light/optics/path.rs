@@ -1,4 +1,4 @@
-//! The way of a ray, and what it is made of: bounces, and how it ends.
+//! The path of a ray and its parts: bounces, and how it ends.
 
 use crate::light::glass::Passage;
 use catoptric_cast::Ray;
@@ -6,65 +6,65 @@ use catoptric_cast::{Hit, placed};
 use catoptric_model::Pose;
 use nalgebra::{Point3, Vector3};
 
-/// Most mirrors a ray can meet; `max_bounces` may be less.
+/// Maximum number of mirrors that a ray can hit; `max_bounces` may be less.
 pub const MAX_BOUNCES: usize = 8;
 
-/// How a ray's way ends.
+/// How a ray path ends.
 #[derive(Debug, Clone, Copy)]
 pub enum End {
     /// On a surface that scatters.
     Hit(Hit),
     /// In the open.
     Escaped,
-    /// Between mirrors, after the last bounce allowed, or in the rim of a mirror's glass.
+    /// Between mirrors after the last bounce that is allowed, or in the rim of a mirror's glass.
     Trapped,
 }
 
-/// What a ray brought to a mirror that it met.
+/// The state of a ray where it hits a mirror.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Meeting {
     /// Index of the surface.
     pub surface: usize,
-    /// Length up to there, in metres.
+    /// Length up to the mirror, in meters.
     pub length: f64,
     /// Cosine of the incidence.
     pub cos_incidence: f64,
-    /// Reflections by silver before.
+    /// Number of earlier reflections by silver.
     pub silvered: usize,
-    /// Share of the light that glass before has let pass.
+    /// Share of the light that earlier glass has transmitted.
     pub gain: f64,
 }
 
 /// A reflection.
 #[derive(Debug, Clone, Copy)]
 pub struct Bounce {
-    /// The mirror, by its index.
+    /// Index of the mirror.
     pub facet: usize,
-    /// Where it was met.
+    /// Where the mirror is hit.
     pub point: Point3<f64>,
     /// Index of the surface.
     pub surface: usize,
-    /// Length up to `point`, in metres.
+    /// Length up to `point`, in meters.
     pub length: f64,
-    /// What the glass did, if the light went through any.
+    /// The passage through glass, if there is any.
     pub passage: Option<Passage>,
     /// The ray that leaves.
     pub after: Ray,
-    /// Length up to where it leaves, in metres.
+    /// Length up to where it leaves, in meters.
     pub length_after: f64,
     pub(super) meeting: Meeting,
 }
 
-/// What becomes of a ray as a whole.
+/// The overall result of following a ray.
 #[derive(Debug, Clone, Copy)]
 pub struct Course {
-    /// Mirrors met.
+    /// Number of mirrors hit.
     pub count: usize,
-    /// Length to the end, in metres; to the last mirror if there is no end.
+    /// Length to the end, in meters; to the last mirror if there is no end.
     pub length: f64,
-    /// Reflections by silver.
+    /// Number of reflections by silver.
     pub silvered: usize,
-    /// Share of the light that glass has let pass, or turned back for a ghost.
+    /// Share of the light that glass transmits, or reflects for a ghost.
     pub gain: f64,
     /// The last leg.
     pub last: Ray,
@@ -72,18 +72,18 @@ pub struct Course {
     pub end: End,
 }
 
-/// The way of a ray.
+/// The path of a ray.
 #[derive(Debug, Clone, Copy)]
 pub struct Path {
     count: usize,
     facets: [usize; MAX_BOUNCES],
     points: [Point3<f64>; MAX_BOUNCES],
     meetings: [Option<Meeting>; MAX_BOUNCES],
-    /// Reflections by silver; a ghost has one less than it met mirrors.
+    /// Number of reflections by silver; for a ghost, one less than the number of mirrors hit.
     pub silvered: usize,
-    /// Share of the light that glass has let pass, or turned back for a ghost: 1 without ghosts.
+    /// Share of the light that glass transmits, or reflects for a ghost: 1 without ghosts.
     pub gain: f64,
-    /// Length from the scanner to the end, in metres; to the last mirror if there is no end.
+    /// Length from the scanner to the end, in meters; to the last mirror if there is no end.
     pub length: f64,
     /// The last leg.
     pub last: Ray,
@@ -92,17 +92,17 @@ pub struct Path {
 }
 
 impl Path {
-    /// The facets met, in order.
+    /// The facets hit, in order.
     pub fn facets(&self) -> &[usize] {
         &self.facets[..self.count]
     }
 
-    /// What the ray brought to each of them.
+    /// The state of the ray at each of them.
     pub fn meetings(&self) -> impl Iterator<Item = Meeting> + Clone {
         self.meetings.into_iter().flatten()
     }
 
-    /// Where they were met, in the sensor frame.
+    /// Where they are hit, in the sensor frame.
     pub fn points(&self) -> &[Point3<f64>] {
         &self.points[..self.count]
     }
@@ -151,7 +151,7 @@ impl Course {
 }
 
 impl Bounce {
-    /// The same in the frame of a sensor in another place.
+    /// The same in the frame of a sensor with another pose.
     pub(super) fn seen_from(self, kept_from_sensor: &Pose) -> Self {
         let turned = |v: &Vector3<f64>| kept_from_sensor.inverse_transform_vector(v);
         Self {

@@ -1,7 +1,8 @@
-//! The scanner's own rays over its own mirrors, compiled once.
+//! The scanner's own rays via its own mirrors, compiled once.
 //!
-//! Scanner and structure are rigid: what a sub-ray does until it leaves the structure for good, or ends on it, is the same
-//! wherever the sensor is and whatever is around it, as long as nothing of the room comes within the structure itself.
+//! Scanner and structure are rigid: what a sub-ray does until it leaves the structure for good, or ends on it, is the
+//! same wherever the sensor is and whatever surrounds it, as long as no part of the room comes within the structure
+//! itself.
 
 use super::path::{Course, End, Meeting};
 use super::setting::Setting;
@@ -10,46 +11,46 @@ use catoptric_cast::Rays;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// The ways of every sub-ray of every beam over the structure, beam after beam.
+/// The paths of all sub-rays of all beams via the structure, beam by beam.
 #[derive(Debug, Clone)]
 pub struct Rig {
     all: Compiled,
-    /// The last legs of all, which `all` has no more.
+    /// The last legs of all sub-rays that leave, moved here from `all`.
     leaving: Rays,
-    /// Where the ways of each beam begin, and last where they end.
+    /// Where the paths of each beam start; the last entry is the end of all.
     starts: Vec<Start>,
-    /// No way leaves the ball of this radius around the sensor before it departs, in metres; 0 if all depart at once.
+    /// Until it leaves, every path stays within this radius around the sensor, in meters; 0 if all leave at once.
     reach: f64,
-    /// Whether a mirror on any way has a glass that makes ghosts.
+    /// Whether a mirror on any path has glass that makes ghosts.
     ghosts: bool,
 }
 
-/// The ways of a beam's sub-rays over the structure, in the order in which they are cast.
+/// The paths of a beam's sub-rays via the structure, in the order in which they are cast.
 #[derive(Debug, Clone)]
-pub(crate) struct Ways<'a> {
-    /// How the sub-rays are done with the structure, in order.
+pub(crate) struct BeamPaths<'a> {
+    /// How the sub-rays leave the structure or end on it, in order.
     pub(crate) runs: &'a [Run],
-    /// Lengths of the ways of all sub-rays, in metres: to the end on the structure, or to where the last leg begins.
+    /// Path lengths of all sub-rays, in meters: to the end on the structure, or to where the last leg begins.
     pub(crate) lengths: &'a [f64],
-    /// The last legs of those that leave, among [`Rig::leaving`].
+    /// The last legs of those that leave, as indices into [`Rig::leaving`].
     pub(crate) leaving: Range<usize>,
     facets: &'a [usize],
     meetings: &'a [Meeting],
 }
 
-/// The ways of one beam, or of beams one after the other.
+/// The paths of one beam, or of several beams in sequence.
 #[derive(Debug, Clone, Default)]
 struct Compiled {
     runs: Vec<Run>,
     lengths: Vec<f64>,
     leaving: Vec<Ray>,
-    /// Mirrors met by each run, one run after the other.
+    /// Mirrors hit by each run, run by run.
     facets: Vec<usize>,
-    /// What was brought to them, of all ways one after the other.
+    /// Meetings with these mirrors, path by path.
     meetings: Vec<Meeting>,
 }
 
-/// How much of everything comes before a beam.
+/// Number of entries of every kind that precede a beam.
 #[derive(Debug, Clone, Copy)]
 struct Start {
     runs: usize,
@@ -59,35 +60,35 @@ struct Start {
     meetings: usize,
 }
 
-/// Sub-rays in a row that are done with the structure alike. Each that does not leave is by itself.
+/// Consecutive sub-rays that leave the structure identically. A sub-ray that does not leave is a run of its own.
 #[derive(Debug, Clone)]
 pub(crate) struct Run {
-    /// Which of the beam's sub-rays.
+    /// Indices of the sub-rays within the beam.
     pub(crate) sub_rays: Range<usize>,
-    /// What comes then.
+    /// What happens after the last mirror.
     pub(crate) then: Then,
-    /// Reflections by silver.
+    /// Number of reflections by silver.
     pub(crate) silvered: usize,
-    /// Share of the light that glass has let pass.
+    /// Share of the light that glass has transmitted.
     pub(crate) gain: f64,
     facets: Range<usize>,
-    /// Place of the first meeting of the beam's.
+    /// Index of the first meeting among the beam's.
     meetings: usize,
 }
 
-/// What a sub-ray does when it is done with the mirrors of the structure.
+/// What a sub-ray does after the last mirror of the structure.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Then {
-    /// It leaves, by the next of [`Ways::leaving`].
+    /// It leaves, by the next of [`BeamPaths::leaving`].
     Leaves,
-    /// It ends on a surface of the structure, under an incidence of this cosine.
+    /// It ends on a surface of the structure, with this cosine of the incidence.
     EndsOn(usize, f64),
     /// It is trapped.
     Trapped,
 }
 
 impl Rig {
-    /// Follows the rays of every beam over the structure of a setting that holds nothing else.
+    /// Follows the rays of every beam via the structure of a setting that contains nothing else.
     pub(crate) fn compile<R: Iterator<Item = Ray>>(
         bare: &Setting<'_>,
         beams: usize,
@@ -117,10 +118,10 @@ impl Rig {
         &self.leaving
     }
 
-    /// The ways of a beam.
-    pub(crate) fn ways(&self, beam: usize) -> Ways<'_> {
+    /// The paths of a beam.
+    pub(crate) fn paths(&self, beam: usize) -> BeamPaths<'_> {
         let (from, to, all) = (&self.starts[beam], &self.starts[beam + 1], &self.all);
-        Ways {
+        BeamPaths {
             runs: &all.runs[from.runs..to.runs],
             lengths: &all.lengths[from.lengths..to.lengths],
             leaving: from.leaving..to.leaving,
@@ -129,8 +130,8 @@ impl Rig {
         }
     }
 
-    /// Whether these ways are those of settings that are one, seen from places near each other: nothing of its room comes
-    /// near enough, and there are no ghosts, whose ways are others.
+    /// Whether these paths are valid in settings that are one setting seen from nearby poses: no part of its room comes
+    /// close enough, and there are no ghosts, which take other paths.
     pub fn holds_in(&self, settings: &[Setting<'_>]) -> bool {
         let Some(first) = settings.first() else {
             return true;
@@ -138,7 +139,7 @@ impl Rig {
         let others = settings.iter().map(|other| other.distance_from(first));
         let spread = others.fold(0.0, f64::max);
         let is_clear = || {
-            // A ball that holds those around all places is mostly clear as well.
+            // A ball that contains those around all poses is usually clear as well.
             first.is_clear(self.reach + spread) || settings.iter().all(|s| s.is_clear(self.reach))
         };
         !self.ghosts && (self.reach == 0.0 || is_clear())
@@ -146,10 +147,10 @@ impl Rig {
 }
 
 impl Compiled {
-    /// The ways of a beam, how far from the sensor they go before they depart, and whether a glass on them makes ghosts.
+    /// The paths of a beam, how far from the sensor they go before they leave, and whether glass on them makes ghosts.
     fn of(bare: &Setting<'_>, rays: impl Iterator<Item = Ray>) -> (Self, f64, bool) {
         let rays: Vec<Ray> = rays.collect();
-        let mut ways = Self::default();
+        let mut compiled = Self::default();
         let mut bounces: Vec<(usize, usize, Meeting)> = Vec::new();
         let mut reach: f64 = 0.0;
         let courses = bare.follow_beam(&rays, bare.contents.max_bounces, |ray, bounce| {
@@ -157,7 +158,7 @@ impl Compiled {
             let places = [bounce.point, bounce.after.origin];
             reach = places.iter().map(|p| p.coords.norm()).fold(reach, f64::max);
         });
-        // Those of one ray after the other, each in order.
+        // Grouped by ray, each in order.
         bounces.sort_by_key(|(ray, ..)| *ray);
         let facets = &bare.contents.facets;
         let ghosts = bounces
@@ -165,20 +166,20 @@ impl Compiled {
             .any(|(_, f, _)| facets[*f].glass.is_some_and(|g| g.ghost));
         let mut met = 0;
         for (ray, course) in rays.iter().zip(&courses) {
-            // What leaves at once is cast into the room from where it starts, whatever is near.
+            // A ray that leaves at once is cast into the room from where it starts, whatever is near.
             if course.count > 0 || !matches!(course.end, End::Escaped) {
                 reach = reach.max(ray.origin.coords.norm());
             }
             let then = match course.end {
                 End::Escaped => {
-                    ways.leaving.push(course.last);
+                    compiled.leaving.push(course.last);
                     Then::Leaves
                 }
                 End::Hit(hit) => {
                     reach = reach.max(hit.point.coords.norm());
                     Then::EndsOn(hit.surface, hit.cos_incidence())
                 }
-                // It has met one more mirror, somewhere on the structure: all of that counts.
+                // It has hit one more mirror, somewhere on the structure: its whole extent counts.
                 End::Trapped => {
                     reach = reach.max(bare.contents.span);
                     Then::Trapped
@@ -186,12 +187,13 @@ impl Compiled {
             };
             let own = met..met + course.count;
             met = own.end;
-            ways.lengths.push(course.length);
-            ways.depart(course, then, own.clone().map(|i| bounces[i].1));
-            ways.meetings
+            compiled.lengths.push(course.length);
+            compiled.depart(course, then, own.clone().map(|i| bounces[i].1));
+            compiled
+                .meetings
                 .extend(bounces[own].iter().map(|(.., meeting)| *meeting));
         }
-        (ways, reach, ghosts)
+        (compiled, reach, ghosts)
     }
 
     fn start(&self) -> Start {
@@ -204,7 +206,7 @@ impl Compiled {
         }
     }
 
-    /// Adds the ways of a beam.
+    /// Appends the paths of a beam.
     fn append(&mut self, beam: &Self) {
         self.runs.extend_from_slice(&beam.runs);
         self.lengths.extend_from_slice(&beam.lengths);
@@ -213,7 +215,7 @@ impl Compiled {
         self.meetings.extend_from_slice(&beam.meetings);
     }
 
-    /// Adds the next sub-ray to the run before, or begins one.
+    /// Adds the next sub-ray to the previous run, or starts a new one.
     fn depart(&mut self, course: &Course, then: Then, facets: impl Iterator<Item = usize>) {
         let number = self.lengths.len() - 1;
         let first = self.facets.len();
@@ -238,13 +240,13 @@ impl Compiled {
     }
 }
 
-impl<'a> Ways<'a> {
-    /// The mirrors that a run's sub-rays met.
+impl<'a> BeamPaths<'a> {
+    /// The mirrors that a run's sub-rays hit.
     pub(crate) fn facets(&self, run: &Run) -> &'a [usize] {
         &self.facets[run.facets.clone()]
     }
 
-    /// What one of its sub-rays brought to them.
+    /// The meetings of one of its sub-rays with them.
     pub(crate) fn meetings(&self, run: &Run, sub_ray: usize) -> &'a [Meeting] {
         let count = run.facets.len();
         let first = run.meetings + (sub_ray - run.sub_rays.start) * count;

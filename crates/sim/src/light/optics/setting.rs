@@ -1,14 +1,14 @@
-//! Everything that light can meet, and how it is listed.
+//! Everything that light can hit, and how it is listed.
 //!
-//! Rays are cast in the sensor frame. The structure is in it, and while nothing moves so is the room. In a flight the
-//! room is in the sensor frame of the flight's start. Every leg is cast into both, each time from where the sensor is
-//! then, and the nearer surface counts.
+//! Rays are cast in the sensor frame. The structure is in it, and so is the room while nothing moves. In a flight the
+//! room is kept in the sensor frame of the flight's start. Every leg is cast into both, from the current pose of the
+//! sensor, and the nearer surface counts.
 
 use super::clearance::Extent;
 use super::path::MAX_BOUNCES;
 use crate::build::color::{self, Paint};
 use crate::build::stage::Stage;
-use crate::build::structure::{Back, BuiltFacet, Part, Structure};
+use crate::build::structure::{Back, BuiltFacet, OpaquePart, Structure};
 use crate::error::SimError;
 use crate::scene::Scene;
 use catoptric_cast::Ray;
@@ -18,7 +18,7 @@ use nalgebra::{Point3, Unit, Vector3};
 use std::borrow::Cow;
 use std::ops::{Deref, Range};
 
-/// What a surface is.
+/// The role of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Role {
     /// A mirror, by its index: first those of the structure, then those of the room.
@@ -29,14 +29,14 @@ pub enum Role {
     Board,
     /// A wall, floor or ceiling.
     Wall,
-    /// Another surface in the room.
+    /// Another surface of the room.
     Object,
 }
 
-/// Everything that light can meet during one stretch, as the sensor sees it from where it is.
+/// Everything that light can hit during one stretch, as seen from the current pose of the sensor.
 pub struct Setting<'a> {
     pub(super) contents: Held<'a>,
-    /// Where the sensor is in the frame that the room is kept in; `None` where it started.
+    /// Pose of the sensor in the frame in which the room is kept; `None` at the start.
     start_from_sensor: Option<Pose>,
 }
 
@@ -57,15 +57,15 @@ impl<'a> Deref for Held<'a> {
     }
 }
 
-/// What a setting holds, wherever the sensor is.
+/// What a setting contains, wherever the sensor is.
 pub(super) struct Contents<'a> {
     /// The structure, which moves with the sensor, in its frame.
     world: World,
-    /// What the sensor stands in or moves past, if anything.
+    /// What the sensor rests in or moves past, if anything.
     room: Option<World>,
-    /// Where that is.
+    /// Bounds on where its surfaces are.
     extents: Vec<Extent>,
-    /// Radius of a ball around the sensor that holds the structure, in metres.
+    /// Radius of a ball around the sensor that contains the structure, in meters.
     pub(super) span: f64,
     /// Whether the sensor can move.
     flies: bool,
@@ -77,12 +77,12 @@ pub(super) struct Contents<'a> {
     diffuse_reflectivity: f64,
 }
 
-/// Where a leg of a ray ends, in the frame that the surface is kept in.
+/// The end of a leg of a ray, in the frame in which the surface is kept.
 pub(super) struct Leg<'p> {
     pub(super) hit: Hit,
     /// Direction of the ray.
     pub(super) incoming: Unit<Vector3<f64>>,
-    /// From the sensor frame to that frame, unless it is the same.
+    /// From the sensor frame to that frame, unless they are the same.
     pub(super) kept_from_sensor: Option<&'p Pose>,
 }
 
@@ -107,16 +107,16 @@ enum Side {
     Back,
 }
 
-/// Whether the mirrors are in place.
+/// Whether the mirrors are attached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Mirrors {
     /// They are.
     Attached,
-    /// Step 3: the bare structure behind them is seen.
+    /// Step 3: they are removed, and the bare structure behind them is visible.
     Removed,
 }
 
-/// Room for the legs of some beams in the frame of the room, and for what they meet.
+/// Buffers for the legs of some beams in the frame of the room, and for what they hit.
 #[derive(Debug, Default)]
 pub(crate) struct Beyond {
     rays: Rays,
@@ -135,7 +135,7 @@ pub struct Target {
     pub name: String,
     /// Its shape.
     pub shape: Shape,
-    /// What it is.
+    /// Its role.
     pub role: Role,
     /// Its color.
     pub paint: Paint,
@@ -145,7 +145,7 @@ impl<'a> Setting<'a> {
     /// The structure, with or without its mirrors, and the targets around it.
     ///
     /// # Errors
-    /// [`SimError::UnknownColor`] for a part whose color nobody defined.
+    /// [`SimError::UnknownColor`] for a part whose color is not defined.
     pub fn new(
         scene: &Scene,
         structure: &'a Structure,
@@ -155,10 +155,10 @@ impl<'a> Setting<'a> {
         Self::in_room(scene, structure, mirrors, None, targets)
     }
 
-    /// The same, and what stands in the room.
+    /// The same with everything that is fixed in the room.
     ///
     /// # Errors
-    /// As [`Setting::new`].
+    /// As for [`Setting::new`].
     pub fn in_room(
         scene: &Scene,
         structure: &'a Structure,
@@ -180,11 +180,11 @@ impl<'a> Setting<'a> {
         Ok(Self::of(scene, list, first_of_room, facets, false))
     }
 
-    /// The structure with its mirrors, flying past the targets and what stands in the room, all of it in the sensor
-    /// frame of the flight's start; seen from there.
+    /// The structure with its mirrors, flying past the targets and everything that is fixed in the room, all of it in
+    /// the sensor frame of the flight's start; seen from there.
     ///
     /// # Errors
-    /// As [`Setting::new`].
+    /// As for [`Setting::new`].
     pub fn in_flight(
         scene: &Scene,
         structure: &'a Structure,
@@ -211,7 +211,7 @@ impl<'a> Setting<'a> {
             _ => shape.triangles().into_iter().flatten().collect(),
         });
         let contents = Contents {
-            // Cylinders are drawn with flat faces.
+            // The triangles of a cylinder are flat.
             span: 1.01 * corners.map(|c| c.coords.norm()).fold(0.0, f64::max),
             world: World::new(list.shapes),
             extents: room.iter().map(|shape| Extent::of(shape, flies)).collect(),
@@ -229,7 +229,7 @@ impl<'a> Setting<'a> {
         }
     }
 
-    /// The same from another place of the sensor; exactly the same where it has not moved, and where nothing can.
+    /// The same seen from another pose of the sensor; exactly the same if it has not moved or if nothing can.
     #[must_use]
     pub fn seen_from(&self, start_from_sensor: &Pose) -> Setting<'_> {
         let moved = self.contents.flies && *start_from_sensor != Pose::identity();
@@ -239,7 +239,7 @@ impl<'a> Setting<'a> {
         }
     }
 
-    /// Whether nothing of the room is within a distance of the sensor, in metres.
+    /// Whether no part of the room is within a distance of the sensor, in meters.
     pub(super) fn is_clear(&self, distance: f64) -> bool {
         let sensor = self.sensor();
         self.contents
@@ -248,12 +248,12 @@ impl<'a> Setting<'a> {
             .all(|e| e.is_beyond(&sensor, distance))
     }
 
-    /// How far the sensor is from where another setting has it, in metres.
+    /// Distance of the sensor from its position in another setting, in meters.
     pub(super) fn distance_from(&self, other: &Self) -> f64 {
         (self.sensor() - other.sensor()).norm()
     }
 
-    /// Where the sensor is in the frame that the room is kept in.
+    /// Position of the sensor in the frame in which the room is kept.
     fn sensor(&self) -> Point3<f64> {
         self.start_from_sensor
             .map_or_else(Point3::origin, |pose| Point3::from(pose.translation.vector))
@@ -264,7 +264,7 @@ impl<'a> Setting<'a> {
         self.place_in_room(rays, which, &mut beyond.rays);
     }
 
-    /// Appends rays of the sensor frame, in the frame that the room is kept in.
+    /// Appends rays of the sensor frame, transformed into the frame in which the room is kept.
     fn place_in_room(&self, rays: &Rays, which: Range<usize>, in_room: &mut Rays) {
         match &self.start_from_sensor {
             None => in_room.extend_from(rays, which),
@@ -281,17 +281,17 @@ impl<'a> Setting<'a> {
         }
     }
 
-    /// Index among all surfaces of one that a leg met in the room.
+    /// Index among all surfaces of one that a leg hit in the room.
     pub(crate) fn met_in_room(&self, contact: &Contact) -> usize {
         contact.surface as usize + self.contents.first_of_room
     }
 
-    /// Whether a surface is a mirror, or a side of one that does not reflect.
+    /// Whether a surface belongs to a mirror, on a reflecting side or not.
     pub(crate) fn is_mirror(&self, surface: usize) -> bool {
         matches!(self.role(surface), Role::Facet(_))
     }
 
-    /// What a surface is.
+    /// The role of a surface.
     pub fn role(&self, surface: usize) -> Role {
         self.contents.surfaces[surface].role
     }
@@ -311,7 +311,8 @@ impl<'a> Setting<'a> {
         self.contents.diffuse_reflectivity
     }
 
-    /// The mirror that a surface is part of if its front, or its back, reflects; and whether that is the body's back.
+    /// The mirror that a surface belongs to, if its given side reflects, and whether that side is the back of the
+    /// mirror's body.
     pub(crate) fn reflecting(&self, surface: usize, front: bool) -> Option<(usize, bool)> {
         let surface = &self.contents.surfaces[surface];
         let Role::Facet(facet) = surface.role else {
@@ -324,7 +325,7 @@ impl<'a> Setting<'a> {
         }
     }
 
-    /// The structure, if there is nothing else.
+    /// The structure, if the setting contains nothing else.
     pub(super) fn structure_alone(&self) -> Option<&World> {
         self.contents.room.is_none().then_some(&self.contents.world)
     }
@@ -338,15 +339,15 @@ impl<'a> Setting<'a> {
         a.role == b.role && a.side == b.side
     }
 
-    /// Whether the mirror that a surface is part of, if it is, turns light alike in another setting.
-    pub(super) fn reflects_alike(&self, other: &Setting<'_>, surface: usize) -> bool {
+    /// Whether the mirror that a surface belongs to, if any, reflects identically in another setting.
+    pub(super) fn reflects_identically(&self, other: &Setting<'_>, surface: usize) -> bool {
         match self.contents.surfaces[surface].role {
             Role::Facet(facet) => self.contents.facets[facet].reflects_like(&other.contents.facets[facet]),
             _ => true,
         }
     }
 
-    /// A leg that ends where the sensor frame is that of the surface.
+    /// A leg whose end is kept in the sensor frame.
     pub(super) fn unmoved(&self, hit: Hit, incoming: Unit<Vector3<f64>>) -> Leg<'_> {
         Leg {
             hit,
@@ -355,7 +356,7 @@ impl<'a> Setting<'a> {
         }
     }
 
-    /// The nearest surface along a ray of the sensor frame, `left` (the one it just left) aside.
+    /// The nearest surface along a ray of the sensor frame, except `left`, the one it has just left.
     pub(super) fn cast(&self, ray: &Ray, left: Option<usize>) -> Option<Leg<'_>> {
         let contents = &*self.contents;
         let unmoved = |hit| self.unmoved(hit, ray.direction);
@@ -399,7 +400,7 @@ impl<'a> Setting<'a> {
         );
     }
 
-    /// The nearer of what a ray meets of the structure and, in the frame of the room, of that.
+    /// The nearer of what a ray hits of the structure and, in the frame of the room, of the room.
     fn nearer(
         &self,
         (own, ray): (Option<Hit>, &Ray),
@@ -423,7 +424,7 @@ impl<'a> Setting<'a> {
 }
 
 impl Leg<'_> {
-    /// Where the leg ends, in the sensor frame.
+    /// The end of the leg in the sensor frame.
     pub(super) fn in_sensor_frame(&self) -> Hit {
         self.kept_from_sensor.map_or(self.hit, |pose| Hit {
             point: pose.inverse_transform_point(&self.hit.point),
@@ -457,7 +458,7 @@ fn structure_list<'a>(
     Ok((list, structure.facets.iter().map(Cow::Borrowed).collect()))
 }
 
-/// Surfaces as they are listed.
+/// The surfaces of a setting in the order of their indices.
 #[derive(Default)]
 struct List {
     shapes: Vec<Shape>,
@@ -475,14 +476,14 @@ impl List {
         });
     }
 
-    /// What is in the room: targets, then mirrors and surfaces.
+    /// Adds what is in the room: targets, then mirrors and surfaces.
     fn room<'a>(
         &mut self,
         scene: &Scene,
         facets: &mut Vec<Cow<'a, BuiltFacet>>,
         targets: Vec<Target>,
         mirrors: impl Iterator<Item = Cow<'a, BuiltFacet>>,
-        parts: &[Part],
+        parts: &[OpaquePart],
     ) -> Result<(), SimError> {
         let dull = color::paint(scene, "structure")?;
         for target in targets {
@@ -499,7 +500,7 @@ impl List {
         Ok(())
     }
 
-    /// A mirror's face, and its back and rim if it has two sides.
+    /// Adds a mirror's face, and its back and rim if it is two-sided.
     fn mirror(&mut self, mirror: &BuiltFacet, index: usize, dull: &Paint) {
         let role = Role::Facet(index);
         let side = match mirror.back {

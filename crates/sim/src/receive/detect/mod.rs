@@ -1,9 +1,9 @@
 //! From a sum of pulses to a range: the leading edge of the first echo.
 //!
-//! Every sub-ray sends back a Gaussian pulse. The echo is their sum; the detector takes the place where it first rises
-//! through a fixed threshold. A weaker pulse crosses later: that is the walk, √(2 ln(A/V))·σ for a Gaussian of height
-//! A. Surfaces closer than the pulse is long merge into one echo, others follow one another. Other detectors and the
-//! echoes after the first are in [`echo`](crate::receive::echo).
+//! Every sub-ray returns a Gaussian pulse. The echo is their sum; the detector takes the point where it first rises
+//! through a fixed threshold. A weaker pulse crosses later: this is the walk error, since a Gaussian of height A
+//! crosses √(2 ln(A/V))·σ before its peak. Surfaces closer together than the length of a pulse merge into one echo;
+//! others give successive echoes. Other detectors and the echoes after the first are in [`echo`](crate::receive::echo).
 
 mod pulse;
 pub(crate) mod root;
@@ -14,34 +14,34 @@ pub(crate) use pulse::{height, slope};
 /// The first echo that rises through the threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Edge {
-    /// Where the threshold is crossed, in metres of range.
+    /// Where the threshold is crossed, in meters of range.
     pub crossing: f64,
     /// Height of the echo's first peak, in watts.
     pub peak: f64,
 }
 
-/// Speed of light, in metres per second.
+/// Speed of light, in meters per second.
 pub const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 
-/// Standard deviation in range of a pulse of the given full width at half maximum in nanoseconds, in metres.
+/// Standard deviation in range of a pulse of the given full width at half maximum in nanoseconds, in meters.
 pub fn pulse_sd(fwhm_ns: f64) -> f64 {
     0.5 * SPEED_OF_LIGHT * fwhm_ns * 1e-9 / (8.0 * std::f64::consts::LN_2).sqrt()
 }
 
-/// Full width at half maximum of a pulse of the given standard deviation, both in metres of range.
+/// Full width at half maximum of a pulse of the given standard deviation, both in meters of range.
 pub fn pulse_length(sd: f64) -> f64 {
     sd * (8.0 * std::f64::consts::LN_2).sqrt()
 }
 
-/// Whether a sum of pulses reaches the threshold anywhere: whether there is a [`leading_edge`].
+/// Whether a sum of pulses reaches the threshold anywhere, that is, whether there is a [`leading_edge`].
 pub fn is_seen(pulses: &[Pulse], sd: f64, threshold: f64) -> bool {
     is_surely_seen(pulses, sd, threshold) || bracket(pulses, sd, threshold).is_some()
 }
 
-/// Whether a bound tells that the threshold is reached: at the nearest pulse all of them stand at least at
-/// exp(−δ²/2) ≥ 1 − δ²/2 of their height, with δ the distance of the farthest over σ.
+/// Whether a bound proves that the threshold is reached: at the nearest pulse all pulses have at least exp(−δ²/2) ≥ 1 −
+/// δ²/2 of their height, with δ the distance of the farthest divided by σ.
 fn is_surely_seen(pulses: &[Pulse], sd: f64, threshold: f64) -> bool {
-    /// Far above what sums are off by rounding.
+    /// Far above the rounding error of the sums.
     const ROUNDING: f64 = 1e-9;
     let Span {
         total,
@@ -54,7 +54,7 @@ fn is_surely_seen(pulses: &[Pulse], sd: f64, threshold: f64) -> bool {
 
 /// The leading edge of the first echo; `None` if the threshold is never reached.
 ///
-/// Exact to 1e-13 m for one pulse and for any sum.
+/// Accurate to 1e-13 m for one pulse and for any sum.
 pub fn leading_edge(pulses: &[Pulse], sd: f64, threshold: f64) -> Option<Edge> {
     let (below, above) = bracket(pulses, sd, threshold)?;
     let crossing = root::crossing(pulses, sd, (below, above), threshold);
@@ -65,7 +65,7 @@ pub fn leading_edge(pulses: &[Pulse], sd: f64, threshold: f64) -> Option<Edge> {
     })
 }
 
-/// All light of some pulses, in watts, and how near and far they are, in metres.
+/// Total light of some pulses, in watts, and their smallest and largest range, in meters.
 struct Span {
     total: f64,
     nearest: f64,
@@ -96,7 +96,7 @@ impl Span {
     }
 }
 
-/// Places between which the sum first reaches the threshold: still below it, and at or above it.
+/// Two positions between which the sum first reaches the threshold: still below it, and at or above it.
 fn bracket(pulses: &[Pulse], sd: f64, threshold: f64) -> Option<(f64, f64)> {
     let Span {
         total,
@@ -106,9 +106,9 @@ fn bracket(pulses: &[Pulse], sd: f64, threshold: f64) -> Option<(f64, f64)> {
     if total < threshold || pulses.is_empty() {
         return None;
     }
-    // Before this place even all pulses together at the nearest range stay below the threshold.
+    // Before this position even all pulses together at the nearest range stay below the threshold.
     let mut below = nearest - sd * walk(total, threshold) - 1e-12;
-    // Up to the nearest pulse the echo only rises; from there on a peak is never narrower than a quarter of σ.
+    // Up to the nearest pulse the echo only rises; beyond it, a peak is never narrower than a quarter of σ.
     let mut above = nearest;
     while height(pulses, sd, above) < threshold {
         if above > farthest {
@@ -121,7 +121,7 @@ fn bracket(pulses: &[Pulse], sd: f64, threshold: f64) -> Option<(f64, f64)> {
 }
 
 impl Edge {
-    /// The range this echo would be taken for if it were one Gaussian pulse: its crossing with the walk undone.
+    /// The range of this echo if it were one Gaussian pulse: its crossing, corrected for the walk.
     pub fn compensated(&self, sd: f64, threshold: f64) -> f64 {
         self.crossing + sd * walk(self.peak, threshold)
     }
@@ -140,7 +140,7 @@ mod tests {
             (vec![], false),
             (vec![pulse(3.0, 0.999)], false),
             (vec![pulse(3.0, 1.0)], true),
-            // Each too dim, and only near enough to each other bright enough together.
+            // Each too dim alone, and bright enough together only if they are close.
             (vec![pulse(3.0, 0.6), pulse(3.1, 0.6)], true),
             (vec![pulse(3.0, 0.6), pulse(4.5, 0.6)], false),
             (vec![pulse(3.0, 0.6), pulse(4.5, 1.2)], true),
@@ -155,7 +155,7 @@ mod tests {
         for power in [1.0, 1.5, 40.0, 1e6] {
             let edge = leading_edge(&[Pulse { range: 3.0, power }], SD, 1.0).expect("it is bright enough");
             assert!((edge.crossing - (3.0 - SD * (2.0 * libm::log(power)).sqrt())).abs() < 1e-12);
-            // Near the top a place is only known to the square root of the precision; the height is not affected.
+            // Near the top a position is known only to the square root of the precision; the height is not affected.
             assert!((edge.peak / power - 1.0).abs() < 1e-14);
             assert!((edge.compensated(SD, 1.0) - 3.0).abs() < 1e-12);
         }

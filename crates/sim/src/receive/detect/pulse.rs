@@ -5,7 +5,7 @@ use crate::lanes::{LANES, exponential};
 /// The light of one sub-ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pulse {
-    /// Path length, in metres.
+    /// Path length, in meters.
     pub range: f64,
     /// Peak power, in watts.
     pub power: f64,
@@ -16,7 +16,7 @@ pub fn walk(peak: f64, threshold: f64) -> f64 {
     (2.0 * libm::log(peak / threshold)).max(0.0).sqrt()
 }
 
-/// Σ over the pulses of what is made of their distance, power and bell exp(−(x − r)²/2σ²), in their order.
+/// Sum over the pulses, in order, of `term` of their distance, power and bell exp(−(x − r)²/2σ²).
 #[inline(always)]
 pub(super) fn sum(pulses: &[Pulse], sd: f64, at: f64, mut term: impl FnMut(f64, f64, f64) -> f64) -> f64 {
     let mut total = -0.0;
@@ -42,7 +42,7 @@ pub(super) fn sum(pulses: &[Pulse], sd: f64, at: f64, mut term: impl FnMut(f64, 
     total
 }
 
-/// The echo at a range, in watts.
+/// Height of the echo at a range, in watts.
 pub(crate) fn height(pulses: &[Pulse], sd: f64, at: f64) -> f64 {
     sum(pulses, sd, at, |_, power, bell| power * bell)
 }

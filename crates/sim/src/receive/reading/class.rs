@@ -1,4 +1,4 @@
-//! What the structure does to a beam.
+//! Classifies what the structure does to a beam.
 
 use super::sensor::Sensor;
 use crate::light::footprint::SubRay;
@@ -13,20 +13,20 @@ pub enum BeamClass {
     Direct,
     /// All of it leaves by one facet.
     Deflected,
-    /// Its parts take different ways.
+    /// An edge divides it between paths.
     Split,
     /// All of it leaves after more than one facet.
     MultiBounce,
     /// All of it ends on the structure.
     Blocked,
-    /// All of it is still between mirrors after the last bounce allowed.
+    /// All of it is still between mirrors after the last bounce that is allowed.
     Lost,
 }
 
 impl Sensor {
-    /// What the structure does to a beam, and the share of its energy that goes the chief ray's way.
+    /// What the structure does to a beam, and the share of its energy that takes the path of the chief ray.
     ///
-    /// `bare` is a setting without targets, so that light which leaves the structure escapes.
+    /// `bare` is a setting without targets, so that light leaving the structure escapes.
     pub fn classify(&self, bare: &Setting<'_>, beam: usize) -> (BeamClass, f64) {
         let chief = self.chief_path(bare, beam);
         let paths: Vec<_> = self.paths(bare, beam).collect();
@@ -34,8 +34,8 @@ impl Sensor {
     }
 }
 
-/// What the structure does to a beam, from the ways of its chief ray and of its sub-rays past it, and the share of its
-/// energy that goes the chief ray's way.
+/// What the structure does to a beam, given the paths of its chief ray and its sub-rays, and the share of its energy
+/// that takes the path of the chief ray.
 pub fn class<'p>(chief: &Path, paths: impl IntoIterator<Item = (&'p SubRay, &'p Path)>) -> (BeamClass, f64) {
     let of = |path: &Path| match path.end {
         End::Hit(_) => BeamClass::Blocked,
@@ -49,7 +49,7 @@ pub fn class<'p>(chief: &Path, paths: impl IntoIterator<Item = (&'p SubRay, &'p 
     let mut whole = true;
     let mut share = 0.0;
     for (sub_ray, path) in paths {
-        // Light that ends on the structure is lost to the scanner whatever part of it is met.
+        // Light that ends on the structure is lost to the scanner, whichever part of it is hit.
         let same =
             of(path) == of(chief) && (of(path) == BeamClass::Blocked || path.facets() == chief.facets());
         if same {

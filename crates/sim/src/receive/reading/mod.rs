@@ -1,6 +1,6 @@
-//! One beam against one setting: its sub-rays' ways, the echo they make, and the range read off it.
+//! One beam in one setting: the paths of its sub-rays, the echo they produce, and the range taken from it.
 //!
-//! Everything but `report` is free of chance; it is the same for every scan of a stretch.
+//! Everything except `report` is without random effects, and the same for every scan of a stretch.
 
 mod class;
 mod observe;
@@ -15,7 +15,7 @@ mod sub_ray;
 pub use class::{BeamClass, class};
 pub use observe::Share;
 pub use part::Parts;
-pub use report::Chance;
+pub use report::RandomEffects;
 pub use returned::{MAX_ECHOES, Return};
 pub use sensor::Sensor;
 pub use sub_ray::{Light as SubRayLight, Stop, SubRayEnd};

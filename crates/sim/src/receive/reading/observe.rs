@@ -1,4 +1,4 @@
-//! One beam against one setting, all of its light.
+//! One beam in one setting, with all of its light.
 
 use super::part::{Parts, Place};
 use super::returned::Return;
@@ -9,12 +9,12 @@ use crate::light::optics::{End, Path, Role, Setting};
 use crate::light::power;
 use catoptric_cast::Ray;
 
-/// A part of a beam's light, as fractions of all of it.
+/// A part of a beam's light, as fractions of the whole.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Share {
-    /// The surface it ends on; none for light that escapes or is lost between mirrors.
+    /// The surface on which it ends; none for light that escapes or is lost between mirrors.
     pub role: Option<Role>,
-    /// Facets on the way there.
+    /// Facets on the path there.
     pub facets: Vec<usize>,
     /// Share of the beam's energy.
     pub energy: f64,
@@ -23,14 +23,14 @@ pub struct Share {
 }
 
 impl Sensor {
-    /// What a beam brings home; `None` if no echo reaches the threshold.
+    /// What a beam receives; `None` if no echo reaches the threshold.
     pub fn observe(&self, setting: &Setting<'_>, beam: usize) -> Option<Return> {
         let mut parts = Parts::default();
         self.illuminate(setting, beam, &mut parts);
         self.receive(setting, parts.as_slice())
     }
 
-    /// Where a beam's energy goes: what each way and surface gets, and what reaches none.
+    /// Where a beam's energy goes: what arrives along each path at each surface, and what arrives nowhere.
     pub fn shares(&self, setting: &Setting<'_>, beam: usize) -> Vec<Share> {
         let mut parts = Parts::default();
         self.illuminate(setting, beam, &mut parts);
@@ -76,7 +76,7 @@ impl Sensor {
         parts.end();
     }
 
-    /// What one sub-ray's light reaches on its way.
+    /// What one sub-ray's light reaches along its path.
     pub(super) fn illuminate_along(
         &self,
         setting: &Setting<'_>,
@@ -99,7 +99,7 @@ impl Sensor {
         }
     }
 
-    /// Adds the light of a sub-ray that reaches a surface to the part of that surface and the facets on the way.
+    /// Adds the light that a sub-ray brings to a surface to the part with that surface and those facets.
     fn add(&self, parts: &mut Parts, path: &Path, arrival: &Arrival, chief: bool) {
         let (on, facets) = (&arrival.on, &path.facets()[..arrival.bounces]);
         let cosines = path.meetings().take(arrival.bounces).map(|m| m.cos_incidence);
@@ -108,7 +108,7 @@ impl Sensor {
         parts.add((arrival.surface, facets), power, share, place, cosines, chief);
     }
 
-    /// Lends the chief ray's range to the part it falls on, where the bundle itself holds no chief ray.
+    /// Assigns the chief ray's range to the part that it hits, for beams whose sub-rays do not include the chief ray.
     pub(super) fn add_chief(parts: &mut Parts, path: &Path) {
         if let End::Hit(hit) = path.end
             && let Some(part) = parts.find(hit.surface, path.facets())

@@ -1,34 +1,35 @@
-//! Neighboring beams over a structure whose part in their ways is known: what leaves it is cast into the room together,
-//! and sub-rays that go one way to one surface are added in a row.
+//! Observes neighboring beams with the compiled paths via the structure: what leaves it is cast into the room together,
+//! and consecutive sub-rays that take one path to one surface are added together.
 
 use super::part::{Parts, Place};
 use super::returned::Return;
 use super::sensor::{Sensor, is_chief};
 use crate::light::footprint;
-use crate::light::optics::{Rig, Run, Setting, Then, Ways};
+use crate::light::optics::{BeamPaths, Rig, Run, Setting, Then};
 use crate::light::power::{self, Target};
 use crate::receive::detect::Pulse;
 use catoptric_cast::Contact;
 use std::ops::Range;
 
-/// Sub-rays that leave the structure alike, and what is around it.
+/// Sub-rays that leave the structure identically, and what is around it.
 #[derive(Clone, Copy)]
-struct Group<'a> {
+struct RunContext<'a> {
     setting: &'a Setting<'a>,
-    ways: &'a Ways<'a>,
+    paths: &'a BeamPaths<'a>,
     run: &'a Run,
 }
 
 impl Sensor {
-    /// The structure's part in the ways of all sub-rays, for [`Sensor::observe_over`]; `bare` holds nothing else.
+    /// Compiles the paths of all sub-rays via the structure, for [`Sensor::observe_over`]; `bare` contains nothing
+    /// else.
     pub fn compile(&self, bare: &Setting<'_>) -> Rig {
         Rig::compile(bare, self.scan.beams(), |beam| self.rays(beam))
     }
 
-    /// What neighboring beams from `first` on bring home: the same to the last bit, with the structure's part already
-    /// followed and the room's for all of them together.
+    /// What neighboring beams from `first` on receive: bit for bit the same as [`Sensor::observe`], but with the
+    /// structure's part of the paths already compiled and the room's cast for all of them together.
     ///
-    /// Every beam has a setting of its own: the same one, or what is seen of it from elsewhere; `rig` must
+    /// Every beam has a setting of its own: the same one, or what is seen of it from another pose; `rig` must
     /// [hold](Rig::holds_in) in them.
     pub fn observe_over(
         &self,
@@ -41,26 +42,26 @@ impl Sensor {
         let mut beyond = std::mem::take(&mut parts.beyond);
         beyond.clear();
         for (setting, beam) in settings.iter().zip(first..) {
-            setting.leave(rig.leaving(), rig.ways(beam).leaving, &mut beyond);
+            setting.leave(rig.leaving(), rig.paths(beam).leaving, &mut beyond);
         }
         if let Some(any) = settings.first() {
             any.cast_into_room(&mut beyond);
         }
         let mut in_room = beyond.contacts.as_slice();
         for ((setting, beam), place) in settings.iter().zip(first..).zip(returns) {
-            let ways = rig.ways(beam);
-            let (own, others) = in_room.split_at(ways.leaving.len());
+            let paths = rig.paths(beam);
+            let (own, others) = in_room.split_at(paths.leaving.len());
             in_room = others;
-            self.illuminate_over(&ways, setting, beam, own, parts);
+            self.illuminate_over(&paths, setting, beam, own, parts);
             *place = self.receive(setting, parts.as_slice());
         }
         parts.beyond = beyond;
     }
 
-    /// [`Sensor::illuminate`] from where the sub-rays depart from the structure.
+    /// [`Sensor::illuminate`] from where the sub-rays leave the structure.
     fn illuminate_over(
         &self,
-        ways: &Ways<'_>,
+        paths: &BeamPaths<'_>,
         setting: &Setting<'_>,
         beam: usize,
         in_room: &[Option<Contact>],
@@ -68,22 +69,22 @@ impl Sensor {
     ) {
         parts.begin();
         let mut left = 0;
-        for run in ways.runs {
-            let group = Group { setting, ways, run };
+        for run in paths.runs {
+            let context = RunContext { setting, paths, run };
             let all = run.sub_rays.clone();
             match run.then {
                 Then::Leaves => {
                     let legs = left..left + all.len();
                     left = legs.end;
-                    self.illuminate_room(&group, beam, &in_room[legs], parts);
+                    self.illuminate_room(&context, beam, &in_room[legs], parts);
                 }
                 Then::EndsOn(surface, cos_incidence) => {
                     let end = |length| (length, cos_incidence);
-                    let ends = ways.lengths[all.clone()].iter().copied().map(end);
-                    self.add_light(&group, all.clone(), surface, ends, parts);
-                    self.add_on_mirrors(&group, all, parts);
+                    let ends = paths.lengths[all.clone()].iter().copied().map(end);
+                    self.add_light(&context, all.clone(), surface, ends, parts);
+                    self.add_on_mirrors(&context, all, parts);
                 }
-                Then::Trapped => self.add_on_mirrors(&group, all, parts),
+                Then::Trapped => self.add_on_mirrors(&context, all, parts),
             }
         }
         if self.lacks_chief() {
@@ -92,24 +93,24 @@ impl Sensor {
         parts.end();
     }
 
-    /// Adds the light of sub-rays that leave alike, with what they meet in the room.
+    /// Adds the light of sub-rays that leave identically, with what they hit in the room.
     fn illuminate_room(
         &self,
-        group: &Group<'_>,
+        context: &RunContext<'_>,
         beam: usize,
         in_room: &[Option<Contact>],
         parts: &mut Parts,
     ) {
-        let Group { setting, ways, run } = *group;
+        let RunContext { setting, paths, run } = *context;
         let mut done = 0;
         while let Some(first) = in_room.get(done) {
             let surface = first.map(|contact| setting.met_in_room(&contact));
             let mirror = surface.filter(|surface| setting.is_mirror(*surface));
-            // Mirrors are looked at ray by ray.
+            // Mirrors are handled ray by ray.
             let count = if mirror.is_some() {
                 1
             } else {
-                alike(&in_room[done..])
+                same_surface(&in_room[done..])
             };
             let contacts = &in_room[done..done + count];
             let from = run.sub_rays.start + done;
@@ -117,38 +118,38 @@ impl Sensor {
             done += count;
             let front = first.is_some_and(|contact| contact.front());
             if mirror.is_some_and(|mirror| setting.reflecting(mirror, front).is_some()) {
-                // Its light may come back to the structure.
+                // Its light may return to the structure.
                 let sub_ray = &self.sub_rays[sub_rays.start];
                 let ray = footprint::ray(&self.shape, self.scan.azimuth(beam), sub_ray);
                 self.illuminate_along(setting, sub_ray, &ray, &setting.trace(&ray), parts);
                 continue;
             }
             if let Some(surface) = surface {
-                let ends = contacts.iter().zip(&ways.lengths[sub_rays.clone()]);
-                // All of them are there.
+                let ends = contacts.iter().zip(&paths.lengths[sub_rays.clone()]);
+                // All of these contacts exist.
                 let ends = ends.map(|(contact, length)| {
                     let end = |contact: &Contact| (length + contact.distance, contact.cos_incidence());
                     contact.as_ref().map_or((f64::INFINITY, 0.0), end)
                 });
-                self.add_light(group, sub_rays.clone(), surface, ends, parts);
+                self.add_light(context, sub_rays.clone(), surface, ends, parts);
             }
-            self.add_on_mirrors(group, sub_rays, parts);
+            self.add_on_mirrors(context, sub_rays, parts);
         }
     }
 
-    /// Adds sub-rays of a run that end on one surface, each at a range and under an incidence of a cosine.
+    /// Adds sub-rays of a run that end on one surface, each with its range and the cosine of its incidence.
     fn add_light(
         &self,
-        group: &Group<'_>,
+        context: &RunContext<'_>,
         which: Range<usize>,
         surface: usize,
         ends: impl Iterator<Item = (f64, f64)>,
         parts: &mut Parts,
     ) {
-        let Group { setting, ways, run } = *group;
+        let RunContext { setting, paths, run } = *context;
         let reflectivity = setting.paint(surface).reflectivity;
         let target = Target::new(&self.light, reflectivity, self.mirrors[run.silvered] * run.gain);
-        let facets = ways.facets(run);
+        let facets = paths.facets(run);
         let part = parts.of(surface, facets);
         let known = part.pulses.len();
         let mut chief = None;
@@ -164,7 +165,7 @@ impl Sensor {
                     (Pulse { range, power }, sub_ray.weight * run.gain, cos_incidence)
                 }),
         );
-        let cosines = |number| ways.meetings(run, number).iter().map(|m| m.cos_incidence);
+        let cosines = |number| paths.meetings(run, number).iter().map(|m| m.cos_incidence);
         if !facets.is_empty() {
             part.add_cosines(known, which.map(cosines));
         }
@@ -173,29 +174,29 @@ impl Sensor {
         }
     }
 
-    /// Adds what the mirrors on the ways of sub-rays of a run scatter themselves.
-    fn add_on_mirrors(&self, group: &Group<'_>, which: Range<usize>, parts: &mut Parts) {
-        let Group { setting, ways, run } = *group;
+    /// Adds the light that the mirrors on the paths of a run's sub-rays scatter themselves.
+    fn add_on_mirrors(&self, context: &RunContext<'_>, which: Range<usize>, parts: &mut Parts) {
+        let RunContext { setting, paths, run } = *context;
         if setting.diffuse_reflectivity() <= 0.0 {
             return;
         }
-        let facets = ways.facets(run);
+        let facets = paths.facets(run);
         for number in which {
-            let (sub_ray, meetings) = (&self.sub_rays[number], ways.meetings(run, number));
+            let (sub_ray, meetings) = (&self.sub_rays[number], paths.meetings(run, number));
             for arrival in self.on_mirrors(setting, sub_ray, meetings.iter().copied()) {
                 let on = &arrival.on;
                 let cosines = meetings[..arrival.bounces].iter().map(|m| m.cos_incidence);
                 let (power, share) = (power::received(&self.light, on), on.share * arrival.gain);
-                let way = (arrival.surface, &facets[..arrival.bounces]);
+                let path = (arrival.surface, &facets[..arrival.bounces]);
                 let place = (on.range, on.cos_incidence);
-                parts.add(way, power, share, place, cosines, is_chief(sub_ray));
+                parts.add(path, power, share, place, cosines, is_chief(sub_ray));
             }
         }
     }
 }
 
-/// How many legs in a row, from the first on, meet the same surface, or nothing.
-fn alike(in_room: &[Option<Contact>]) -> usize {
+/// Number of consecutive legs, from the first on, that hit the same surface, or nothing.
+fn same_surface(in_room: &[Option<Contact>]) -> usize {
     let surface = |contact: &Option<Contact>| contact.as_ref().map(|contact| contact.surface);
     let met = in_room.first().and_then(surface);
     in_room

@@ -1,10 +1,10 @@
-//! The light of a beam by the surfaces that it reaches and the ways it goes there.
+//! The light of a beam, by the surfaces that it reaches and the paths that it takes there.
 
 use crate::light::optics::{Beyond, MAX_BOUNCES};
 use crate::receive::detect::Pulse;
 use std::borrow::Cow;
 
-/// The sub-rays that went one way to one surface.
+/// The sub-rays that took one path to one surface.
 #[derive(Debug, Default)]
 pub(super) struct Part {
     pub(super) surface: usize,
@@ -13,22 +13,22 @@ pub(super) struct Part {
     pub(super) pulses: Vec<Pulse>,
     pub(super) share: f64,
     pub(super) power: f64,
-    /// Where the chief ray meets it.
+    /// Where the chief ray hits it.
     pub(super) chief: Option<Place>,
-    /// Where its light does on the average.
+    /// Where its light hits it on average.
     pub(super) mean: Place,
 }
 
-/// Where light meets a surface.
+/// Where light hits a surface.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Place {
     pub(super) range: f64,
     pub(super) cos_incidence: f64,
-    /// Cosine of the incidence on each of the facets before.
+    /// Cosine of the incidence on each of the facets on the path.
     pub(super) facets: [f64; MAX_BOUNCES],
 }
 
-/// The parts of one beam after another; what one needed in memory the next one uses.
+/// The parts of one beam after another; the memory of one beam is used for the next.
 #[derive(Debug, Default)]
 pub struct Parts {
     live: Vec<Part>,
@@ -37,7 +37,7 @@ pub struct Parts {
 }
 
 impl Place {
-    /// A place with the cosines of the incidence on the facets before it.
+    /// A place with the cosines of the incidence on the facets on the path.
     pub(super) fn new(range: f64, cos_incidence: f64, cosines: impl Iterator<Item = f64>) -> Self {
         let mut place = Self {
             range,
@@ -60,17 +60,17 @@ impl Place {
 }
 
 impl Part {
-    /// The facets before the surface, in order.
+    /// The facets on the path to the surface, in order.
     pub(super) fn facets(&self) -> &[usize] {
         &self.facets[..self.count]
     }
 
-    /// Where the chief ray meets it, or where its light does on the average if that goes elsewhere.
+    /// Where the chief ray hits it, or where its light does on average if the chief ray goes elsewhere.
     pub(super) fn place(&self) -> &Place {
         self.chief.as_ref().unwrap_or(&self.mean)
     }
 
-    fn went(&self, surface: usize, facets: &[usize]) -> bool {
+    fn is_for(&self, surface: usize, facets: &[usize]) -> bool {
         self.surface == surface && self.facets().iter().eq(facets)
     }
 
@@ -87,7 +87,7 @@ impl Part {
         (self.share, self.power, self.mean) = (all, power, mean);
     }
 
-    /// Adds the incidences on the facets before to what was added after the first so many.
+    /// Adds the incidences on the facets on the path for all pulses after the first `known`.
     pub(super) fn add_cosines(
         &mut self,
         known: usize,
@@ -100,7 +100,7 @@ impl Part {
         }
     }
 
-    /// Begins anew with nothing in it.
+    /// Starts over, without light.
     fn begin(&mut self, surface: usize, facets: &[usize]) {
         self.surface = surface;
         self.facets[..facets.len()].copy_from_slice(facets);
@@ -112,7 +112,7 @@ impl Part {
 }
 
 impl Parts {
-    /// Begins with a beam.
+    /// Starts a beam.
     pub(super) fn begin(&mut self) {
         self.spare.append(&mut self.live);
     }
@@ -122,14 +122,14 @@ impl Parts {
         &self.live
     }
 
-    /// The part of a surface and the facets on the way, if any light went there.
+    /// The part of a surface and the facets on the path to it, if any light took that path.
     pub(super) fn find(&mut self, surface: usize, facets: &[usize]) -> Option<&mut Part> {
-        self.live.iter_mut().find(|p| p.went(surface, facets))
+        self.live.iter_mut().find(|p| p.is_for(surface, facets))
     }
 
-    /// The part of a surface and the facets on the way, from now on if it is new.
+    /// The part of a surface and the facets on the path to it, created if it is new.
     pub(super) fn of(&mut self, surface: usize, facets: &[usize]) -> &mut Part {
-        let known = self.live.iter().position(|p| p.went(surface, facets));
+        let known = self.live.iter().position(|p| p.is_for(surface, facets));
         let index = known.unwrap_or_else(|| {
             let mut part = self.spare.pop().unwrap_or_default();
             part.begin(surface, facets);
@@ -139,8 +139,8 @@ impl Parts {
         &mut self.live[index]
     }
 
-    /// Adds light that reaches a surface at a range under an incidence, after incidences on facets; `share` is that of the
-    /// beam's energy.
+    /// Adds light that reaches a surface at a range and incidence, after incidences on facets; `share` is its share of
+    /// the beam's energy.
     pub(super) fn add(
         &mut self,
         (surface, facets): (usize, &[usize]),
@@ -159,7 +159,7 @@ impl Parts {
         }
     }
 
-    /// Ends a beam: sums become means.
+    /// Finishes a beam: sums become means.
     pub(super) fn end(&mut self) {
         for part in self.live.iter_mut().filter(|p| p.power > 0.0) {
             part.mean.divide(part.power, part.count);

@@ -1,4 +1,4 @@
-//! Which echoes a beam's light makes, and what the detector reads in each of them.
+//! Which echoes a beam's light produces, and what the detector reads from each of them.
 
 use super::part::{Part, Parts};
 use super::returned::{MAX_ECHOES, Return};
@@ -9,10 +9,10 @@ use crate::receive::echo::Echo;
 use crate::receive::phase;
 use crate::scene::{Detector, EchoChoice, ErrorModel, Principle};
 
-/// Echoes this many σ of the receiver's noise below the threshold are never detected: the chance is below 3e-7.
+/// Echoes this many σ of the receiver's noise below the threshold are never detected: the probability is below 3e-7.
 const FAINTEST: f64 = 5.0;
 
-/// An echo as it is read: the part that dominates it, and what the detector makes of it.
+/// An echo as it is read: the part that dominates it, and the shifts of its range.
 struct Seen<'a> {
     part: &'a Part,
     mixed: f64,
@@ -21,7 +21,7 @@ struct Seen<'a> {
 }
 
 impl Sensor {
-    /// What the detector makes of a beam's light.
+    /// The return that the detector makes of a beam's light.
     pub(super) fn receive(&self, setting: &Setting<'_>, parts: &[Part]) -> Option<Return> {
         let physical = matches!(self.errors.model, ErrorModel::Physical | ErrorModel::Both);
         if !self.takes_one_edge() {
@@ -31,7 +31,7 @@ impl Sensor {
             };
             let mut found = seen.iter().filter_map(|seen| self.returned(setting, seen));
             let mut first = found.next()?;
-            // Echoes that are surely detected and alone reported never need a substitute.
+            // Echoes that are certainly detected and reported alone never need a substitute.
             if self.detection.echo == EchoChoice::All || self.detection.noise_over_threshold > 0.0 {
                 first.others = found.take(MAX_ECHOES - 1).collect();
             }
@@ -39,7 +39,7 @@ impl Sensor {
         }
         let (part, mixed, detection) = match parts {
             [] => return None,
-            // One surface reads its own range, wherever on its edge that is.
+            // A single surface reads its own range, whatever point of its edge is detected.
             [only] if !physical => {
                 if !detect::is_seen(&only.pulses, self.receiver.sd, self.receiver.threshold) {
                     return None;
@@ -59,7 +59,7 @@ impl Sensor {
         )
     }
 
-    /// An echo with everything that it says of its surface; `None` beyond the longest range.
+    /// An echo with everything that is known about its surface; `None` beyond the longest range.
     fn returned(&self, setting: &Setting<'_>, seen: &Seen<'_>) -> Option<Return> {
         let part = seen.part;
         let place = part.place();
@@ -83,10 +83,10 @@ impl Sensor {
         (found.range() <= self.limits.range_max_m).then_some(found)
     }
 
-    /// The part that dominates the first echo, the shift that the others cause, and the detector's own.
+    /// The part that dominates the first echo, the shift that the others cause, and the shift by the detector itself.
     ///
-    /// Where the detector is not to show itself, both edges have their walk undone, so that a single surface reads its
-    /// own range and only the mixture shifts it.
+    /// If the error model excludes the detector, both edges are corrected for their walk, so that a single surface
+    /// reads its own range and only the mixture shifts it.
     fn detect<'a>(&self, parts: &'a [Part], physical: bool) -> Option<(&'a Part, f64, f64)> {
         let all = Parts::pulses(parts);
         let edge = detect::leading_edge(&all, self.receiver.sd, self.receiver.threshold)?;
@@ -107,7 +107,7 @@ impl Sensor {
         };
         let alone = match parts {
             [_] => read(&edge),
-            // A surface too dim to be seen without the others stands for its own range.
+            // A surface too dim to be seen without the others is represented by its own range.
             _ => detect::leading_edge(&part.pulses, self.receiver.sd, self.receiver.threshold)
                 .map_or(geometric, |edge| read(&edge)),
         };
@@ -115,7 +115,7 @@ impl Sensor {
         Some((part, read(&edge) - alone, detection))
     }
 
-    /// Whether the first leading edge is all that counts: it is found faster than all echoes are.
+    /// Whether only the first leading edge counts, which is found faster than all echoes are.
     fn takes_one_edge(&self) -> bool {
         let d = &self.detection;
         d.principle == Principle::Pulsed
@@ -124,13 +124,13 @@ impl Sensor {
             && d.noise_over_threshold == 0.0
     }
 
-    /// Least height at which an echo has a chance of being detected, in watts.
+    /// Smallest height at which an echo may be detected, in watts.
     fn faintest(&self) -> f64 {
         let share = 1.0 - FAINTEST * self.detection.noise_over_threshold;
         (self.receiver.threshold * share).max(f64::MIN_POSITIVE)
     }
 
-    /// Chance that an echo of a height is detected: Φ((A − V)/σ).
+    /// Probability that an echo of a given height is detected: Φ((A − V)/σ).
     fn probability(&self, height: f64) -> f64 {
         let noise = self.detection.noise_over_threshold * self.receiver.threshold;
         if noise > 0.0 {
@@ -164,7 +164,7 @@ impl Sensor {
                 .max_by(|a, b| a.power.total_cmp(&b.power))
                 .or_else(|| nearest(parts, echo.compensated))?;
             let geometric = part.place().range;
-            // A surface too dim to be seen without the others stands for its own range.
+            // A surface too dim to be seen without the others is represented by its own range.
             let alone = self.receiver.echoes(&part.pulses, self.faintest());
             let alone = alone.iter().max_by(|a, b| a.peak.total_cmp(&b.peak));
             let alone = alone.map_or(geometric, &read);
@@ -178,7 +178,7 @@ impl Sensor {
         echoes.iter().filter_map(seen).collect()
     }
 
-    /// The one range of modulated light.
+    /// The single range of modulated light.
     fn receive_phase<'a>(&self, parts: &'a [Part], physical: bool) -> Vec<Seen<'a>> {
         let ambiguity = phase::ambiguity(self.detection.modulation_hz);
         let all = Parts::pulses(parts);
@@ -206,7 +206,7 @@ impl Sensor {
     }
 }
 
-/// The part whose light is nearest to a range.
+/// The part whose light is closest to a range.
 fn nearest(parts: &[Part], range: f64) -> Option<&Part> {
     let away = |p: &&Part| (p.mean.range - range).abs();
     parts

@@ -1,38 +1,38 @@
-//! What the scanner reports in one scan: everything by chance, then rounding and codes.
+//! What the scanner reports in one scan: random effects, then rounding and codes.
 
 use super::returned::{MAX_ECHOES, Return};
 use super::sensor::Sensor;
 use crate::scene::ErrorModel;
 
-/// Everything by chance in one reading, each contribution by itself.
+/// The random effects in one reading, each contribution separately.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Chance {
-    /// Constant of the pose, in metres.
+pub struct RandomEffects {
+    /// Constant of the pose, in meters.
     pub drift: f64,
-    /// Constant of the beam in the pose, in metres.
+    /// Constant of the beam in the pose, in meters.
     pub element: f64,
-    /// What the scanner is off while it gets warm, in metres.
+    /// Warm-up error of the scanner, in meters.
     pub warm_up: f64,
-    /// Noise shared with the readings before, in metres.
+    /// Noise correlated with that of earlier readings, in meters.
     pub correlated: f64,
-    /// Step by interference, in metres.
+    /// Step due to interference, in meters.
     pub interference: f64,
-    /// White noise, a standard normal deviate: times [`Return::noise_sd`].
+    /// White noise: a standard normal deviate, to be multiplied by [`Return::noise_sd`].
     pub noise: f64,
-    /// Whether the reading is lost, a uniform deviate: below `errors.dropout` it is.
+    /// Whether the reading is lost: a uniform deviate; lost if below `errors.dropout`.
     pub dropout: f64,
-    /// Whether each echo is detected, uniform deviates: below [`Return::probability`] it is.
+    /// Whether each echo is detected: uniform deviates; detected if below [`Return::probability`].
     pub detection: [f64; MAX_ECHOES],
 }
 
 /// [`f64::round`] without a call into the system's library.
 fn rounded(x: f64) -> f64 {
-    /// Every number from here on is whole.
+    /// From here on every number is an integer.
     const WHOLE: f64 = 4_503_599_627_370_496.0;
     if x.is_nan() || x.abs() >= WHOLE {
         return x;
     }
-    // The fraction is cut off, and what was cut off is exact.
+    // The fraction is truncated, and the truncated part is exact.
     #[allow(clippy::cast_possible_truncation)]
     let whole = x as i64 as f64;
     let rest = x - whole;
@@ -46,37 +46,38 @@ fn rounded(x: f64) -> f64 {
 }
 
 impl Sensor {
-    /// A reading of one scan, in metres: the beam's range with everything by chance, rounded, or a code.
+    /// A reading of one scan, in meters: the beam's range with its random effects, rounded, or a code.
     ///
-    /// What is no range stays none: noise never touches a code.
-    pub fn read(&self, found: Option<&Return>, chance: &Chance) -> f64 {
+    /// Noise is never applied to a code.
+    pub fn read(&self, found: Option<&Return>, effects: &RandomEffects) -> f64 {
         use catoptric_model::range::NO_RETURN;
-        let detected = self.detected(found, chance).next();
+        let detected = self.detected(found, effects).next();
         detected.map_or(NO_RETURN, |found| {
-            self.read_echo(found.range(), found.noise_sd, chance)
+            self.read_echo(found.range(), found.noise_sd, effects)
         })
     }
 
-    /// The same of an echo that is detected, by its [`Return::range`] and the standard deviation of its noise, in metres.
+    /// The reading of an echo that is detected, by its [`Return::range`] and the standard deviation of its noise, in
+    /// meters.
     #[inline]
-    pub fn read_echo(&self, range: f64, noise_sd: f64, chance: &Chance) -> f64 {
+    pub fn read_echo(&self, range: f64, noise_sd: f64, effects: &RandomEffects) -> f64 {
         use catoptric_model::range::INVALID;
-        if self.errors.model != ErrorModel::None && chance.dropout < self.errors.dropout {
+        if self.errors.model != ErrorModel::None && effects.dropout < self.errors.dropout {
             return INVALID;
         }
-        self.report(range, noise_sd, chance)
+        self.report(range, noise_sd, effects)
     }
 
-    /// All echoes of a reading that are reported, in metres, nearest first; a lost reading has none.
+    /// All echoes of a reading that are reported, in meters, nearest first; none if the reading is lost.
     ///
-    /// What is by chance in a reading is common to its echoes.
-    pub fn read_all(&self, found: Option<&Return>, chance: &Chance) -> Vec<f64> {
-        if self.errors.model != ErrorModel::None && chance.dropout < self.errors.dropout {
+    /// The random effects of a reading are common to its echoes.
+    pub fn read_all(&self, found: Option<&Return>, effects: &RandomEffects) -> Vec<f64> {
+        if self.errors.model != ErrorModel::None && effects.dropout < self.errors.dropout {
             return Vec::new();
         }
-        self.detected(found, chance)
+        self.detected(found, effects)
             .take(self.limits.echoes as usize)
-            .map(|echo| self.report(echo.range(), echo.noise_sd, chance))
+            .map(|echo| self.report(echo.range(), echo.noise_sd, effects))
             .collect()
     }
 
@@ -84,18 +85,18 @@ impl Sensor {
     fn detected<'a>(
         &self,
         found: Option<&'a Return>,
-        chance: &'a Chance,
+        effects: &'a RandomEffects,
     ) -> impl Iterator<Item = &'a Return> + use<'a> {
         let echoes = found.into_iter().flat_map(Return::echoes);
         echoes
-            .zip(chance.detection)
-            .filter(|(echo, chance)| *chance < echo.probability)
+            .zip(effects.detection)
+            .filter(|(echo, draw)| *draw < echo.probability)
             .map(|(echo, _)| echo)
     }
 
-    /// An echo's range as it is reported, in metres, or the code of one that cannot be.
+    /// The range of an echo as reported, in meters, or the code of one that cannot be reported.
     #[inline]
-    fn report(&self, range: f64, noise_sd: f64, chance: &Chance) -> f64 {
+    fn report(&self, range: f64, noise_sd: f64, effects: &RandomEffects) -> f64 {
         use catoptric_model::range::{NO_RETURN, TOO_CLOSE};
         if self.errors.model == ErrorModel::None {
             return if range < self.limits.range_min_m {
@@ -104,8 +105,8 @@ impl Sensor {
                 range
             };
         }
-        let white = range + chance.drift + noise_sd * chance.noise;
-        let range = white + (chance.warm_up + chance.correlated + chance.interference + chance.element);
+        let white = range + effects.drift + noise_sd * effects.noise;
+        let range = white + (effects.warm_up + effects.correlated + effects.interference + effects.element);
         let step = self.errors.quantization_mm * 1e-3;
         let range = if step > 0.0 {
             rounded(range / step) * step

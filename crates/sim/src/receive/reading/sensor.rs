@@ -1,4 +1,4 @@
-//! The scanner with everything resolved that does not depend on where it looks.
+//! The scanner with everything resolved that does not depend on its surroundings.
 
 use crate::build::color;
 use crate::error::SimError;
@@ -11,13 +11,13 @@ use crate::scene::{BeamShape, Detection, ErrorModel, Errors, Light, Limits, Scen
 use catoptric_cast::Ray;
 use catoptric_model::{RangeBias, ScanGeometry};
 
-/// The scanner with everything resolved that does not depend on where it looks.
+/// The scanner with everything resolved that does not depend on its surroundings.
 pub struct Sensor {
     pub(super) scan: ScanGeometry,
     pub(super) shape: BeamShape,
     pub(super) sub_rays: Vec<SubRay>,
     pub(super) light: Light,
-    /// What is left of light after so many reflections by silver.
+    /// Share of the light that is left after a number of reflections by silver.
     pub(super) mirrors: [f64; MAX_BOUNCES + 1],
     pub(super) limits: Limits,
     pub(super) detection: Detection,
@@ -31,7 +31,7 @@ impl Sensor {
     /// Resolves a scene's scanner.
     ///
     /// # Errors
-    /// [`SimError::Scanner`]; [`SimError::UnknownColor`] never happens with the built-in white that the walk is referred to.
+    /// [`SimError::UnknownColor`], which cannot happen: the walk is relative to the built-in white.
     pub fn new(scene: &Scene) -> Result<Self, SimError> {
         let pulse_sd = detect::pulse_sd(scene.detection.pulse_fwhm_ns);
         let face_on = |reflectivity: f64, range: f64| {
@@ -97,7 +97,7 @@ impl Sensor {
         &self.bias
     }
 
-    /// Sub-rays of a beam.
+    /// Number of sub-rays of a beam.
     pub fn sub_rays(&self) -> usize {
         self.sub_rays.len()
     }
@@ -107,12 +107,12 @@ impl Sensor {
         &self.shape
     }
 
-    /// The sub-rays of a beam themselves.
-    pub fn bundle(&self) -> &[SubRay] {
+    /// The sub-rays of a beam.
+    pub fn sub_ray_list(&self) -> &[SubRay] {
         &self.sub_rays
     }
 
-    /// The ways of a beam's sub-rays, in the order in which they are cast.
+    /// The paths of a beam's sub-rays, in the order in which they are cast.
     pub fn paths<'a>(
         &'a self,
         setting: &'a Setting<'_>,
@@ -140,7 +140,7 @@ impl Sensor {
         footprint::ray(&self.shape, self.scan.azimuth(beam), &chief)
     }
 
-    /// The way of a beam's chief ray.
+    /// The path of a beam's chief ray.
     pub fn chief_path(&self, setting: &Setting<'_>, beam: usize) -> Path {
         setting.trace(&self.chief_ray(beam))
     }

@@ -1,6 +1,6 @@
-//! The sub-rays of a beam one by one: the way of each, where it ends, and the light that it brings home.
+//! The sub-rays of a beam one by one: the path of each, where it ends, and the light that it returns.
 //!
-//! The beam's echo is made of the same light: whatever is listed here with a power is one of its pulses.
+//! The beam's echo consists of the same light: every entry with a power is one of its pulses.
 
 use super::sensor::Sensor;
 use crate::light::footprint::{self, SubRay};
@@ -8,25 +8,25 @@ use crate::light::optics::{End, Meeting, Path, Setting};
 use crate::light::power::{self, Illumination};
 use nalgebra::Point3;
 
-/// Which part of a sub-ray's light went a way.
+/// Which part of a sub-ray's light took a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Light {
     /// What mirrors reflect.
     Beam,
-    /// What the front of a mirror's glass turned back.
+    /// What the front of a mirror's glass reflects.
     Ghost,
     /// What a mirror itself scatters.
     Mirror,
 }
 
-/// How a way ends.
+/// How a path ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Stop {
     /// On a surface.
     Hit {
         /// Index of the surface in [`Setting::names`].
         surface: usize,
-        /// Where, in the sensor frame, in metres.
+        /// Where, in the sensor frame, in meters.
         point: Point3<f64>,
         /// Cosine of the incidence, from 0 to 1.
         cos_incidence: f64,
@@ -35,22 +35,22 @@ pub enum Stop {
     },
     /// In the open.
     Escaped,
-    /// Between mirrors, after the last bounce allowed, or in the rim of a mirror's glass.
+    /// Between mirrors after the last bounce that is allowed, or in the rim of a mirror's glass.
     Trapped,
 }
 
-/// One way of a sub-ray's light.
+/// One path of a sub-ray's light.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SubRayEnd {
     /// Number of the sub-ray in the beam.
     pub number: usize,
-    /// Its place in the ellipse and its share of the beam's energy; the shares of [`Light::Beam`] sum to one.
+    /// Its position in the ellipse and its share of the beam's energy; the shares of [`Light::Beam`] sum to one.
     pub sub_ray: SubRay,
-    /// Which part of its light.
+    /// Which part of the light took the path.
     pub light: Light,
-    /// Mirrors on the way, by their index.
+    /// Indices of the mirrors on the path.
     pub facets: Vec<usize>,
-    /// Optical path to the end, in metres; to the last mirror where there is no end.
+    /// Optical path length to the end, in meters; to the last mirror if there is no end.
     pub path: f64,
     /// How it ends.
     pub stop: Stop,
@@ -59,17 +59,17 @@ pub struct SubRayEnd {
 /// Light that reaches a surface.
 pub(super) struct Arrival {
     pub(super) surface: usize,
-    /// Mirrors met before, of those on the way.
+    /// Number of mirrors on the path before it.
     pub(super) bounces: usize,
     pub(super) on: Illumination,
-    /// What is left of the sub-ray's energy.
+    /// Share of the sub-ray's energy that is left.
     pub(super) gain: f64,
 }
 
 impl Sensor {
-    /// Every way of every sub-ray of a beam in a setting, in the order in which the sub-rays are cast.
+    /// Every path of every sub-ray of a beam in a setting, in the order in which the sub-rays are cast.
     ///
-    /// Each sub-ray has one way of [`Light::Beam`]; those of its ghosts follow, then what the mirrors on its way scatter.
+    /// Each sub-ray has one path of [`Light::Beam`]; its ghosts follow, then what the mirrors on its path scatter.
     pub fn sub_ray_ends(&self, setting: &Setting<'_>, beam: usize) -> Vec<SubRayEnd> {
         let mut ends = Vec::with_capacity(self.sub_rays.len());
         let azimuth = self.scan.azimuth(beam);
@@ -118,7 +118,7 @@ impl Sensor {
         }
     }
 
-    /// The light that a sub-ray leaves where its way ends; `None` if it ends nowhere.
+    /// The light that a sub-ray leaves where its path ends; `None` if it does not end on a surface.
     pub(super) fn at_end(&self, setting: &Setting<'_>, sub_ray: &SubRay, path: &Path) -> Option<Arrival> {
         let End::Hit(hit) = path.end else { return None };
         Some(Arrival {
@@ -135,7 +135,7 @@ impl Sensor {
         })
     }
 
-    /// What the mirrors on a sub-ray's way scatter themselves.
+    /// The light that the mirrors on a sub-ray's path scatter themselves.
     pub(super) fn on_mirrors(
         &self,
         setting: &Setting<'_>,

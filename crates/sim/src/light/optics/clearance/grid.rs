@@ -1,13 +1,14 @@
-//! Which cells of a grid hold a part of a mesh: a room that is one mesh is all around the sensor, and yet not near.
+//! A grid of the cells that hold part of a mesh: a room that is a single mesh surrounds the sensor without being near
+//! it.
 
 use nalgebra::{Point3, Vector3};
 use std::ops::RangeInclusive;
 
-/// Cells along the longest side of a mesh at most.
-const MOST: f64 = 128.0;
+/// Maximum number of cells along the longest side of a mesh.
+const MAX_CELLS: f64 = 128.0;
 
-/// Least side of a cell, in metres.
-const LEAST: f64 = 0.05;
+/// Minimum side of a cell, in meters.
+const MIN_SIDE: f64 = 0.05;
 
 /// A grid over a mesh.
 #[derive(Debug, Clone)]
@@ -20,14 +21,14 @@ pub(in crate::light::optics) struct Grid {
 }
 
 impl Grid {
-    /// The grid of triangles that lie between two corners.
+    /// The grid of triangles that are between two corners.
     pub(super) fn of(
         triangles: impl Iterator<Item = [Point3<f64>; 3]>,
         (low, high): (&Point3<f64>, &Point3<f64>),
     ) -> Self {
         let size = high - low;
-        let side = (size.max() / MOST).max(LEAST);
-        // At most MOST and one.
+        let side = (size.max() / MAX_CELLS).max(MIN_SIDE);
+        // At most MAX_CELLS + 1.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let counts = [0, 1, 2].map(|k| (size[k] / side).floor() as usize + 1);
         let mut grid = Self {
@@ -46,7 +47,7 @@ impl Grid {
     fn add(&mut self, [a, b, c]: &[Point3<f64>; 3]) {
         let [xs, ys, zs] = self.cells(&a.inf(b).inf(c), &a.sup(b).sup(c));
         let normal = (b - a).cross(&(c - a));
-        // A plane is in a cell only if it is nearer to its middle than the corners are.
+        // A plane is in a cell only if it is closer to the cell's center than the corners are.
         let reach = normal.norm() * self.side * 0.867;
         let middle = self.low + Vector3::repeat(0.5 * self.side) - a;
         for z in zs {
@@ -62,7 +63,7 @@ impl Grid {
         }
     }
 
-    /// Whether no triangle is within a distance of a point, in metres; if in doubt one is.
+    /// Whether no triangle is within a distance of a point, in meters; false in case of doubt.
     pub(super) fn is_beyond(&self, point: &Point3<f64>, distance: f64) -> bool {
         let out = (self.low - point)
             .sup(&(point - self.high))
@@ -82,7 +83,7 @@ impl Grid {
         x + self.counts[0] * (y + self.counts[1] * z)
     }
 
-    /// The cells between two corners, those at the border for what is beyond it.
+    /// The cells between two corners; positions beyond the border count as border cells.
     fn cells(&self, low: &Point3<f64>, high: &Point3<f64>) -> [RangeInclusive<usize>; 3] {
         [0, 1, 2].map(|k| {
             let last = (self.counts[k] - 1) as f64;

@@ -1,7 +1,7 @@
-//! How near to a point what is in the room can be: a lower bound, quickly.
+//! A fast lower bound on the distance from a point to what is in the room.
 //!
-//! Light on its way from mirror to mirror of the structure stays within a ball around the sensor. Nothing of the room
-//! that is farther away than that can be in its way.
+//! Light traveling from mirror to mirror of the structure stays within a ball around the sensor. No part of the room
+//! that is farther away can be in its path.
 
 mod grid;
 
@@ -9,25 +9,25 @@ use catoptric_cast::{Polygon, Shape};
 use grid::Grid;
 use nalgebra::{Point3, Vector3};
 
-/// What a shape of the room keeps clear of.
+/// Bounds on where a shape of the room is.
 #[derive(Debug, Clone)]
 pub(super) enum Extent {
-    /// A plane outline: its plane, and for every edge the half plane it bounds, as unit normal and offset.
+    /// A plane outline: its plane, and for every edge the half plane that it bounds, as unit normal and offset.
     Outline(Vec<(Vector3<f64>, f64)>),
-    /// A box around anything else.
+    /// A box around any other shape.
     Box(Point3<f64>, Point3<f64>),
     /// A mesh that the sensor flies past or within.
     Mesh(Grid),
 }
 
-/// How much a box is larger than what it was made from, as a part of its diagonal: a cylinder is drawn with flat faces.
+/// Margin of a box, as a fraction of its diagonal: the triangles of a cylinder are flat.
 const MARGIN: f64 = 0.01;
 
-/// Slack of the bound, in metres, far above rounding.
+/// Slack of the bound, in meters, far above rounding.
 const SLACK: f64 = 1e-6;
 
 impl Extent {
-    /// The extent of a shape; of a mesh more closely for a sensor that flies.
+    /// The extent of a shape; that of a mesh is finer for a sensor that flies.
     pub(super) fn of(shape: &Shape, flies: bool) -> Self {
         match shape {
             Shape::Mesh(mesh) if flies => {
@@ -40,13 +40,13 @@ impl Extent {
         }
     }
 
-    /// Whether all of it is farther than a distance from a point, in metres; if in doubt it is not.
+    /// Whether all of it is farther than a distance from a point, in meters; false in case of doubt.
     pub(super) fn is_beyond(&self, point: &Point3<f64>, distance: f64) -> bool {
         let distance = distance + SLACK;
         match self {
             Self::Outline(sides) => sides.iter().enumerate().any(|(i, (normal, offset))| {
                 let beyond = offset - normal.dot(&point.coords);
-                // Of the plane either side, of an edge what is outside.
+                // Either side of the plane, but only the outside of an edge.
                 beyond > distance || (i == 0 && -beyond > distance)
             }),
             Self::Box(low, high) => {
@@ -99,7 +99,7 @@ mod tests {
         );
         let origin = Point3::origin();
         assert!(polygon.is_beyond(&origin, 1.99) && !polygon.is_beyond(&origin, 2.0));
-        // Beside it, in its plane.
+        // Next to it, in its plane.
         let beside = Point3::new(4.0, 0.0, 2.0);
         assert!(polygon.is_beyond(&beside, 2.99) && !polygon.is_beyond(&beside, 3.0));
         let size = Vector3::new(1.0, 1.0, 1.0);

@@ -1,4 +1,4 @@
-//! What a person would say about an experiment and a score.
+//! Plain-language summaries of an experiment and of a score, as paragraphs of the report.
 
 use super::page::{escape, number};
 use catoptric_assess::score::{Honesty, Score, words as score_words};
@@ -7,18 +7,18 @@ use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
 use std::collections::BTreeMap;
 
-/// What was recorded, and what was really there.
+/// Describes the recording and, where it is known, the truth.
 pub(super) fn experiment(dataset: &Dataset, truth: Option<&Truth>) -> String {
     let session = &dataset.session;
     let count = |kind| dataset.of_kind(kind).count();
     let scans: Vec<usize> = dataset.of_kind(PoseKind::Facet).map(|p| p.label.scans).collect();
     let each = match (scans.iter().min(), scans.iter().max()) {
-        (Some(least), Some(most)) if least == most => format!(" with {} each", plural(*least, "scan")),
-        (Some(least), Some(most)) => format!(" with {least} to {most} scans each"),
+        (Some(fewest), Some(most)) if fewest == most => format!(" with {} each", plural(*fewest, "scan")),
+        (Some(fewest), Some(most)) => format!(" with {fewest} to {most} scans each"),
         _ => String::new(),
     };
     let mut text = format!(
-        "A {} with {} beams looks through {}. A board was set up {} in the fans of the mirrors{each}",
+        "A {} with {} beams is surrounded by {}. A board was placed {} in the fans of the mirrors{each}",
         session.scanner.preset.to_uppercase(),
         session.scanner.scan.beams(),
         plural(session.facets.len(), "mirror"),
@@ -27,18 +27,18 @@ pub(super) fn experiment(dataset: &Dataset, truth: Option<&Truth>) -> String {
     let direct = count(PoseKind::Direct);
     if direct > 0 {
         text += &format!(
-            ", and {} before beams that no mirror deflects",
+            ", and {} in front of beams that no mirror deflects",
             plural(direct, "time")
         );
     }
     text += &format!(
-        ". Range noise is believed to be {} mm, markers to be within {} mm.",
+        ". Range noise is believed to be {} mm, and markers to be known to {} mm.",
         session.believed.range_noise_sd_mm, session.believed.marker_sd_mm
     );
     if let Some(truth) = truth {
         let class = |class| truth.beams.iter().filter(|b| b.status == class).count();
         text += &format!(
-            " This is a simulation, so the truth is known: {} deflected by one mirror, {} are split at an edge, {} pass by, {} end on the structure",
+            " This is a simulation, so the truth is known: {} deflected by one mirror, {} are split at an edge, {} pass by the structure, {} end on it",
             elements_are(class(BeamClass::Deflected)),
             class(BeamClass::Split),
             class(BeamClass::Direct),
@@ -46,17 +46,17 @@ pub(super) fn experiment(dataset: &Dataset, truth: Option<&Truth>) -> String {
         );
         let bounced = class(BeamClass::MultiBounce);
         text += &if bounced > 0 {
-            format!(", {bounced} meet more than one mirror.")
+            format!(", {bounced} hit more than one mirror.")
         } else {
             ".".to_owned()
         };
     } else {
-        text += " The truth is not known.";
+        text += " The truth is unknown.";
     }
     text
 }
 
-/// What came back, what dominates, what is at fault.
+/// Summarizes accuracy, the dominant error, the honesty of the covariance, abstentions and warnings, as HTML.
 pub(super) fn findings(calibration: &Calibration, score: &Score) -> String {
     let mut html = String::new();
     for sentence in [
@@ -88,18 +88,18 @@ fn accuracy(score: &Score) -> String {
     let beams = score.beams;
     let Some(deflected) = beams.deflected else {
         return format!(
-            "{} solved. Without a truth the points they make are held against what was surveyed: they lie {} mm (rms) off the boards and {} mm off the walls of the empty room.",
+            "{} solved. Without a truth their points are compared with the survey: they are {} mm (rms) off the boards and {} mm off the walls of the empty room.",
             elements_are(beams.solved),
             number(score.boards_mm.rms, 1),
             number(score.walls_mm.rms, 1)
         );
     };
-    let mut text = format!("{} of {deflected} deflected elements came back", beams.solved);
+    let mut text = format!("{} of {deflected} deflected elements were solved", beams.solved);
     if !score.per_axis_rms_deg.is_finite() {
-        return text + ": there is no accuracy to speak of.";
+        return text + ": there is no accuracy to report.";
     }
     text += &format!(
-        " with θ and φ within {}° per axis (rms); half of the directions are better than {}°, the worst is off by {}°. A point 4 m behind the mirror is displaced by {} mm.",
+        " with θ and φ within {}° per axis (rms); half of the directions are within {}°, the worst is off by {}°. A point 4 m behind the mirror is displaced by {} mm.",
         number(score.per_axis_rms_deg, 3),
         number(score.direction_deg.median, 3),
         number(score.direction_deg.max, 3),
@@ -107,7 +107,7 @@ fn accuracy(score: &Score) -> String {
     );
     if score.per_axis_rms_room_deg.is_finite() {
         text += &format!(
-            " Seen in the room, mounting included, it is {}° per axis.",
+            " In the room frame, mounting included, it is {}° per axis.",
             number(score.per_axis_rms_room_deg, 3)
         );
     }
@@ -124,24 +124,24 @@ fn dominance(score: &Score) -> String {
     let left = number(score.differential_per_axis_rms_deg, 3);
     if share > score_words::DOMINANT_SHARE {
         return format!(
-            "What all elements have in common dominates: a rotation of {rotation}° makes {percent} % of the squared error. That is what an error of the sensor's mounting does; without it {left}° per axis would be left, which is due to boards and ranges."
+            "The common mode dominates: a rotation of {rotation}° common to all elements accounts for {percent} % of the squared error. An error of the sensor's mounting has this effect; without it {left}° per axis would remain, from boards and ranges."
         );
     }
     let within = within_mirrors(score);
     let scatter = number(within.to_degrees(), 3);
     let (found, advice) = if within.to_degrees().powi(2) < 0.5 * score.per_axis_rms_deg.powi(2) {
         (
-            "What the elements of one mirror have in common dominates",
-            "Drift, markers and biases of the boards do that: more boards would help, more scans would not.",
+            "The error common to the elements of each mirror dominates",
+            "Drift, markers and biases of the boards have this effect: more boards would help, more scans would not.",
         )
     } else {
         (
-            "What differs from element to element dominates",
-            "Range noise and uneven mirrors do that: more scans may help.",
+            "The error that differs from element to element dominates",
+            "Range noise and slope errors of the mirrors have this effect: more scans may help.",
         )
     };
     format!(
-        "{found}: within a mirror the elements scatter by {scatter}° per axis about what they share. {advice} The rotation that all elements share, {rotation}°, makes only {percent} % of the squared error: the mounting of the sensor is not the main fault."
+        "{found}: within a mirror the elements scatter by {scatter}° per axis about their mean. {advice} The rotation common to all elements, {rotation}°, accounts for only {percent} % of the squared error: the mounting of the sensor is not the main cause."
     )
 }
 
@@ -170,26 +170,26 @@ fn honesty(score: &Score) -> String {
         let alone = number(score.alone_crlb_per_axis_deg, 3);
         text += &if score.efficiency > 1.2 {
             format!(
-                "With these boards no method can be expected to do better than {bound}° per axis. This run is better by luck: the errors that all elements share happened to be small."
+                "With these boards no method can be expected to do better than {bound}° per axis. This run does better by statistical fluctuation: the errors that all elements share happened to be small."
             )
         } else {
             format!(
-                "With these boards no method can be expected to do better than {bound}° per axis, and none that treats every element by itself better than {alone}°; counted in squares, this one reaches {} % of the first.",
+                "With these boards no method can be expected to do better than {bound}° per axis, and none that estimates every element separately better than {alone}°; in mean squares, this one reaches {} % of the former.",
                 number(score.efficiency * 100.0, 0)
             )
         };
     }
     if score.nees_mean.is_finite() {
-        let judgement = match score.honesty {
+        let judgment = match score.honesty {
             Some(Honesty::OverConfident) => {
                 let times = number(score.nees_mean.sqrt(), 1);
-                format!("smaller than the errors made, which are {times} times as large")
+                format!("smaller than the actual errors, which are {times} times as large")
             }
-            Some(Honesty::UnderConfident) => "larger than the errors made".to_owned(),
-            Some(Honesty::Honest) | None => "consistent with the errors made".to_owned(),
+            Some(Honesty::UnderConfident) => "larger than the actual errors".to_owned(),
+            Some(Honesty::Honest) | None => "consistent with the actual errors".to_owned(),
         };
         text += &format!(
-            " The stated uncertainty is {judgement}: {} % of them lie inside their 95 % ellipses.",
+            " The stated uncertainty is {judgment}: {} % of them are inside their 95 % ellipses.",
             number(score.coverage_95 * 100.0, 0)
         );
     }
@@ -204,8 +204,8 @@ fn abstentions(calibration: &Calibration, score: &Score) -> String {
     let total: usize = reasons.iter().map(|a| a.count).sum();
     let solvable = match (score.beams.deflected, score.beams.abstained) {
         (None, _) => String::new(),
-        (Some(_), 0) => ", none of which leaves by one mirror unsplit".to_owned(),
-        (Some(_), n) => format!(", of which {n} do leave by one mirror unsplit"),
+        (Some(_), 0) => ", none of which is deflected by one mirror unsplit".to_owned(),
+        (Some(_), n) => format!(", of which {n} are deflected by one mirror unsplit"),
     };
     format!(
         "{} left without a direction{solvable}. The most frequent reason, {} times: {} ({}).",
@@ -235,15 +235,15 @@ mod tests {
     use catoptric_fixtures::{Noise, noisy, perfect, sample, turned};
 
     #[test]
-    fn each_kind_of_error_is_named() {
+    fn each_dominant_error_is_named() {
         let s = sample();
-        let said = |calibration: &Calibration| {
+        let text = |calibration: &Calibration| {
             dominance(&score(&s.dataset, calibration, Some(&s.truth)).expect("in memory"))
         };
         assert!(
-            said(&turned(noisy(&s.truth, 1e-4, 1), 5e-3)).starts_with("What all elements have in common")
+            text(&turned(noisy(&s.truth, 1e-4, 1), 5e-3)).starts_with("The common mode dominates")
         );
-        assert!(said(&noisy(&s.truth, 1e-3, 1)).starts_with("What differs from element to element"));
+        assert!(text(&noisy(&s.truth, 1e-3, 1)).starts_with("The error that differs from element to element"));
         let mut by_mirror = noisy(&s.truth, 1e-4, 1);
         let mut noise = Noise::new(9);
         for facet in &s.dataset.session.facets {
@@ -254,7 +254,7 @@ mod tests {
                 .filter(|b| b.facet.as_ref() == Some(&facet.name));
             of.for_each(|b| b.elevation_rad = b.elevation_rad.map(|e| e + lift));
         }
-        assert!(said(&by_mirror).starts_with("What the elements of one mirror have in common"));
+        assert!(text(&by_mirror).starts_with("The error common to the elements of each mirror"));
         assert!(
             accuracy(&score(&s.dataset, &perfect(&s.truth), Some(&s.truth)).expect("in memory"))
                 .contains("within 0.000°")

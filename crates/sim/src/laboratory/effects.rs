@@ -1,31 +1,31 @@
-//! What is by chance in the readings of a stretch, scan by scan.
+//! Random effects in the readings of a stretch, scan by scan.
 //!
-//! Every draw is a function of (seed, purpose, scan, beam) alone. Correlated noise begins anew with each stretch, so
-//! that scan k of a stretch follows exactly from the innovations of its scans 0 to k and from nothing else.
+//! Every draw is a function of (seed, purpose, scan, beam) alone. Correlated noise starts anew with each stretch, so
+//! scan k of a stretch depends on the innovations of its scans 0 to k and on nothing else.
 
 use super::setup::Laboratory;
 use crate::noise::{Columns, Draws, Purpose};
-use crate::receive::reading::{Chance, MAX_ECHOES};
+use crate::receive::reading::{MAX_ECHOES, RandomEffects};
 use crate::scene::{Correlated, ErrorModel, Scene};
 use catoptric_model::ScanGeometry;
 use std::sync::Arc;
 
-/// What is by chance in all readings of a stretch, and how what is new in every scan is drawn.
+/// The random effects that all readings of a stretch share, and the source of those that are drawn in every scan.
 #[derive(Clone)]
-pub(super) struct Luck<'a> {
+pub(super) struct EffectSource<'a> {
     scene: &'a Scene,
     geometry: &'a ScanGeometry,
     seed: u64,
     drift: f64,
-    /// Constant error of every beam; empty without any.
+    /// Constant error of every beam; empty if there is none.
     elements: Arc<[f64]>,
     start_s: f64,
     first_scan: usize,
 }
 
-/// What is by chance in one scan, each kind for all beams; a kind that the scene has not is empty.
+/// Random effects of one scan, each kind for all beams; a kind that the scene does not have is empty.
 #[derive(Default)]
-pub(super) struct ScanLuck {
+pub(super) struct ScanEffects {
     drift: f64,
     warm_up: f64,
     elements: Arc<[f64]>,
@@ -33,44 +33,45 @@ pub(super) struct ScanLuck {
     dropout: Vec<f64>,
     correlated: Vec<f64>,
     interference: Vec<f64>,
-    /// Whether echoes are detected, of all beams, or of those that were asked for.
+    /// Draws that decide whether echoes are detected: for all beams here, or for the requested ones in `asked`.
     detection: Columns,
     asked: Vec<(usize, [f64; MAX_ECHOES])>,
-    /// Draws in the making.
+    /// Scratch space for draws.
     columns: Columns,
 }
 
-/// A beam is drawn by itself where fewer than this part of all is: a jump costs several columns in a row.
+/// Beams are drawn individually if fewer than one in this many is requested: a jump costs as much as several
+/// consecutive columns.
 const FEW: usize = 8;
 
-/// The chances of a stretch, from its first scan on.
-pub struct Chances<'a> {
-    luck: Luck<'a>,
+/// Random effects of a stretch, from its first scan on.
+pub struct StretchEffects<'a> {
+    source: EffectSource<'a>,
     /// Scans of the stretch so far.
     done: usize,
     memory: Memory,
-    scan: ScanLuck,
+    scan: ScanEffects,
 }
 
-/// The AR(1) state of every beam, of unit variance, after so many scans; empty before the first.
+/// The AR(1) state of every beam, of unit variance, after some number of scans; empty before the first.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Memory {
     states: Vec<f64>,
 }
 
 impl Laboratory {
-    /// The chances of a stretch, scan after scan.
-    pub fn chances(&self, number: usize) -> Chances<'_> {
-        Chances {
-            luck: self.luck(number),
+    /// Random effects of a stretch, scan by scan.
+    pub fn effects(&self, number: usize) -> StretchEffects<'_> {
+        StretchEffects {
+            source: self.effect_source(number),
             done: 0,
             memory: Memory::default(),
-            scan: ScanLuck::default(),
+            scan: ScanEffects::default(),
         }
     }
 
-    pub(super) fn luck(&self, number: usize) -> Luck<'_> {
-        Luck {
+    pub(super) fn effect_source(&self, number: usize) -> EffectSource<'_> {
+        EffectSource {
             scene: &self.scene,
             geometry: self.sensor.scan(),
             seed: self.seed,
@@ -81,7 +82,7 @@ impl Laboratory {
         }
     }
 
-    /// Constant error of every beam in a stretch, in metres; empty where there is none.
+    /// Constant error of every beam in a stretch, in meters; empty if there is none.
     fn elements(&self, number: usize) -> Vec<f64> {
         let sd = self.scene.errors.element_sd_mm * 1e-3;
         if sd == 0.0 || self.scene.errors.model == ErrorModel::None {
@@ -96,7 +97,7 @@ impl Laboratory {
             .collect()
     }
 
-    /// What the scanner is off because it is not warm yet, in metres: a·exp(−t/τ), t seconds into the recording.
+    /// Range error of the scanner while it warms up, in meters: a·exp(−t/τ), t seconds into the recording.
     pub fn warm_up(&self, time_s: f64) -> f64 {
         warm_up(&self.scene, time_s)
     }
@@ -111,7 +112,7 @@ fn warm_up(scene: &Scene, time_s: f64) -> f64 {
     }
 }
 
-impl Luck<'_> {
+impl EffectSource<'_> {
     /// The law of the correlated noise, if there is any.
     fn correlated(&self) -> Option<&Correlated> {
         let errors = &self.scene.errors;
@@ -121,12 +122,12 @@ impl Luck<'_> {
             .filter(|_| errors.model != ErrorModel::None)
     }
 
-    /// Row of a scan's draws.
+    /// Noise row of a scan.
     fn row(&self, scan: usize) -> u64 {
         (self.first_scan + scan) as u64
     }
 
-    /// The innovations ε of a scan, for all beams; none without correlated noise.
+    /// The innovations ε of a scan, for all beams; empty without correlated noise.
     pub(super) fn innovations(&self, scan: usize, columns: &mut Columns, out: &mut Vec<f64>) {
         out.clear();
         if self.correlated().is_some() {
@@ -140,8 +141,8 @@ impl Luck<'_> {
         }
     }
 
-    /// The AR(1) step of all beams, which turns the innovations of a scan into its states: x₀ = ε₀,
-    /// xₖ = φ·xₖ₋₁ + √(1 − φ²)·εₖ.
+    /// Takes the AR(1) step of all beams, which turns the innovations of a scan into states: x₀ = ε₀, xₖ = φ·xₖ₋₁ + √(1
+    /// − φ²)·εₖ.
     pub(super) fn remember(&self, scan: usize, memory: &mut Memory, innovations: &mut [f64]) {
         let Some(law) = self.correlated() else { return };
         let period_s = self.geometry.scan_period_s();
@@ -160,8 +161,8 @@ impl Luck<'_> {
 
     /// Draws a scan; `states` are those of its correlated noise.
     ///
-    /// With `asked`, only those beams are told whether their echoes are detected.
-    pub(super) fn draw(&self, scan: usize, states: &[f64], asked: Option<&[usize]>, into: &mut ScanLuck) {
+    /// With `asked`, the detection of echoes is drawn for those beams only, if they are few.
+    pub(super) fn draw(&self, scan: usize, states: &[f64], asked: Option<&[usize]>, into: &mut ScanEffects) {
         let (errors, row) = (&self.scene.errors, self.row(scan));
         if errors.model != ErrorModel::None {
             let time_s = self.start_s + scan as f64 * self.geometry.scan_period_s();
@@ -211,26 +212,26 @@ impl Luck<'_> {
     }
 }
 
-impl ScanLuck {
-    /// What is by chance in a beam's reading.
-    pub(super) fn of(&self, beam: usize) -> Chance {
+impl ScanEffects {
+    /// Random effects of a beam's reading.
+    pub(super) fn of(&self, beam: usize) -> RandomEffects {
         let asked = self.asked.binary_search_by_key(&beam, |(asked, _)| *asked);
         let detection = match asked {
             Ok(place) => self.asked[place].1,
             Err(_) if self.detection.is_empty() => Default::default(),
             Err(_) => std::array::from_fn(|echo| self.detection.uniform(beam, echo)),
         };
-        Chance {
+        RandomEffects {
             detection,
-            ..self.but_detection(beam)
+            ..self.without_detection(beam)
         }
     }
 
-    /// The same without whether its echoes are detected.
+    /// The same without the detection of its echoes.
     #[inline]
-    pub(super) fn but_detection(&self, beam: usize) -> Chance {
+    pub(super) fn without_detection(&self, beam: usize) -> RandomEffects {
         let of = |kind: &[f64]| kind.get(beam).copied().unwrap_or_default();
-        Chance {
+        RandomEffects {
             drift: self.drift,
             element: of(&self.elements),
             warm_up: self.warm_up,
@@ -243,8 +244,8 @@ impl ScanLuck {
     }
 }
 
-impl Chances<'_> {
-    /// Leaves scans out, keeping what later ones remember of them.
+impl StretchEffects<'_> {
+    /// Skips scans, keeping the state that later ones depend on.
     #[must_use]
     pub fn skip_scans(mut self, scans: usize) -> Self {
         for _ in 0..scans {
@@ -253,31 +254,31 @@ impl Chances<'_> {
         self
     }
 
-    /// The states of the next scan's correlated noise.
+    /// States of the next scan's correlated noise.
     fn step(&mut self) -> Vec<f64> {
         let mut states = Vec::new();
-        self.luck
+        self.source
             .innovations(self.done, &mut self.scan.columns, &mut states);
-        self.luck.remember(self.done, &mut self.memory, &mut states);
+        self.source.remember(self.done, &mut self.memory, &mut states);
         self.done += 1;
         states
     }
 
-    /// Draws the next scan; `asked` as for [`Luck::draw`].
-    pub(super) fn next_scan(&mut self, asked: Option<&[usize]>) -> &ScanLuck {
+    /// Draws the next scan; `asked` as for [`EffectSource::draw`].
+    pub(super) fn next_scan(&mut self, asked: Option<&[usize]>) -> &ScanEffects {
         let scan = self.done;
         let states = self.step();
-        self.luck.draw(scan, &states, asked, &mut self.scan);
+        self.source.draw(scan, &states, asked, &mut self.scan);
         &self.scan
     }
 }
 
-impl Iterator for Chances<'_> {
-    /// One for every beam.
-    type Item = Vec<Chance>;
+impl Iterator for StretchEffects<'_> {
+    /// One per beam.
+    type Item = Vec<RandomEffects>;
 
-    fn next(&mut self) -> Option<Vec<Chance>> {
-        let beams = self.luck.geometry.beams();
+    fn next(&mut self) -> Option<Vec<RandomEffects>> {
+        let beams = self.source.geometry.beams();
         let scan = self.next_scan(None);
         Some((0..beams).map(|beam| scan.of(beam)).collect())
     }

@@ -1,24 +1,41 @@
-//! Generalized least squares per element: Gauss–Newton weighted by the covariance Σ of all errors believed in.
+//! `beam-gls`: generalized least squares per element, Gauss–Newton weighted by the covariance Σ of all errors believed in.
 //!
 //! Δx = (HᵀΣ⁻¹H)⁻¹HᵀΣ⁻¹(z − r̂), with drift, markers, biases, d and the mounting in Σ ([`crate::covariance`]). It has the
 //! least variance of all estimates of one element by itself. Unlike the paper, whose sum gives every reading the same
-//! weight.
+//! weight. Its covariance is that bound where Σ has an inverse.
 
-use crate::element::attempt::Attempt;
-use crate::element::solve::{Element, Solution, determined_step};
+use super::row::{Row, Scope};
+use crate::element::solve::{Solution, determined_step};
+use crate::element::solver::{Solver, Task};
 use crate::judge::levers::libm_cos;
-use catoptric_model::Deflection;
 use nalgebra::DVector;
 
 /// Variance that stands for none, in square metres: a micrometre's.
 const LEAST_VARIANCE: f64 = 1e-12;
 
+pub(super) const ROW: Row = Row {
+    name: "beam-gls",
+    about: "Each element by itself, weighted by the covariance of all errors",
+    scope: Scope::Element(&GENERALIZED),
+};
+
+pub(crate) const GENERALIZED: Solver = Solver {
+    single_readings: false,
+    solve: generalized,
+    residuals: |budget| {
+        budget
+            .residual_covariance_at_bound()
+            .or_else(|| budget.residual_covariance())
+    },
+    covariance: |_, _, budget| budget.bound().or_else(|| budget.sandwich()),
+};
+
 /// The estimate from a start; `None` if the ray misses a board on the way.
-pub(crate) fn generalized(attempt: &Attempt, element: &Element, start: &Deflection) -> Option<Solution> {
-    let options = attempt.work.options;
-    let mut at = element.place(start.azimuth, start.elevation);
+fn generalized(task: &Task) -> Option<Solution> {
+    let (element, options) = (task.element, task.options());
+    let mut at = element.place(task.from.azimuth, task.from.elevation);
     for iteration in 1..=options.max_iterations {
-        let budget = attempt.budget(&at, element.observations)?;
+        let budget = task.attempt.budget(&at, element.observations)?;
         let residuals = DVector::from_vec(element.residuals(&at)?);
         let (information, right) = budget.weighted(&residuals)?;
         // Per board and in square metres, so that a lever arm is one.

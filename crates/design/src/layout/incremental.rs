@@ -1,8 +1,7 @@
-//! A layout with the ways of its beams, which are kept while it is changed.
+//! A layout that keeps the traced paths of its beams, so that an edit retraces only the beams that it may affect.
 //!
-//! A change of some mirrors or posts is looked at again only where it may matter: by the beams that met them and those that
-//! pass where they are now. All else is what it was, and what is said of the layout is the same, to the bit, as if it had
-//! been looked at for the first time.
+//! After a change of mirrors or posts, only beams that hit the changed ones, or that pass where they are now, are
+//! traced again. The results for the layout are bit-identical to those of a layout traced from scratch.
 
 use super::element::{self, Traced};
 use super::footprint::{Footprint, Outlines};
@@ -14,7 +13,7 @@ use catoptric_sim::{Scene, SimError};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// A layout that was looked at, ready to be changed.
+/// An analyzed layout that can be edited.
 ///
 /// ```
 /// use catoptric_design::layout::{Detail, Layout, analyze};
@@ -41,31 +40,31 @@ pub struct Layout {
     beams: Vec<Arc<Beam>>,
 }
 
-/// What is known of a beam.
+/// The traced paths and footprints of a beam.
 struct Beam {
     traced: Traced,
     footprints: Vec<Footprint>,
 }
 
 impl Layout {
-    /// Looks at a layout: as drawn, or as built under a seed.
+    /// Traces a layout as drawn, or as built under a seed.
     ///
     /// # Errors
     /// As [`analyze`](super::analyze).
     pub fn new(scene: &Scene, seed: Option<u64>, detail: Detail) -> Result<Self, SimError> {
         let mut layout = Self::drawn(scene, seed, detail)?;
-        layout.beams = layout.look(&layout.setting()?, |_| None);
+        layout.beams = layout.trace(&layout.setting()?, |_| None);
         Ok(layout)
     }
 
-    /// The layout of another scene, looked at where it may not be as it was.
+    /// Returns the layout of another scene; beams that the difference cannot affect are not traced again.
     ///
     /// # Errors
     /// As [`Layout::new`].
     pub fn edited(&self, scene: &Scene) -> Result<Self, SimError> {
         let mut layout = Self::drawn(scene, self.seed, self.detail)?;
         let setting = layout.setting()?;
-        let edit = match is_alike(&self.scene, scene) {
+        let edit = match differ_only_in_structure(&self.scene, scene) {
             true => Edit::between(&self.setting()?, &setting),
             false => None,
         };
@@ -73,16 +72,16 @@ impl Layout {
             let (known, edit) = (&self.beams[beam], edit.as_ref()?);
             (!edit.may_change(&known.traced.trail)).then(|| Arc::clone(known))
         };
-        let beams = layout.look(&setting, known);
+        let beams = layout.trace(&setting, known);
         drop(setting);
         layout.beams = beams;
         Ok(layout)
     }
 
-    /// What it sees, loses and allows.
+    /// Returns what the layout sees, loses and allows.
     ///
     /// # Errors
-    /// As [`Layout::new`], though one that was made has none.
+    /// As [`Layout::new`]; a layout that was constructed has none.
     pub fn analysis(&self) -> Result<Analysis, SimError> {
         let traced: Vec<&Traced> = self.beams.iter().map(|beam| &beam.traced).collect();
         let footprints: Vec<&Footprint> = self.beams.iter().flat_map(|beam| &beam.footprints).collect();
@@ -120,27 +119,27 @@ impl Layout {
         Setting::new(&self.scene, &self.structure, Mirrors::Attached, Vec::new())
     }
 
-    /// Every beam, those that are known aside.
-    fn look(
+    /// Traces every beam that is not known.
+    fn trace(
         &self,
         setting: &Setting<'_>,
         known: impl Fn(usize) -> Option<Arc<Beam>> + Sync,
     ) -> Vec<Arc<Beam>> {
         let outlines = Outlines::new(&self.sensor, &self.structure);
-        let look = |beam| {
+        let trace = |beam| {
             let traced = element::trace_one(&self.sensor, setting, &self.scene, beam);
             let footprints = outlines.of(&traced);
             Arc::new(Beam { traced, footprints })
         };
         let beams = (0..self.sensor.scan().beams()).into_par_iter();
         beams
-            .map(|beam| known(beam).unwrap_or_else(|| look(beam)))
+            .map(|beam| known(beam).unwrap_or_else(|| trace(beam)))
             .collect()
     }
 }
 
-/// Whether scenes differ in nothing but their mirrors and posts, and how they are called.
-fn is_alike(one: &Scene, other: &Scene) -> bool {
+/// Whether scenes differ only in their mirrors, posts and names.
+fn differ_only_in_structure(one: &Scene, other: &Scene) -> bool {
     let rest = |scene: &Scene| {
         let mut scene = scene.clone();
         scene.name.clear();
