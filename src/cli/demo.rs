@@ -8,7 +8,7 @@ use super::score::figure;
 use catoptric::apply::{CloudSketch, Lift};
 use catoptric::calib::Options;
 use catoptric::files;
-use catoptric::report::MOST_POINTS;
+use catoptric::report::MAX_POINTS;
 use catoptric::{
     CloudFrame, Error, Method, Recording, Scene, Template, Verdict, apply_into, calibrate_with, read_dataset,
     read_truth, report, score, simulate_into, write_json,
@@ -80,7 +80,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let cloud_path = folder.join("cloud.ply");
     let cloud = apply_into(&dataset, &results[0].0, None, CloudFrame::Room, &cloud_path)?;
     let lift = Lift::new(&dataset, &results[0].0, None, CloudFrame::Room).map_err(Error::from)?;
-    let sketch = CloudSketch::of(&lift, MOST_POINTS).map_err(Error::from)?;
+    let sketch = CloudSketch::of(&lift, MAX_POINTS).map_err(Error::from)?;
     let report_path = folder.join("report.html");
     let html = report(&dataset, truth.as_ref(), &results, Some(&sketch));
     files::write_file(&report_path, html.as_bytes())?;

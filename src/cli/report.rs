@@ -4,7 +4,7 @@ use super::Context;
 use super::error::CliError;
 use super::output::print;
 use catoptric::apply::{CloudSketch, Lift};
-use catoptric::report::MOST_POINTS;
+use catoptric::report::MAX_POINTS;
 use catoptric::{CloudFrame, Error, files, read_calibration_for, read_dataset, read_truth, report, score};
 use clap::Args;
 use std::path::PathBuf;
@@ -36,7 +36,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         .first()
         .map(|(calibration, _)| Lift::new(&dataset, calibration, None, CloudFrame::Room));
     let cloud = match cloud {
-        Some(Ok(lift)) => Some(CloudSketch::of(&lift, MOST_POINTS).map_err(Error::from)?),
+        Some(Ok(lift)) => Some(CloudSketch::of(&lift, MAX_POINTS).map_err(Error::from)?),
         Some(Err(error)) => {
             context.say(&format!("without a cloud: {error}"));
             None

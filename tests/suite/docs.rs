@@ -12,7 +12,7 @@ use catoptric::{calib, score, sim};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 fn root() -> &'static Path {
@@ -246,7 +246,10 @@ fn every_source_file_says_first_what_it_is() {
         for path in files_below(folder).into_iter().filter(|p| p.ends_with(".rs")) {
             let text = read(&path);
             let first = text.lines().next().unwrap_or_default();
-            assert!(first.starts_with("//!") || path.ends_with("/build.rs"), "{path} begins with {first:?}");
+            assert!(
+                first.starts_with("//!") || path.ends_with("/build.rs"),
+                "{path} begins with {first:?}"
+            );
         }
     }
 }
@@ -254,7 +257,15 @@ fn every_source_file_says_first_what_it_is() {
 /// Packages that a user compiles beside our own crates' dependencies, ours counted.
 fn packages(arguments: &[&str]) -> BTreeSet<String> {
     let output = Command::new(env!("CARGO"))
-        .args(["tree", "--locked", "--offline", "--prefix", "none", "--format", "{p}"])
+        .args([
+            "tree",
+            "--locked",
+            "--offline",
+            "--prefix",
+            "none",
+            "--format",
+            "{p}",
+        ])
         .args(["-e", "normal"])
         .args(arguments)
         .current_dir(root())
@@ -272,7 +283,13 @@ fn packages(arguments: &[&str]) -> BTreeSet<String> {
 #[test]
 fn who_only_tests_a_calibration_compiles_little() {
     let with = packages(&["-p", "catoptric", "--features", "testing"]);
-    let without = packages(&["-p", "catoptric", "--no-default-features", "--features", "testing"]);
+    let without = packages(&[
+        "-p",
+        "catoptric",
+        "--no-default-features",
+        "--features",
+        "testing",
+    ]);
     assert!(with.len() <= 125, "{}: {with:?}", with.len());
     assert!(without.len() <= 95, "{}: {without:?}", without.len());
     for foreign in ["clap", "indicatif", "plotters", "image", "argmin"] {

@@ -7,8 +7,9 @@
 use catoptric::calib::plan::Request;
 use catoptric::study::{Contestant, Part, Study};
 use catoptric::{
-    Control, Error, Method, PlanStart, Progress, Recording, Scene, Stop, Template, ToleranceOptions, calibrate_with,
-    plan, read_dataset, simulate, simulate_into, simulate_with, study, study_into, tolerance, trace,
+    Control, Error, Method, PlanStart, Progress, Recording, Scene, Stop, Template, ToleranceOptions,
+    calibrate_with, plan, read_dataset, simulate, simulate_into, simulate_with, study, study_into, tolerance,
+    trace,
 };
 use std::path::Path;
 use std::process::Command;
@@ -78,7 +79,10 @@ fn a_crate_outside_of_the_workspace_scores_a_calibration() {
         "{}",
         String::from_utf8_lossy(&output.stderr)
     );
-    assert!(text.starts_with("pass: 0.0") && text.ends_with("blind\n"), "{text}");
+    assert!(
+        text.starts_with("pass: 0.0") && text.ends_with("blind\n"),
+        "{text}"
+    );
 }
 
 #[test]
@@ -173,10 +177,23 @@ fn the_program_runs_as_a_function_again_and_again() {
     let (scene, data) = (scene.to_str().unwrap(), dataset.to_str().unwrap());
     assert_eq!(run(&["check", scene]), 3);
     assert_eq!(run(&["new", scene, "--layout", "two-mirror"]), 0);
-    let few = ["--set", "experiment.scans_per_pose=2", "--set", "scanner.sub_rays=1"];
+    let few = [
+        "--set",
+        "experiment.scans_per_pose=2",
+        "--set",
+        "scanner.sub_rays=1",
+    ];
     // The number of threads holds for one run, not for those after it.
     for threads in ["1", "2"] {
-        let simulate = ["simulate", scene, "--out", data, "--replace", "--threads", threads];
+        let simulate = [
+            "simulate",
+            scene,
+            "--out",
+            data,
+            "--replace",
+            "--threads",
+            threads,
+        ];
         assert_eq!(run(&[simulate.as_slice(), few.as_slice()].concat()), 0);
     }
     assert_eq!(run(&["simulate", scene, "--bogus"]), 2);

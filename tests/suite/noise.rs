@@ -3,8 +3,8 @@
 //! Seeds are fixed and bounds are those of 99.9 %. None of this proves that a real scanner's noise is like that.
 
 use crate::scenes::{BARE, scene};
-use catoptric::sim::scene::{Correlated, ErrorModel, Interference};
 use catoptric::sim::noise::{Draws, Purpose};
+use catoptric::sim::scene::{Correlated, ErrorModel, Interference};
 use catoptric::sim::{Laboratory, Scene};
 use catoptric_fixtures::ust20lx;
 use rand::SeedableRng;

@@ -249,7 +249,11 @@ fn what_makes_no_search_is_said() {
         &["is not a direction"],
     );
     refuse(&["--goal", "size", "--goal", "size"], 2, &["given twice"]);
-    refuse(&["--goal", "size", "--require", "lots<=3"], 2, &["is not a figure"]);
+    refuse(
+        &["--goal", "size", "--require", "lots<=3"],
+        2,
+        &["is not a figure"],
+    );
     refuse(
         &["--goal", "size", "--require", "size.diameter_mm<=10"],
         1,

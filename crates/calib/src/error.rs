@@ -86,6 +86,7 @@ impl CalibError {
             | Self::UnknownFacet { .. }
             | Self::NoPlace { .. }
             | Self::Foreign { .. }
+            | Self::Unreadable(_)
             | Self::Stopped(_) => None,
         }
     }

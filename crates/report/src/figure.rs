@@ -89,7 +89,13 @@ pub(super) struct Bar {
 }
 
 /// Plots lines and labels in a plane, to scale if both axes have the same length.
-pub(super) fn plan(size: (u32, u32), axes: &Axes, title: &str, strokes: &[Stroke], labels: &[Label]) -> String {
+pub(super) fn plan(
+    size: (u32, u32),
+    axes: &Axes,
+    title: &str,
+    strokes: &[Stroke],
+    labels: &[Label],
+) -> String {
     draw(size, title, |area| {
         let mut chart = frame(area, axes, true)?;
         draw_strokes(&mut chart, strokes)?;

@@ -15,13 +15,13 @@ mod page;
 #[cfg(feature = "design")]
 mod plan;
 mod plots;
+mod prose;
 mod scores;
 mod study;
 #[cfg(feature = "design")]
 mod tolerance;
 mod trials;
 mod verdict;
-mod prose;
 
 pub use characterization::characterization;
 #[cfg(feature = "design")]
@@ -30,7 +30,7 @@ pub use layout::{Drawn, layout, layout_pictures};
 pub use optimum::{front_picture, goal_value, optimum};
 #[cfg(feature = "design")]
 pub use plan::plan;
-pub use plots::MOST_POINTS;
+pub use plots::MAX_POINTS;
 pub use study::study;
 #[cfg(feature = "design")]
 pub use tolerance::{tolerance, tolerance_plot};

@@ -1,6 +1,6 @@
 //! The page on planned board poses: for each facet the room from above and from the side, and a table.
 
-use super::figure::{self, Axes, GRID, Stroke, Label, color};
+use super::figure::{self, Axes, GRID, Label, Stroke, color};
 use super::page::{escape, figure as block, number, page};
 use catoptric_calib::plan::{FacetPlan, Plan, PlannedPose, Situation, Standing};
 use catoptric_model::frame::yaw_pitch_roll;

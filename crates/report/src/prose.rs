@@ -240,10 +240,10 @@ mod tests {
         let text = |calibration: &Calibration| {
             dominance(&score(&s.dataset, calibration, Some(&s.truth)).expect("in memory"))
         };
+        assert!(text(&turned(noisy(&s.truth, 1e-4, 1), 5e-3)).starts_with("The common mode dominates"));
         assert!(
-            text(&turned(noisy(&s.truth, 1e-4, 1), 5e-3)).starts_with("The common mode dominates")
+            text(&noisy(&s.truth, 1e-3, 1)).starts_with("The error that differs from element to element")
         );
-        assert!(text(&noisy(&s.truth, 1e-3, 1)).starts_with("The error that differs from element to element"));
         let mut by_mirror = noisy(&s.truth, 1e-4, 1);
         let mut noise = Noise::new(9);
         for facet in &s.dataset.session.facets {

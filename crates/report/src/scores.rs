@@ -42,9 +42,7 @@ pub(super) fn scores(results: &[(Calibration, Score)]) -> String {
     row("– bound, each element separately (°)", &|s| {
         number(s.alone_crlb_per_axis_deg, 4)
     });
-    row("– bound, any method (°)", &|s| {
-        number(s.crlb_per_axis_deg, 4)
-    });
+    row("– bound, any method (°)", &|s| number(s.crlb_per_axis_deg, 4));
     row("– efficiency, 1 is best", &|s| number(s.efficiency, 2));
     row("– without the common rotation (°)", &|s| {
         number(s.differential_per_axis_rms_deg, 4)
@@ -81,9 +79,10 @@ pub(super) fn scores(results: &[(Calibration, Score)]) -> String {
     row("Distance of points from the boards: mean / rms (mm)", &|s| {
         format!("{} / {}", number(s.boards_mm.mean, 2), number(s.boards_mm.rms, 2))
     });
-    row("Distance of points from the walls of the empty room: mean / rms (mm)", &|s| {
-        format!("{} / {}", number(s.walls_mm.mean, 2), number(s.walls_mm.rms, 2))
-    });
+    row(
+        "Distance of points from the walls of the empty room: mean / rms (mm)",
+        &|s| format!("{} / {}", number(s.walls_mm.mean, 2), number(s.walls_mm.rms, 2)),
+    );
     row("Split elements: solved / all", &|s| match s.split.elements {
         0 => "–".to_owned(),
         all => format!("{} of {all}", s.split.solved),

@@ -12,7 +12,7 @@ fn html(with_truth: bool) -> String {
     let first = turned(noisy(&s.truth, 1e-3, 1), 2e-3);
     let second = noisy(&s.truth, 3e-3, 2);
     let lift = Lift::new(&s.dataset, &first, None, CloudFrame::Room).expect("there is a room");
-    let cloud = CloudSketch::of(&lift, MOST_POINTS).expect("in memory");
+    let cloud = CloudSketch::of(&lift, MAX_POINTS).expect("in memory");
     drop(lift);
     let results = [first, second].map(|c| {
         let score = score(&s.dataset, &c, truth).expect("in memory");

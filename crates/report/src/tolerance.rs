@@ -1,6 +1,6 @@
 //! The page on manufacturing errors, with its plot.
 
-use super::figure::{Area, Axes, Shapes, Stroke, Label, color, fine, round_numbers, standalone};
+use super::figure::{Area, Axes, Label, Shapes, Stroke, color, fine, round_numbers, standalone};
 use super::page::{count, escape, figure, number, page, table};
 use catoptric_design::tolerance::{Distribution, Tolerance};
 use plotters::style::BLACK;

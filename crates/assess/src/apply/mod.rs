@@ -7,8 +7,8 @@ use crate::score::residual;
 use catoptric_model::Motion;
 use catoptric_model::cloud::{self, CloudFrame, CloudPoint, PointCloud};
 use catoptric_model::{
-    Calibration, Dataset, Deflection, ModelError, Pose, PoseKind, PoseRecord, RangeBias, ScanGeometry, Status,
-    Unreadable,
+    Calibration, Dataset, Deflection, ModelError, Pose, PoseKind, PoseRecord, RangeBias, ScanGeometry,
+    Status, Unreadable,
 };
 pub use sketch::{CloudSketch, Extent};
 

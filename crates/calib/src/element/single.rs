@@ -14,7 +14,12 @@ pub(super) struct Block {
 }
 
 /// All elements, in blocks of at most so many bytes of readings, and of at least one element.
-pub(super) fn blocks(work: &Workspace, solver: &Solver, candidates: &[Candidate], most_bytes: usize) -> Vec<Block> {
+pub(super) fn blocks(
+    work: &Workspace,
+    solver: &Solver,
+    candidates: &[Candidate],
+    most_bytes: usize,
+) -> Vec<Block> {
     if !solver.single_readings {
         return vec![Block {
             beams: 0..candidates.len(),

@@ -108,8 +108,7 @@ fn housing(drawing: &Drawing) -> Housing {
         parts.flat_map(|p| p.skin.iter().flatten())
     };
     let min = |axis: usize| points().map(|p| p[axis]).reduce(f64::min);
-    let (Some(back), Some(low), Some(high)) = (min(0), min(2), points().map(|p| p.z).reduce(f64::max))
-    else {
+    let (Some(back), Some(low), Some(high)) = (min(0), min(2), points().map(|p| p.z).reduce(f64::max)) else {
         return NO_HOUSING;
     };
     let radius = points().map(|p| libm::hypot(p.x, p.y)).fold(0.0, f64::max);

@@ -249,7 +249,8 @@ fn near(sequences: &FacetSequences) -> f64 {
         (0..LATTICE).map(direction).collect()
     });
     let is_near = |direction: &&Vector3<f64>| {
-        sequences.0
+        sequences
+            .0
             .iter()
             .any(|sequence| sequence.is_near(direction, sin_near, cos_near))
     };

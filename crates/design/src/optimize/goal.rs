@@ -177,7 +177,12 @@ impl Goal {
             "size" => return goal(text, Better::Down, Some("cm³"), Measure::Cylinder),
             "directions" if wanted.is_empty() => return Err(GoalError::Directions),
             "directions" => {
-                return goal(text, Better::Down, Some("°"), Measure::Directions(wanted.to_vec()));
+                return goal(
+                    text,
+                    Better::Down,
+                    Some("°"),
+                    Measure::Directions(wanted.to_vec()),
+                );
             }
             _ => {}
         }

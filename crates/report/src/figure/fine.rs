@@ -1,7 +1,7 @@
 //! Plots of small shapes: drawn four times as large and scaled down, because plotters rounds coordinates to whole
 //! pixels.
 
-use super::{AXIS_ROOM, Axes, FONT, Failure, GRID, LABEL_SIZE, MARGIN, Stroke, Label, draw, tick};
+use super::{AXIS_ROOM, Axes, FONT, Failure, GRID, LABEL_SIZE, Label, MARGIN, Stroke, draw, tick};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 

@@ -19,7 +19,10 @@ impl Picture {
         let encoder = PngEncoder::new_with_quality(&mut file, CompressionType::Fast, FilterType::Adaptive);
         let [columns, rows] = self.size;
         // Writing to memory, of the size the picture has, cannot fail.
-        if encoder.write_image(&self.bytes, columns, rows, self.color).is_err() {
+        if encoder
+            .write_image(&self.bytes, columns, rows, self.color)
+            .is_err()
+        {
             file.clear();
         }
         file

@@ -1,8 +1,8 @@
 //! Flat pictures of a layout: the map of directions, the scan, the footprints on the facets.
 
 use super::Drawn;
-use crate::figure::{Area, Axes, GRID, Shapes, Stroke, Label, color, fine, round_numbers};
-use catoptric_design::layout::{Class, DrawnRay, Footprint, Run};
+use crate::figure::{Area, Axes, GRID, Label, Shapes, Stroke, color, fine, round_numbers};
+use catoptric_design::layout::{Class, DrawnRay, ElementRun, Footprint};
 use catoptric_model::beam;
 use nalgebra::{Matrix3, Point3, Vector3};
 use plotters::style::{BLACK, RGBColor};
@@ -180,7 +180,7 @@ pub(super) fn scan(drawn: &Drawn) -> String {
         x_label: "azimuth in the scan, to the left (°)".to_owned(),
         y_label: String::new(),
     };
-    let area = |run: &Run| {
+    let area = |run: &ElementRun| {
         let ray = &drawn.drawing.rays[run.beams[0]];
         let (bottom, color) = match run.class {
             Class::Direct => (2.1, DIRECT),

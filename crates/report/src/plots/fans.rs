@@ -1,6 +1,6 @@
 //! Plots of the fans from above, from the side and from behind.
 
-use super::super::figure::{self, Axes, GRID, Stroke, Label};
+use super::super::figure::{self, Axes, GRID, Label, Stroke};
 use super::super::page::{figure as block, number};
 use super::elements::{Solved, azimuth_deg, color_of, facet_name, legend, solved};
 use catoptric_model::{Calibration, Dataset, Status, beam};

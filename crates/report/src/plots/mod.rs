@@ -9,7 +9,7 @@ mod residuals;
 mod statuses;
 
 pub(super) use angles::{errors, estimates};
-pub use cloud::MOST_POINTS;
+pub use cloud::MAX_POINTS;
 pub(super) use cloud::cloud;
 pub(super) use fans::fans;
 pub(super) use residuals::residuals;

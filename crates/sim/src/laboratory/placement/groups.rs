@@ -132,7 +132,7 @@ fn free_sectors(paths: &[Path], scan: &ScanGeometry) -> Vec<Vec<usize>> {
             last.extend(first);
         }
     }
-    sectors.retain(|s| (s.len() - 1) as f64 * scan.step() >= LEAST_SECTOR);
+    sectors.retain(|s| (s.len() - 1) as f64 * scan.step() >= MIN_SECTOR);
     sectors
 }
 
