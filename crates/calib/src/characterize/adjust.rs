@@ -9,7 +9,7 @@ use catoptric_model::characterization::Fit;
 use catoptric_model::{Pose, PoseData, Session};
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 
-/// A step of the mounting shorter than this, in metres and radians alike, ends the iteration.
+/// A step of the mounting shorter than this, in meters and radians alike, ends the iteration.
 const STEP_TOLERANCE: f64 = 1e-12;
 
 /// Steps, at most: the problem is nearly linear.

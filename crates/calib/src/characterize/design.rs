@@ -6,7 +6,7 @@ use catoptric_model::{AngleBias, ColorBias, DistanceBias, RangeBias, Session, Te
 use nalgebra::{DVector, RowDVector};
 use std::collections::BTreeMap;
 
-/// Distances nearer to each other than this are one node of E_r, in metres.
+/// Distances nearer to each other than this are one node of E_r, in meters.
 const SAME_DISTANCE: f64 = 0.01;
 
 /// Least spread of cos θ_N over all boards that tells A_a: boards within 11° of normal incidence do not.
@@ -55,7 +55,7 @@ impl Term {
     }
 }
 
-/// The numbers to be fitted, in millimetres and metres.
+/// The numbers to be fitted, in millimeters and meters.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Design {
     /// Distances of E_r; the first terms are its values there.
@@ -160,7 +160,7 @@ impl Design {
         }
     }
 
-    /// Change of a range, in metres, by one unit of each term.
+    /// Change of a range, in meters, by one unit of each term.
     pub(super) fn row(&self, distance: f64, cos_incidence: f64, color: &str) -> RowDVector<f64> {
         let weight = |nodes: &[f64], at: f64, node: usize| -> f64 {
             let weights = interpolation_weights(nodes, at);

@@ -36,7 +36,7 @@ use design::{Design, Term};
 use nalgebra::{DMatrix, Matrix2, Vector2};
 use std::collections::BTreeMap;
 
-/// Bias, in metres, that no reading of a board is taken to exceed; beyond, it is of something else.
+/// Bias, in meters, that no reading of a board is taken to exceed; beyond, it is of something else.
 const LARGEST_BIAS: f64 = 0.5;
 
 /// Rounds of choosing beams and adjusting, at most.

@@ -17,7 +17,7 @@ const INDIFFERENT: f64 = 13.8;
 /// Directions nearer than this are one, in radians.
 const ONE_DIRECTION: f64 = 1e-6;
 
-/// Range error that is always reckoned with, in metres.
+/// Range error that is always reckoned with, in meters.
 const LEAST_SD: f64 = 1e-6;
 
 /// Another direction that the readings allow as well, and the drawing too.

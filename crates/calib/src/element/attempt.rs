@@ -35,7 +35,7 @@ pub(crate) struct Attempt<'a> {
     /// What the facet's plane is believed to make of it.
     pub(crate) nominal: Deflection,
     pub(crate) distance: BareDistance,
-    /// Believed noise of one reading, in metres.
+    /// Believed noise of one reading, in meters.
     pub(crate) noise: f64,
     /// Poses recorded for its facet.
     pub(crate) recorded: usize,
@@ -151,7 +151,7 @@ pub(crate) struct Failure {
 }
 
 impl Fit {
-    /// Root mean square residual over the boards, in metres.
+    /// Root mean square residual over the boards, in meters.
     pub(crate) fn rms(&self) -> f64 {
         let sum: f64 = self.solution.residuals.iter().map(|r| r * r).sum();
         (sum / self.solution.residuals.len() as f64).sqrt()

@@ -5,13 +5,13 @@ use crate::readings::observations::{azimuth, cone_half_angle};
 use catoptric_model::session::NominalFacet;
 use catoptric_model::{BeamEstimate, Deflection, MirrorPlane, beam};
 
-/// Residual that is always taken as the board's own, in metres; a wall behind it differs by decimeters.
+/// Residual that is always taken as the board's own, in meters; a wall behind it differs by decimeters.
 pub(crate) const GATE_FLOOR: f64 = 0.03;
 
 /// Standard deviations within which a residual is taken as the board's own.
 pub(crate) const GATE_SIGMAS: f64 = 6.0;
 
-/// Board to spare around a spot once the direction is known, in metres.
+/// Board to spare around a spot once the direction is known, in meters.
 const EDGE_MARGIN: f64 = 5e-3;
 
 /// The poses whose board holds the beam and whose range agrees, for a direction known to `stage` radians.

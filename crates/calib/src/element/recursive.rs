@@ -30,7 +30,7 @@ enum State {
 
 /// Recursive least squares over the readings of each observation, in order, from a start.
 ///
-/// `readings` holds the raw ranges, in metres, of each observation. `None` if the ray misses a board or the readings do
+/// `readings` holds the raw ranges, in meters, of each observation. `None` if the ray misses a board or the readings do
 /// not determine both angles.
 ///
 /// ```

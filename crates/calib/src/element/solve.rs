@@ -12,9 +12,9 @@ use catoptric_model::bias::ColoredBias;
 use catoptric_model::{BoardPlane, CorrectedRange, Deflection, RangeBias, beam};
 use nalgebra::{Matrix2, Unit, Vector2, Vector3};
 
-/// Lever arm, in metres per radian, below which a direction counts as undetermined within the iteration.
+/// Lever arm, in meters per radian, below which a direction counts as undetermined within the iteration.
 ///
-/// A residual of a millimetre along such a lever would turn the beam by 11°: no step is taken along it. Elements with
+/// A residual of a millimeter along such a lever would turn the beam by 11°: no step is taken along it. Elements with
 /// levers several times longer are already reported as unobservable.
 const SHORTEST_LEVER: f64 = 5e-3;
 
@@ -27,9 +27,9 @@ const LEAST_FACING: f64 = 0.05;
 /// Step 3: range to the structure before the mirror was glued on, and the mirror's thickness along its normal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BareDistance {
-    /// Distance from the sensor origin to the bare structure, in metres.
+    /// Distance from the sensor origin to the bare structure, in meters.
     pub distance: f64,
-    /// Thickness t of the mirror, in metres.
+    /// Thickness t of the mirror, in meters.
     pub thickness: f64,
 }
 
@@ -73,7 +73,7 @@ pub struct Solution {
     pub iterations: usize,
     /// Whether the last step was as short as asked for.
     pub converged: bool,
-    /// z − r̂ of each board, in metres.
+    /// z − r̂ of each board, in meters.
     pub residuals: Vec<f64>,
 }
 
@@ -88,9 +88,9 @@ struct Known<'e> {
 pub(crate) struct Row {
     /// (∂r/∂θ_a, ∂r/∂φ).
     pub(crate) gradient: Vector2<f64>,
-    /// Predicted range r̂, in metres.
+    /// Predicted range r̂, in meters.
     pub(crate) predicted: f64,
-    /// E_a + E_c + E_r at the estimate, in metres.
+    /// E_a + E_c + E_r at the estimate, in meters.
     pub(crate) bias: f64,
 }
 
@@ -199,7 +199,7 @@ impl Element<'_> {
         self.observations.iter().map(row).collect()
     }
 
-    /// z − r̂ of each board at an estimate, with z corrected by Eq. (3), in metres; `None` if the ray misses one.
+    /// z − r̂ of each board at an estimate, with z corrected by Eq. (3), in meters; `None` if the ray misses one.
     pub fn residuals(&self, at: &Deflection) -> Option<Vec<f64>> {
         let ray = OutgoingRay::of(at, self.azimuth);
         let mut residuals = Vec::with_capacity(self.observations.len());

@@ -15,10 +15,10 @@ use nalgebra::{Matrix2, Vector2};
 /// Gaussian number: one in a million exceeds five standard deviations.
 const RESIDUAL_FACTOR: f64 = 5.0;
 
-/// Residual that no belief covers, in metres: whole millimetres, beam size, laws that miss their own tables.
+/// Residual that no belief covers, in meters: whole millimeters, beam size, laws that miss their own tables.
 const RESIDUAL_FLOOR: f64 = 4e-3;
 
-/// Largest credible rms residual of a fit, and the expected one, in metres.
+/// Largest credible rms residual of a fit, and the expected one, in meters.
 fn residual_limit(solver: &Solver, attempt: &Attempt, fit: &Fit) -> Option<(f64, f64)> {
     let observations = attempt.observations(&fit.poses);
     let budget = attempt.budget(&fit.solution.deflection, &observations)?;

@@ -1,4 +1,4 @@
-//! The rows of a group: of its elements, each weighted by its departure, then of its facets' distances.
+//! The rows of a group: those of its elements, each weighted for its deviation, then those of its facets' distances.
 
 use super::fan::Shape;
 use super::group::{BareFacet, FACET_PARAMETERS};
@@ -10,14 +10,14 @@ use nalgebra::{DMatrix, DVector};
 /// Residuals of a group at a point.
 struct At {
     residuals: DVector<f64>,
-    /// If it is wanted.
+    /// If requested.
     jacobian: Option<GroupJacobian>,
     /// Σ ln det(I + τ²HᵀH) over its elements.
     log_departures: f64,
 }
 
 impl Joint<'_> {
-    /// The rows of a group at a point: of its elements, then of its facets' distances.
+    /// The rows of a group at a point: those of its elements, then those of its facets' distances.
     fn at(&self, group: usize, shared: &Point, own: &Point, derivatives: bool) -> Option<At> {
         let group = &self.groups[group];
         let boards = self.boards(group, shared, own)?;
@@ -77,7 +77,8 @@ impl Joint<'_> {
         })
     }
 
-    /// Predicted less measured distance of a facet, in standard deviations, and its derivatives by the plane.
+    /// Predicted minus measured distance of a facet, in standard deviations, and its derivatives with respect to the
+    /// plane.
     fn bare(&self, facet: &BareFacet, shape: &Shape, w: &DVector<f64>) -> Option<(f64, [f64; 3])> {
         let (mut sum, mut derivative) = (0.0, [0.0; 3]);
         let (a, b) = frame::tangent_basis(&shape.normal);

@@ -30,7 +30,7 @@ impl<'a> CommonErrors<'a> {
         self.session.believed.bias.distance.range_m.len() + 1 + self.colors.len() + drift
     }
 
-    /// Error of a corrected range that one standard deviation of each number causes, in metres.
+    /// Error of a corrected range that one standard deviation of each number causes, in meters.
     ///
     /// A_a is uncertain with A_a + B_a, the error at normal incidence, held: its column is cos θ_N − 1.
     pub(crate) fn row(&self, range: f64, cos_incidence: f64, color: &str) -> RowDVector<f64> {
@@ -61,7 +61,7 @@ impl<'a> CommonErrors<'a> {
         [below, above, (nodes, gain), color]
     }
 
-    /// Error of a bare distance that one standard deviation of each number causes, in metres: of what the scanner ranged
+    /// Error of a bare distance that one standard deviation of each number causes, in meters: of what the scanner ranged
     /// and the believed biases corrected.
     pub(crate) fn bare_row(&self, distance: f64, cos_incidence: f64) -> RowDVector<f64> {
         if !self.session.bare_structure.scanned {
@@ -73,7 +73,7 @@ impl<'a> CommonErrors<'a> {
         row
     }
 
-    /// Standard deviation of a bare distance by all else, which the facets do not share, in metres.
+    /// Standard deviation of a bare distance by all else, which the facets do not share, in meters.
     pub(crate) fn bare_sd(&self, distance: f64, cos_incidence: f64) -> f64 {
         let whole = self.session.bare_structure.distance_sd_mm * 1e-3;
         let shared = self.bare_row(distance, cos_incidence).norm_squared();
@@ -115,7 +115,7 @@ impl<'a> CommonErrors<'a> {
         bias
     }
 
-    /// Variance of E_c for a color that no board of the session has, in square metres; zero for a listed one.
+    /// Variance of E_c for a color that no board of the session has, in square meters; zero for a listed one.
     pub(crate) fn unlisted_variance(&self, color: &str) -> f64 {
         if self.colors.contains(&color) {
             0.0

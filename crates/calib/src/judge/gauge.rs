@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector, Point3, Unit, Vector3};
 /// Part of a null vector's largest component below which a component is not worth a word.
 const NAMED: f64 = 0.02;
 
-/// A derivative below this, in metres per unit of its unknown, is rounding.
+/// A derivative below this, in meters per unit of its unknown, is rounding.
 const ROUNDING: f64 = 1e-12;
 
 /// What is unknown besides directions.
@@ -27,7 +27,7 @@ pub struct Unknowns {
     /// A constant range error B.
     pub constant: bool,
     /// A range error that grows with the range, A_c.
-    pub per_metre: bool,
+    pub per_meter: bool,
     /// A range error that grows with the cosine of the incidence, A_a.
     pub incidence: bool,
     /// The distance d of each element to its mirror; facets have theirs among their planes.
@@ -94,7 +94,7 @@ pub struct Open {
 
 impl Determined {
     /// Standard deviation of an unknown for ranges of 1 m standard deviation; `None` if it is open.
-    pub fn per_metre(&self, unknown: &str) -> Option<f64> {
+    pub fn per_meter(&self, unknown: &str) -> Option<f64> {
         let index = self.unknowns.iter().position(|n| n == unknown)?;
         Some(self.information.covariance_among(&[index])?[(0, 0)].sqrt())
     }
@@ -182,7 +182,7 @@ struct Columns {
     facets: Vec<usize>,
     mounting: Option<usize>,
     constant: Option<usize>,
-    per_metre: Option<usize>,
+    per_meter: Option<usize>,
     incidence: Option<usize>,
 }
 
@@ -228,7 +228,7 @@ impl Columns {
         let mut one = |wanted: bool, name: &str| wanted.then(|| add(&[name.to_owned()]));
         Self {
             constant: one(unknowns.constant, "B"),
-            per_metre: one(unknowns.per_metre, "A_c"),
+            per_meter: one(unknowns.per_meter, "A_c"),
             incidence: one(unknowns.incidence, "A_a"),
             rays,
             distances,
@@ -271,7 +271,7 @@ impl Columns {
         }
         let errors = [
             (self.constant, 1.0),
-            (self.per_metre, r),
+            (self.per_meter, r),
             (self.incidence, board.cos_incidence(&v)),
         ];
         all.extend(

@@ -10,7 +10,7 @@ use nalgebra::{Matrix2, Vector2};
 /// Standard deviation beyond which a direction counts as unobservable, in radians (3°): more than the drawing's error.
 pub const WEAKEST_SD: f64 = 3.0 * std::f64::consts::PI / 180.0;
 
-/// Range error that is always reckoned with here, in metres: no belief makes a scanner better than a millimetre.
+/// Range error that is always reckoned with here, in meters: no belief makes a scanner better than a millimeter.
 const LEAST_RANGE_ERROR: f64 = 1e-3;
 
 /// Ratio of levers below which the boards share a tilt; above it, they all stand face-on.

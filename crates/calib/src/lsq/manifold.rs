@@ -25,7 +25,7 @@ pub enum Block {
     Direction(Unit<Vector3<f64>>),
     /// A rotation, SO(3); three radians.
     Rotation(UnitQuaternion<f64>),
-    /// A pose, SE(3); three metres, then three radians.
+    /// A pose, SE(3); three meters, then three radians.
     Pose(Pose),
 }
 
@@ -138,7 +138,7 @@ impl Block {
         }
     }
 
-    /// Size of each tangent coordinate, against which a step is large or small: |x| of numbers and metres, 1 radian.
+    /// Size of each tangent coordinate, against which a step is large or small: |x| of numbers and meters, 1 radian.
     pub fn extent(&self) -> Vec<f64> {
         match self {
             Self::Vector(x) => x.iter().map(|v| v.abs()).collect(),

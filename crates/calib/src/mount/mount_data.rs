@@ -14,10 +14,10 @@ use nalgebra::{DMatrix, DVector, Matrix4, Point3};
 /// Beams this close to a served range may meet a mirror as built: half a spot and some facet tilt.
 const CLEAR_OF_FACETS: usize = 12;
 
-/// Noise of a mean below which readings are not weighted further, in metres: whole millimetres, 1/√12 mm.
+/// Noise of a mean below which readings are not weighted further, in meters: whole millimeters, 1/√12 mm.
 const LEAST_NOISE: f64 = 2.9e-4;
 
-/// Step of the reported ranges, in metres.
+/// Step of the reported ranges, in meters.
 const ROUNDING_STEP: f64 = 1e-3;
 
 /// A board read on fewer beams than this does not tell its own plane from another.
@@ -26,7 +26,7 @@ const LEAST_RAYS: usize = 3;
 /// Standard deviations within which a residual is taken as the board's own.
 const GATE_SIGMAS: f64 = 6.0;
 
-/// Residual that is always taken as the board's own, in metres: beam size and incidence, none of them modelled.
+/// Residual that is always taken as the board's own, in meters: beam size and incidence, none of them modelled.
 const GATE_FLOOR: f64 = 0.02;
 
 /// One mean of a beam over a board.
@@ -35,7 +35,7 @@ pub(crate) struct Ray {
     pub(crate) beam: usize,
     pub(crate) azimuth: f64,
     pub(crate) mean: f64,
-    /// Variance of the mean by noise, in square metres.
+    /// Variance of the mean by noise, in square meters.
     pub(crate) variance: f64,
 }
 
@@ -134,7 +134,7 @@ pub(crate) struct Selector<'a> {
     pub(crate) common: CommonErrors<'a>,
     /// What is corrected before a reading is held against the board.
     bias: &'a RangeBias,
-    /// Residual that is always taken as the board's own, in metres.
+    /// Residual that is always taken as the board's own, in meters.
     gate_floor: f64,
     /// Whether each beam is far from every facet.
     clear: Vec<bool>,

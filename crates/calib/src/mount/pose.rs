@@ -13,7 +13,7 @@ use nalgebra::{
     DMatrix, Dyn, Matrix6, OMatrix, SymmetricEigen, Translation3, U6, UnitQuaternion, Vector3, Vector6,
 };
 
-/// A step shorter than this (metres and radians alike) ends the iteration: some roundings of a pose.
+/// A step shorter than this (meters and radians alike) ends the iteration: some roundings of a pose.
 const STEP_TOLERANCE: f64 = 1e-14;
 
 /// Below this length a step that no longer shrinks is rounding, and the iteration has ended.
@@ -25,10 +25,10 @@ const MAX_STEPS: usize = 50;
 /// Rounds of choosing beams and solving, at most.
 const MAX_ROUNDS: usize = 12;
 
-/// Smallest tolerance taken as a prior, in radians and metres: a drawing is never better than 0.1° and 1 mm.
+/// Smallest tolerance taken as a prior, in radians and meters: a drawing is never better than 0.1° and 1 mm.
 const LEAST_TOLERANCE: [f64; 2] = [1.745e-3, 1e-3];
 
-/// Tolerance, in radians and metres, that stands for none: a mounting that was measured and is known.
+/// Tolerance, in radians and meters, that stands for none: a mounting that was measured and is known.
 const NO_TOLERANCE: f64 = 1e-9;
 
 /// The mounting of the sensor as estimated.

@@ -55,7 +55,7 @@ pub struct Standing {
 pub struct PlannedPose {
     /// The board.
     pub board: String,
-    /// Center of its face in the room, in metres.
+    /// Center of its face in the room, in meters.
     pub center_m: [f64; 3],
     /// Normal of its face in the room.
     pub normal: [f64; 3],
@@ -65,7 +65,7 @@ pub struct PlannedPose {
     pub yaw_pitch_roll_deg: [f64; 3],
     /// Beam that the center is on.
     pub beam: usize,
-    /// Way from the mirror to the center, in metres.
+    /// Way from the mirror to the center, in meters.
     pub range_m: f64,
     /// Tilt against that beam, in degrees.
     pub tilt_deg: f64,

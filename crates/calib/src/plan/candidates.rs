@@ -17,25 +17,25 @@ use catoptric_model::session::BoardSheet;
 use catoptric_model::{Pose, Session};
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
-/// Least distance between a board and the shell of the room, in metres.
+/// Least distance between a board and the shell of the room, in meters.
 const WALL_CLEARANCE: f64 = 0.03;
 
-/// Least distance between a board and the outermost part of the rig, in metres.
+/// Least distance between a board and the outermost part of the rig, in meters.
 const RIG_CLEARANCE: f64 = 0.1;
 
 /// Poses tried around each that was chosen.
 const NEAR: usize = 48;
 
-/// How far they are off at first: beams, metres, and degrees of tilt, direction and roll.
+/// How far they are off at first: beams, meters, and degrees of tilt, direction and roll.
 const AROUND: (f64, f64, f64, f64, f64) = (12.0, 0.3, 10.0, 25.0, 40.0);
 
 /// Real root of γ⁶ = γ + 1.
 const GAMMA: f64 = 1.134_724_138_401_519_4;
 
-/// Range error by a spot on a tilted board that is borne, in metres: about a pose's drift.
+/// Range error by a spot on a tilted board that is borne, in meters: about a pose's drift.
 const UNMODELED: f64 = 1e-3;
 
-/// Standard deviation of a pulse in range, in metres: 1 ns (assumed).
+/// Standard deviation of a pulse in range, in meters: 1 ns (assumed).
 const PULSE_SD: f64 = 0.15;
 
 /// √(2·ln 2): the edge is timed at half its height (assumed).
@@ -50,7 +50,7 @@ pub struct Candidate {
     pub room_from_board: Pose,
     /// Beam that its center is on.
     pub beam: usize,
-    /// Way from the mirror to its center, in metres.
+    /// Way from the mirror to its center, in meters.
     pub range_m: f64,
     /// Tilt against that beam, in degrees.
     pub tilt_deg: f64,
@@ -76,7 +76,7 @@ struct Wish {
     roll_deg: f64,
 }
 
-/// Longest lever s·tan α that beam divergence leaves useful, in metres.
+/// Longest lever s·tan α that beam divergence leaves useful, in meters.
 pub fn longest_lever(session: &Session) -> f64 {
     // The full 1/e² width is four standard deviations.
     let spread = 0.25e-3 * session.scanner.divergence_full_mrad;
@@ -126,8 +126,8 @@ pub fn candidates(
     Ok(found)
 }
 
-fn whole_centimetres(metres: f64) -> f64 {
-    (metres * 100.0).round() / 100.0
+fn whole_centimeters(meters: f64) -> f64 {
+    (meters * 100.0).round() / 100.0
 }
 
 /// Why a pose is not possible.
@@ -181,7 +181,7 @@ fn check(request: &Request) -> Result<(), CalibError> {
     };
     let [low, high] = request.range_m;
     if !(low.is_finite() && low > 0.0) {
-        return fail("least range", "a positive number of metres", low);
+        return fail("least range", "a positive number of meters", low);
     }
     if !(high.is_finite() && high >= low) {
         return fail("greatest range", "at least the least range", high);
@@ -201,7 +201,7 @@ fn names(session: &Session) -> String {
     names.join(", ")
 }
 
-/// Radius around the sensor that markers and mirrors reach to, in metres.
+/// Radius around the sensor that markers and mirrors reach to, in meters.
 fn rig_radius(session: &Session) -> f64 {
     let sensor_from_rig = Pose::from(&session.nominal_rig_from_sensor).inverse();
     let markers = session.rig_markers.iter().map(|m| sensor_from_rig * m.position());
@@ -246,7 +246,7 @@ impl<'a> Site<'a> {
             Wish {
                 element: element as usize,
                 board,
-                range: whole_centimetres(center.range_m + off(2, AROUND.1)),
+                range: whole_centimeters(center.range_m + off(2, AROUND.1)),
                 tilt_deg: (center.tilt_deg + off(3, AROUND.2)).round().max(0.0),
                 direction_deg: (center.direction_deg + off(4, AROUND.3))
                     .round()
@@ -270,18 +270,18 @@ impl<'a> Site<'a> {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let element = ((at(1) * elements as f64) as usize).min(elements - 1);
         let reach = self.reach(&self.fan.elements[element]).min(high);
-        // Whole centimetres and degrees, so that a person can set up what is said.
+        // Whole centimeters and degrees, so that a person can set up what is said.
         Wish {
             element,
             board: number % self.situation.session().boards.len(),
-            range: whole_centimetres(low + (reach - low) * at(2)),
+            range: whole_centimeters(low + (reach - low) * at(2)),
             tilt_deg: (self.request.max_incidence_deg * at(3)).round(),
             direction_deg: (360.0 * at(4)).round() % 360.0,
             roll_deg: (180.0 * at(5)).round() % 180.0,
         }
     }
 
-    /// Way of an element's ray to the shell of the room, in metres.
+    /// Way of an element's ray to the shell of the room, in meters.
     fn reach(&self, element: &Element) -> f64 {
         let (origin, v) = self.ray(element);
         let room = self.situation.session().room.as_ref();
@@ -376,7 +376,7 @@ fn stands_in(session: &Session, sheet: &BoardSheet, room_from_board: &Pose) -> b
     })
 }
 
-/// Distance between the sensor and the nearest point of a board, in metres.
+/// Distance between the sensor and the nearest point of a board, in meters.
 fn distance_from_sensor(board: &BoardInSensor) -> f64 {
     let sensor = board.sensor_from_board.inverse_transform_point(&Point3::origin());
     let half = [0.5 * board.outline.width, 0.5 * board.outline.height];

@@ -22,7 +22,7 @@ use nalgebra::{DMatrix, DVector, Matrix6};
 /// Prior of each angle, in radians (30°): 10⁻⁶ of what a determined element knows.
 const PRIOR_SD: f64 = std::f64::consts::PI / 6.0;
 
-/// Variance that stands for none, in square metres: a micrometre's.
+/// Variance that stands for none, in square meters: a micrometer's.
 const LEAST_VARIANCE: f64 = 1e-12;
 
 /// Cost of each board that an element lacks, as log det: more than any board between candidates makes.

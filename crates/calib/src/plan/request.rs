@@ -43,7 +43,7 @@ pub struct Request {
     pub criterion: Criterion,
     /// Where the sequence of candidates begins.
     pub seed: u64,
-    /// Least and greatest way from the mirror to the board along the beam it is aimed at, in metres; the room and the
+    /// Least and greatest way from the mirror to the board along the beam it is aimed at, in meters; the room and the
     /// divergence of the beam set limits of their own.
     pub range_m: [f64; 2],
     /// Largest incidence of any beam that the board serves, in degrees.

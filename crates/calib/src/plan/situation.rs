@@ -45,7 +45,7 @@ pub(crate) struct Element {
     pub(crate) beam: usize,
     pub(crate) azimuth: f64,
     pub(crate) deflection: Deflection,
-    /// Boards it reads: number, noise of one reading in metres, readings.
+    /// Boards it reads: number, noise of one reading in meters, readings.
     pub(crate) read: Vec<(usize, f64, usize)>,
 }
 
@@ -253,7 +253,7 @@ impl Fan {
 impl Element {
     /// Whether a board holds the element's whole spot on its face, directions being off by up to `margin`.
     pub(crate) fn is_held(&self, board: &BoardInSensor, cone: f64, margin: f64) -> bool {
-        /// Board to spare beside a spot, in metres.
+        /// Board to spare beside a spot, in meters.
         const EDGE_MARGIN: f64 = 5e-3;
         let (origin, v) = (
             self.deflection.deflection_point(self.azimuth),

@@ -4,14 +4,14 @@ use crate::readings::observations::{BoardInSensor, cone_half_angle};
 use catoptric_model::{BoardPlane, Pose, Session, frame};
 use nalgebra::{Point3, Unit, Vector3};
 
-/// Disagreement that is always allowed, in metres: survey of the room, beam size, whole millimetres.
+/// Disagreement that is always allowed, in meters: survey of the room, beam size, whole millimeters.
 pub(crate) const AGREEMENT_FLOOR: f64 = 0.02;
 
 /// A surface ahead of a ray, as far as it is known.
 pub(crate) struct Ahead {
     pub(crate) distance: f64,
     pub(crate) plane: BoardPlane,
-    /// How much the range changes where part of the beam meets another surface, in metres: nothing on one surface, the
+    /// How much the range changes where part of the beam meets another surface, in meters: nothing on one surface, the
     /// difference of two walls in a corner of the room, without limit at the edge of a board.
     pub(crate) spread: f64,
 }

@@ -20,7 +20,7 @@ const GATE_SIGMAS: f64 = 6.0;
 /// Median of |x| of a normal variable, in its standard deviations.
 const MEDIAN_OF_NORMAL: f64 = 0.6745;
 
-/// Deviation that is always allowed, in metres: what arithmetic leaves.
+/// Deviation that is always allowed, in meters: what arithmetic leaves.
 const ROUNDING: f64 = 1e-9;
 
 /// Rounds of fitting the plane to the distances that are on it.
@@ -48,7 +48,7 @@ impl Bare {
         }
     }
 
-    /// Bare distance of a beam that meets a facet, in metres: as measured, or where its facet's plane is if that was
+    /// Bare distance of a beam that meets a facet, in meters: as measured, or where its facet's plane is if that was
     /// plainly something else; `None` where nothing was measured.
     pub(crate) fn distance(&self, session: &Session, facet: &str, beam: usize) -> Option<f64> {
         let measured = session.bare_structure.distance(beam)?;

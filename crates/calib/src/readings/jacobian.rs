@@ -12,11 +12,11 @@ pub const DIFFERENCE_STEP: f64 = 1e-3;
 /// Derivatives of a range with respect to the three numbers of a deflection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RangeGradient {
-    /// ∂r/∂θ_a, in metres per radian.
+    /// ∂r/∂θ_a, in meters per radian.
     pub azimuth: f64,
-    /// ∂r/∂φ, in metres per radian.
+    /// ∂r/∂φ, in meters per radian.
     pub elevation: f64,
-    /// ∂r/∂d, in metres per metre.
+    /// ∂r/∂d, in meters per meter.
     pub distance: f64,
 }
 
@@ -47,11 +47,11 @@ pub fn analytic(deflection: &Deflection, beam_azimuth: f64, board: &BoardPlane) 
 /// A deflected beam with its derivatives, to be held against several boards.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OutgoingRay {
-    /// P_L1, in the sensor frame, in metres.
+    /// P_L1, in the sensor frame, in meters.
     pub origin: Point3<f64>,
     /// v.
     pub direction: Unit<Vector3<f64>>,
-    /// u, the direction before the mirror, and d, in metres.
+    /// u, the direction before the mirror, and d, in meters.
     base: Unit<Vector3<f64>>,
     distance: f64,
     /// ∂v/∂θ_a and ∂v/∂φ.
@@ -95,7 +95,7 @@ impl OutgoingRay {
         self.by_elevation.z
     }
 
-    /// The range r to a board, Eq. (6), in metres; `None` if the ray does not meet its plane.
+    /// The range r to a board, Eq. (6), in meters; `None` if the ray does not meet its plane.
     pub fn range(&self, board: &BoardPlane) -> Option<f64> {
         Some(self.distance + board.distance_along(&self.origin, &self.direction)?)
     }

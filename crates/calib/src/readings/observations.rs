@@ -5,7 +5,7 @@ use nalgebra::{Point3, Unit, Vector3};
 
 /// How many spot radii (1/e²) have to lie on a board for a reading to be of that board alone.
 ///
-/// One and a half: 0.13 % of a Gaussian beam is left outside an edge, a millimetre against a wall one metre behind.
+/// One and a half: 0.13 % of a Gaussian beam is left outside an edge, a millimeter against a wall one meter behind.
 pub const SPOT_RADII: f64 = 1.5;
 
 /// The board of one pose, in the sensor frame.
@@ -17,7 +17,7 @@ pub struct BoardInSensor {
     pub plane: BoardPlane,
     /// Its outline.
     pub outline: Rectangle,
-    /// Its markers by the template, in the sensor frame, in metres.
+    /// Its markers by the template, in the sensor frame, in meters.
     pub markers: Vec<Point3<f64>>,
     /// Its color.
     pub color: String,
@@ -26,7 +26,7 @@ pub struct BoardInSensor {
 /// Where a ray meets the plane of a board.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// Distance along the ray, in metres.
+    /// Distance along the ray, in meters.
     pub distance: f64,
     /// The point in the sensor frame.
     pub point: Point3<f64>,
@@ -42,11 +42,11 @@ pub struct Hit {
 pub struct BoardView<'a> {
     /// Plane (c, n) of the board in the sensor frame.
     pub plane: BoardPlane,
-    /// The board's markers by the template, in the sensor frame, in metres.
+    /// The board's markers by the template, in the sensor frame, in meters.
     pub markers: &'a [Point3<f64>],
     /// Color of the board.
     pub color: &'a str,
-    /// White noise of one reading, 1σ, in metres.
+    /// White noise of one reading, 1σ, in meters.
     pub noise_sd: f64,
     /// Readings of it.
     pub count: usize,
@@ -96,7 +96,7 @@ impl BoardInSensor {
         })
     }
 
-    /// Whether the board holds a spot of the given radius (measured across the beam, in metres) and `margin` more.
+    /// Whether the board holds a spot of the given radius (measured across the beam, in meters) and `margin` more.
     ///
     /// On a board met at a slope the round spot is an ellipse; its half extent along x is radius·√(1 + slope_x²).
     pub fn holds(&self, hit: &Hit, spot_radius: f64, margin: f64) -> bool {

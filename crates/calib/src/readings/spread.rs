@@ -2,7 +2,7 @@
 
 use catoptric_model::Summary;
 
-/// Spread that whole-millimetre readings and unstated color may add to any noise, in metres.
+/// Spread that whole-millimeter readings and unstated color may add to any noise, in meters.
 const SPREAD_FLOOR: f64 = 2e-3;
 
 /// How much noisier than believed a good surface may be: black paper against white is a factor 1.5 in Table 4.
@@ -11,7 +11,7 @@ const SURFACE_FACTOR: f64 = 2.0;
 /// Standard errors that a sample standard deviation may lie off its mean before it counts as different.
 const SPREAD_SIGMAS: f64 = 5.0;
 
-/// Largest sample standard deviation that is still believed to be noise, in metres.
+/// Largest sample standard deviation that is still believed to be noise, in meters.
 ///
 /// The standard error of a sample standard deviation is σ/√(2(N − 1)).
 pub(crate) fn largest_spread(believed_sd: f64, count: usize) -> f64 {
@@ -23,7 +23,7 @@ pub(crate) fn is_abnormal(summary: &Summary, believed_sd: f64) -> bool {
     summary.count > 1 && summary.sd > largest_spread(believed_sd, summary.count)
 }
 
-/// Noise of one reading, in metres: the believed one, or the observed one where it is plainly larger.
+/// Noise of one reading, in meters: the believed one, or the observed one where it is plainly larger.
 pub(crate) fn noise_sd(summary: &Summary, believed_sd: f64) -> f64 {
     // Always taking the larger of two would call noise larger than it is whenever the sample happens to be so.
     let chance = believed_sd * (1.0 + 3.0 * relative_error(summary.count));

@@ -6,10 +6,10 @@ use crate::readings::spread;
 use catoptric_model::{PoseKind, Summary, beam};
 use nalgebra::Point3;
 
-/// A reading this near is of the structure around the sensor, in metres, wherever the mirrors are.
+/// A reading this near is of the structure around the sensor, in meters, wherever the mirrors are.
 const STRUCTURE_RANGE: f64 = 0.12;
 
-/// How far behind the farthest mirror point a reading is still of the structure, in metres.
+/// How far behind the farthest mirror point a reading is still of the structure, in meters.
 const STRUCTURE_DEPTH: f64 = 0.03;
 
 impl Screen<'_> {
@@ -66,7 +66,7 @@ impl Screen<'_> {
         None
     }
 
-    /// Range below which a reading is of the structure, in metres.
+    /// Range below which a reading is of the structure, in meters.
     fn structure_limit(&self, beam: usize, facets: &[usize]) -> f64 {
         let session = &self.dataset.session;
         let u = beam::direction(azimuth(session, beam));

@@ -4,7 +4,7 @@ use catoptric_model::session::NominalFacet;
 
 /// How many beams beyond the drawn ones a facet as built may serve.
 ///
-/// At 65 mm a millimetre is 3.5 beams: an optical center a millimetre off in its housing, a facet half a millimetre and
+/// At 65 mm a millimeter is 3.5 beams: an optical center a millimeter off in its housing, a facet half a millimeter and
 /// 1° off in its frame, and posts that hide an edge on the drawing add up to several. Being generous costs nothing:
 /// a beam that no mirror deflects is known by its readings, not by this.
 const EDGE_BEAMS: usize = 10;

@@ -16,7 +16,7 @@ const AGREEMENT_SIGMAS: f64 = 6.0;
 
 /// What an undeflected beam should have read in one stretch.
 enum Expected {
-    /// This range, give or take this much, both in metres.
+    /// This range, give or take this much, both in meters.
     Range(f64, f64),
     /// An edge lies in the beam: nothing can be said.
     Unclear,
@@ -32,7 +32,7 @@ pub(super) struct Tally {
     /// Stretches with a board before a mirror that may deflect it.
     own: usize,
     own_agreeing: usize,
-    /// Expected and found range, in metres, of the stretch with the largest disagreement, and its number.
+    /// Expected and found range, in meters, of the stretch with the largest disagreement, and its number.
     pub(super) worst: Option<(f64, f64, usize)>,
     worst_off: f64,
 }

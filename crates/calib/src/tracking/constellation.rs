@@ -4,7 +4,7 @@ use super::body::{Body, limit, solved};
 use catoptric_model::{Pose, Watched};
 use nalgebra::{Point3, Vector3};
 
-/// What a template is good for, in metres: rulers, glue.
+/// What a template is good for, in meters: rulers, glue.
 const TEMPLATE_SD: f64 = 1e-4;
 
 /// Errors of a marker are believed with one number for three axes; all of the variance may be along one of them.
@@ -19,14 +19,14 @@ const SAME_NORMAL: f64 = 0.02;
 /// Markers that do not stand as the template says.
 pub(super) struct Misfit {
     cause: Cause,
-    /// Root mean square of what is left per marker, in metres.
+    /// Root mean square of what is left per marker, in meters.
     rms: f64,
 }
 
 enum Cause {
     /// Labels that are exchanged, every pair that explains it, and the pose then.
     Exchange(Vec<[String; 2]>, Pose),
-    /// One label that is on something else, and how far from its marker, in metres.
+    /// One label that is on something else, and how far from its marker, in meters.
     Stray(String, f64),
     Unknown,
 }

@@ -5,10 +5,10 @@ use catoptric_model::tracking::MeanMarker;
 use catoptric_model::{PoseRecord, Session, Watched};
 use nalgebra::{Point3, Vector3};
 
-/// A mean place of a marker may wander by this much along one axis without the body having moved, in metres.
+/// A mean place of a marker may wander by this much along one axis without the body having moved, in meters.
 const WANDER: f64 = 3e-4;
 
-/// A change of level that is always taken for that of a sensor which is not quite steady, in metres.
+/// A change of level that is always taken for that of a sensor which is not quite steady, in meters.
 const LEVEL_FLOOR: f64 = 3e-3;
 
 /// Standard errors, and drifts, that a level may change by.
@@ -22,7 +22,7 @@ const LEAST_BEAMS: usize = 5;
 
 /// How a body moved.
 pub(super) struct Movement {
-    /// Shift of the middle of its markers, in metres.
+    /// Shift of the middle of its markers, in meters.
     shift: f64,
     /// Turn, in radians.
     turn: f64,

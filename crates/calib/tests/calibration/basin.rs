@@ -32,7 +32,7 @@ fn boards(truth: &Deflection, draw: &mut Draw) -> Vec<BoardPlane> {
         .collect()
 }
 
-/// How many of the elements end at the truth from a start `angle` away, with so much noise of each mean in metres.
+/// How many of the elements end at the truth from a start `angle` away, with so much noise of each mean in meters.
 fn found(noise: f64, angle: f64, closed_form: bool) -> usize {
     let mut draw = Draw(7);
     let bias = RangeBias::default();
@@ -81,7 +81,7 @@ fn found(noise: f64, angle: f64, closed_form: bool) -> usize {
         };
         let near = |end: &Deflection| {
             let off = beam::angle_between(&end.exit_direction(AZIMUTH), &v);
-            // Random boards at noise of a millimetre leave up to a degree now and then.
+            // Random boards at noise of a millimeter leave up to a degree now and then.
             off < if noise > 0.0 { 0.05 } else { 1e-9 }
         };
         let solution = solve::batch(&element, &start, &Options::default());

@@ -89,7 +89,7 @@ fn recursion_ends_at_the_batch_s_answer() {
 
 #[test]
 fn a_wide_facet_is_solved_group_by_group_on_the_boards_that_are_hit() {
-    // Boards of half a metre, seen by a third of the fan each: most beams miss most boards and read the wall there.
+    // Boards of half a meter, seen by a third of the fan each: most beams miss most boards and read the wall there.
     let world = World {
         served: vec![[480, 600]],
         groups: 3,

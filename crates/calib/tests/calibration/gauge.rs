@@ -64,7 +64,7 @@ fn columns() -> [Unknowns; 5] {
             ..none
         },
         Unknowns {
-            per_metre: true,
+            per_meter: true,
             ..constant
         },
         Unknowns {
@@ -148,7 +148,7 @@ fn sets_of_boards_determine_what_the_table_says() {
             for open in &found.open {
                 // Nothing finite along it: every unknown that takes part is open.
                 for (unknown, _) in open.terms.iter().filter(|t| t.1.abs() > 0.1) {
-                    assert_eq!(found.per_metre(unknown), None, "{name}: {unknown}");
+                    assert_eq!(found.per_meter(unknown), None, "{name}: {unknown}");
                 }
             }
         }
@@ -288,7 +288,7 @@ fn the_sensor_s_place_is_determined_as_the_table_says() {
     let all = Unknowns {
         mounting: true,
         constant: true,
-        per_metre: true,
+        per_meter: true,
         incidence: true,
         distance: false,
     };

@@ -82,7 +82,7 @@ pub(crate) struct Made {
 }
 
 impl World {
-    /// The whole scanner, no noise: mounting off by 1°, facets off by 1° and half a millimetre.
+    /// The whole scanner, no noise: mounting off by 1°, facets off by 1° and half a millimeter.
     pub(crate) fn exact() -> Self {
         Self {
             seed: 1,

@@ -17,11 +17,11 @@ use nalgebra::{DMatrix, DVector, Dyn, Matrix2, Matrix6, OMatrix, RowDVector, Row
 pub(crate) use plane::PlaneFit;
 use plane::plane_variance;
 
-/// Error that keeps Σ invertible where none is believed in, in metres.
+/// Error that keeps Σ invertible where none is believed in, in meters.
 const LEAST_ERROR: f64 = 1e-6;
 
 /// How well the mounting of the sensor is known: small motions of the sensor about its own axes, three shifts in
-/// metres, three turns in radians.
+/// meters, three turns in radians.
 ///
 /// The mounting was found with the same range biases that the elements are found with. The two errors are therefore
 /// correlated, and partly cancel; `common` carries that.
@@ -36,10 +36,10 @@ pub struct MountUncertainty {
 /// The linearized measurement of one element and its error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Budget {
-    /// H: one row (∂r/∂θ_a, ∂r/∂φ) per board, in metres per radian.
+    /// H: one row (∂r/∂θ_a, ∂r/∂φ) per board, in meters per radian.
     #[doc(alias = "H")]
     pub jacobian: DMatrix<f64>,
-    /// Σ: covariance of z − r over the boards, in square metres.
+    /// Σ: covariance of z − r over the boards, in square meters.
     #[doc(alias = "Sigma")]
     pub covariance: DMatrix<f64>,
     /// Readings of each board, the weights of the paper's unweighted sum over readings.
@@ -115,11 +115,11 @@ pub fn budget(
 
 /// What one board tells of one element, and what can be off about it.
 pub(crate) struct Sighting {
-    /// (∂r/∂θ_a, ∂r/∂φ), in metres per radian.
+    /// (∂r/∂θ_a, ∂r/∂φ), in meters per radian.
     pub(crate) angles: Vector2<f64>,
-    /// Variance of what is this board's alone: noise of the mean, drift, markers, in square metres.
+    /// Variance of what is this board's alone: noise of the mean, drift, markers, in square meters.
     pub(crate) own: f64,
-    /// Error by one standard deviation of each of the [`CommonErrors`], and last of d, in metres.
+    /// Error by one standard deviation of each of the [`CommonErrors`], and last of d, in meters.
     pub(crate) shared: RowDVector<f64>,
     /// ∂r/∂(motion of the sensor).
     pub(crate) mount: RowVector6<f64>,
@@ -177,7 +177,7 @@ impl Budget {
         Some(&gain * &self.covariance * gain.transpose())
     }
 
-    /// Covariance of the residuals that the estimate leaves, (I − HG)Σ(I − HG)ᵀ, in square metres.
+    /// Covariance of the residuals that the estimate leaves, (I − HG)Σ(I − HG)ᵀ, in square meters.
     pub fn residual_covariance(&self) -> Option<DMatrix<f64>> {
         let left = DMatrix::identity(self.counts.len(), self.counts.len()) - &self.jacobian * self.gain()?;
         Some(&left * &self.covariance * left.transpose())
@@ -192,14 +192,14 @@ impl Budget {
         to_2(&(self.jacobian.transpose() * solved)).try_inverse()
     }
 
-    /// Covariance of the residuals that the estimate of least variance leaves, Σ − H(HᵀΣ⁻¹H)⁻¹Hᵀ, in square metres.
+    /// Covariance of the residuals that the estimate of least variance leaves, Σ − H(HᵀΣ⁻¹H)⁻¹Hᵀ, in square meters.
     pub fn residual_covariance_at_bound(&self) -> Option<DMatrix<f64>> {
         Some(&self.covariance - &self.jacobian * self.bound()? * self.jacobian.transpose())
     }
 
-    /// HᵀΣ⁻¹H and HᵀΣ⁻¹e: what generalized least squares makes of residuals e, in metres.
+    /// HᵀΣ⁻¹H and HᵀΣ⁻¹e: what generalized least squares makes of residuals e, in meters.
     ///
-    /// Where all errors are believed to be absent, Σ has a micrometre added: data without errors satisfy any weights.
+    /// Where all errors are believed to be absent, Σ has a micrometer added: data without errors satisfy any weights.
     pub fn weighted(&self, residuals: &DVector<f64>) -> Option<(Matrix2<f64>, Vector2<f64>)> {
         let k = residuals.len();
         let floor = DMatrix::identity(k, k) * LEAST_ERROR.powi(2);

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Point3, Unit, Vector3};
 /// Part of the longest distance of a marker from the middle of all at which one gives a direction.
 const LONG_ENOUGH: f64 = 0.3;
 
-/// Variance of a tracked plane's height at a point of it, in square metres: σ²·aᵀ(Σ a_i a_iᵀ)⁻¹a, a = (1, x, y).
+/// Variance of a tracked plane's height at a point of it, in square meters: σ²·aᵀ(Σ a_i a_iᵀ)⁻¹a, a = (1, x, y).
 pub(super) fn plane_variance(
     markers: &[Point3<f64>],
     at: &Point3<f64>,
