@@ -37,7 +37,7 @@ pub mod tracking;
 pub use calibrate::{calibrate, calibrate_until};
 pub use calibrator::Calibrator;
 pub use characterize::characterize;
-pub use element::attempt::LEAST_BOARDS;
+pub use element::attempt::MIN_BOARDS;
 pub use element::{initial, recursive, solve};
 pub use error::CalibError;
 pub use joint::{TrueDirection, limit};

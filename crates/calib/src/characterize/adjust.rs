@@ -16,7 +16,7 @@ const STEP_TOLERANCE: f64 = 1e-12;
 const MAX_STEPS: usize = 30;
 
 /// A pivot of the scaled normal matrix below this is a combination that the boards leave open.
-const LEAST_PIVOT: f64 = 1e-10;
+const MIN_PIVOT: f64 = 1e-10;
 
 /// What is known of the mounting before a board is looked at.
 pub(super) struct Prior {
@@ -137,7 +137,7 @@ pub(super) fn adjust(
         let scaled = DMatrix::from_diagonal(&scale) * &normal * DMatrix::from_diagonal(&scale);
         let factor = scaled
             .cholesky()
-            .filter(|c| c.l_dirty().diagonal().iter().all(|p| p * p > LEAST_PIVOT))
+            .filter(|c| c.l_dirty().diagonal().iter().all(|p| p * p > MIN_PIVOT))
             .ok_or_else(|| fail("the boards do not tell the distance, angle and color errors apart"))?;
         let covariance = DMatrix::from_diagonal(&scale) * factor.inverse() * DMatrix::from_diagonal(&scale);
         let solution = &covariance * &right;

@@ -10,10 +10,10 @@ use std::collections::BTreeMap;
 const SAME_DISTANCE: f64 = 0.01;
 
 /// Least spread of cos θ_N over all boards that tells A_a: boards within 11° of normal incidence do not.
-const LEAST_COSINE_SPREAD: f64 = 0.02;
+const MIN_COSINE_SPREAD: f64 = 0.02;
 
 /// Least spread of a color's distances, in parts of the largest, that tells A_c.
-const LEAST_DISTANCE_SPREAD: f64 = 0.2;
+const MIN_DISTANCE_SPREAD: f64 = 0.2;
 
 /// How much nearer and farther than its center a board is read by the fan across it.
 const FAN_ROOM: f64 = 1.25;
@@ -115,7 +115,7 @@ impl Design {
         let (low, high) = cosines.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), c| {
             (l.min(c), h.max(c))
         });
-        if high - low >= LEAST_COSINE_SPREAD {
+        if high - low >= MIN_COSINE_SPREAD {
             self.terms.push(Term::AngleGain);
         } else {
             self.omit(
@@ -139,7 +139,7 @@ impl Design {
             self.colors.push(color.to_owned());
             let near = distances.iter().copied().fold(f64::INFINITY, f64::min);
             let far = distances.iter().copied().fold(0.0, f64::max);
-            if far - near >= LEAST_DISTANCE_SPREAD * far {
+            if far - near >= MIN_DISTANCE_SPREAD * far {
                 self.terms.push(Term::ColorSlope(index));
             } else {
                 self.omit("A_c", Some(color), "the color was seen at one distance only");
@@ -239,7 +239,7 @@ fn distance_nodes(rows: &[StretchRow]) -> Vec<f64> {
             distances().fold(0.0, f64::max) * FAN_ROOM,
         );
         let spread = far / FAN_ROOM - near * FAN_ROOM;
-        return if spread >= LEAST_DISTANCE_SPREAD * far {
+        return if spread >= MIN_DISTANCE_SPREAD * far {
             vec![near, far]
         } else {
             Vec::new()

@@ -1,4 +1,4 @@
-//! What calibrating has to improve on: the drawing, with nothing measured but d.
+//! The baseline that a calibration has to improve on: the drawing, with nothing measured but d.
 
 use crate::element::solve::BareDistance;
 use crate::readings::bare::Bare;
@@ -6,7 +6,8 @@ use crate::readings::observations::azimuth;
 use crate::screen::Candidate;
 use catoptric_model::{BeamEstimate, MirrorPlane, Session, Status, beam};
 
-/// What the drawing says of every element that a mirror may deflect; nobody knows how far it is off.
+/// The drawing's angles of every element that a mirror may deflect, without a covariance, because their error is
+/// unknown.
 pub(crate) fn as_drawn(
     session: &Session,
     bare: &Bare,

@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector6};
 use std::collections::BTreeSet;
 
 /// Fraction of a residual's variance that the estimate must leave for the residual to count as evidence.
-const LEAST_LEFT: f64 = 1e-6;
+const MIN_LEFT: f64 = 1e-6;
 
 /// One element in the joint solution.
 pub(super) struct Answer {
@@ -51,7 +51,7 @@ impl Seen {
     /// Residual over its own standard deviation, which is below 1 because the estimate has absorbed part of the error.
     pub(super) fn studentized(&self) -> f64 {
         let left = 1.0 - self.fitted.unwrap_or(1.0);
-        if left > LEAST_LEFT {
+        if left > MIN_LEFT {
             self.residual / left.sqrt()
         } else {
             0.0
@@ -187,10 +187,10 @@ impl Joint<'_> {
         let rows = linear.y.len();
         let c = information.covariance_within(at.group, &by.shared, &by.own)?;
         let direction = c.fixed_view::<2, 2>(0, 0) + by.turn * by.inner * by.turn.transpose();
-        let departing = &linear.h * by.inner * linear.h.transpose();
+        let deviating = &linear.h * by.inner * linear.h.transpose();
         Some(Spread {
             direction: (direction + direction.transpose()) * 0.5,
-            fitted: (0..rows).map(|i| c[(2 + i, 2 + i)] + departing[(i, i)]).collect(),
+            fitted: (0..rows).map(|i| c[(2 + i, 2 + i)] + deviating[(i, i)]).collect(),
         })
     }
 

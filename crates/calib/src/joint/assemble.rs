@@ -21,7 +21,7 @@ use std::collections::BTreeMap;
 const MOTIONS: usize = 6;
 
 /// Smallest standard deviation, in meters: keeps every weight finite where no error is believed in.
-const LEAST_SD: f64 = 1e-6;
+const MIN_SD: f64 = 1e-6;
 
 /// An element that takes part: its facet, and the stretches whose boards it hits.
 pub(crate) struct Assigned {
@@ -125,7 +125,7 @@ pub(super) fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) 
             distances,
             thickness: session.bare_structure.mirror_thickness_mm * 1e-3,
             common: row / count,
-            sd: (variance / count).sqrt().max(LEAST_SD),
+            sd: (variance / count).sqrt().max(MIN_SD),
         }
     };
     let mut group = Group {
@@ -152,7 +152,7 @@ pub(super) fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) 
                 sights.push(Sight {
                     board: place,
                     mean: summary.mean,
-                    sd: sd.max(LEAST_SD),
+                    sd: sd.max(MIN_SD),
                     count: summary.count,
                 });
             }
@@ -180,7 +180,7 @@ pub(super) fn along([first, last]: [usize; 2], beam: usize) -> f64 {
 pub(super) fn direct_group(work: &Workspace, selected: &DirectBoard) -> Option<Group> {
     // Readings believed to be noise-free are not rounded either.
     let exact = work.dataset.session.believed.range_noise_sd_mm == 0.0;
-    let least = |sd: f64| if exact { LEAST_SD } else { sd.max(LEAST_SD) };
+    let least = |sd: f64| if exact { MIN_SD } else { sd.max(MIN_SD) };
     let elements = selected.rays.iter().map(|ray| Element {
         beam: ray.beam,
         azimuth: ray.azimuth,

@@ -21,7 +21,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 const DOUBTFUL: f64 = 1e-3;
 
 /// Effective number of parameters of one kind that the readings must determine before a size is reported.
-const LEAST_DETERMINED: f64 = 0.5;
+const MIN_DETERMINED: f64 = 0.5;
 
 /// Probability of a χ² at least as large.
 pub(super) fn chance(chi_squared: f64, freedom: f64) -> f64 {
@@ -41,11 +41,11 @@ impl Joint<'_> {
         let planeness = Planeness {
             figure_deg: self.flatness.figure.to_degrees(),
             departure_deg: self.flatness.tau.to_degrees(),
-            statistic: fit.departure_statistic,
+            statistic: fit.deviation_statistic,
             // Both sizes are at the boundary of their domain under the hypothesis: each is estimated as 0 half of the
             // time.
-            p_value: if fit.departure_statistic > 0.0 {
-                0.5 * chance(fit.departure_statistic, 1.0) + 0.25 * chance(fit.departure_statistic, 2.0)
+            p_value: if fit.deviation_statistic > 0.0 {
+                0.5 * chance(fit.deviation_statistic, 1.0) + 0.25 * chance(fit.deviation_statistic, 2.0)
             } else {
                 1.0
             },
@@ -80,7 +80,7 @@ impl Joint<'_> {
                 determined += 1.0 - c[(0, 0)].min(1.0);
             }
         }
-        let found = (determined > LEAST_DETERMINED && believed > 0.0)
+        let found = (determined > MIN_DETERMINED && believed > 0.0)
             .then(|| believed * (squares / determined).sqrt());
         VarianceComponent {
             name: name.to_owned(),
@@ -118,7 +118,7 @@ impl Joint<'_> {
         let means = seen().count();
         let taken: f64 = seen().filter_map(|s| s.fitted).sum();
         let left = means as f64 - taken;
-        let noise = (left > LEAST_DETERMINED).then(|| believed.range_noise_sd_mm * (squares / left).sqrt());
+        let noise = (left > MIN_DETERMINED).then(|| believed.range_noise_sd_mm * (squares / left).sqrt());
         vec![
             VarianceComponent {
                 name: "noise of a reading".to_owned(),

@@ -31,7 +31,7 @@ const TIE: f64 = 1e-6;
 pub(super) struct Fit {
     pub(super) solution: Solution,
     /// L(0, 0) − L(σ̂, τ̂), never negative.
-    pub(super) departure_statistic: f64,
+    pub(super) deviation_statistic: f64,
 }
 
 impl Joint<'_> {
@@ -75,23 +75,23 @@ impl Joint<'_> {
         };
         self.flatness = Flatness::default();
         let state = self.without_figure(self.solve(start, &rough)?.state);
-        let at_plane = self.with_departures(0.0, &state)?;
+        let at_plane = self.with_deviations(0.0, &state)?;
         let plane = at_plane.deviance(0.0);
         let (figure, none) = search(plane, |figure| Ok(at_plane.deviance(figure)))?;
         let (tau, least) = search(none, |tau| {
-            Ok(self.with_departures(tau, &state)?.deviance(figure))
+            Ok(self.with_deviations(tau, &state)?.deviance(figure))
         })?;
         let (figure, least) = if tau > 0.0 {
             // Deviations of single beams no longer pass for a figure.
-            let departing = self.with_departures(tau, &state)?;
-            search(departing.deviance(0.0), |figure| Ok(departing.deviance(figure)))?
+            let deviating = self.with_deviations(tau, &state)?;
+            search(deviating.deviance(0.0), |figure| Ok(deviating.deviance(figure)))?
         } else {
             (figure, least)
         };
         self.flatness = Flatness { figure, tau };
         Ok(Fit {
             solution: self.solve(state, &exact)?,
-            departure_statistic: (plane - least).max(0.0),
+            deviation_statistic: (plane - least).max(0.0),
         })
     }
 
@@ -106,7 +106,7 @@ impl Joint<'_> {
     }
 
     /// Linearizes the problem with deviations τ at a state with flat facets, for any σ.
-    fn with_departures(&mut self, tau: f64, state: &State) -> Result<Departing, ProblemError> {
+    fn with_deviations(&mut self, tau: f64, state: &State) -> Result<Deviating, ProblemError> {
         // Without a figure, its σ is only a factor of its columns.
         self.flatness = Flatness { figure: 1.0, tau };
         let mut figures = DVector::zeros(state.dimension());
@@ -116,7 +116,7 @@ impl Joint<'_> {
                 figures.rows_mut(first, FIGURE).fill(1.0);
             }
         }
-        Ok(Departing {
+        Ok(Deviating {
             reduced: Reduced::new(&self.without_figures(&*self), state)?,
             figures,
         })
@@ -134,13 +134,13 @@ impl Joint<'_> {
 }
 
 /// The linearized problem for one τ.
-struct Departing {
+struct Deviating {
     reduced: Reduced,
     /// 1 for each parameter of a figure, 0 for all others.
     figures: DVector<f64>,
 }
 
-impl Departing {
+impl Deviating {
     /// L(σ, τ) of the linearized problem.
     fn deviance(&self, figure: f64) -> f64 {
         let factors = self.figures.map(|is| if is > 0.0 { figure } else { 1.0 });

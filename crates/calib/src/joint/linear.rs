@@ -10,7 +10,7 @@ use catoptric_model::frame;
 use nalgebra::{DVector, Dyn, Matrix2, OMatrix, Point3, U2, Unit, Vector2, Vector3};
 
 /// Maximum number of iterations for a beam's own deviation, and the change that ends them, in radians.
-const DEPARTURE_ROUNDS: usize = 8;
+const DEVIATION_ROUNDS: usize = 8;
 const SETTLED: f64 = 1e-14;
 
 /// An element linearized: prediction errors, and derivatives of the predicted range.
@@ -113,13 +113,13 @@ impl Joint<'_> {
         let (across, up) = frame::tangent_basis(&fan.v);
         let base = [across.into_inner(), up.into_inner()];
         let rows = element.sights.len();
-        let tau = self.departure(element);
+        let tau = self.deviation(element);
         let mut delta = Vector2::<f64>::zeros();
         let mut y = DVector::zeros(rows);
         let mut h = OMatrix::<f64, Dyn, U2>::zeros(rows);
         let (mut v, mut axes) = (fan.v, base);
         let mut sightlines = vec![Sightline::default(); rows];
-        for round in 0..DEPARTURE_ROUNDS {
+        for round in 0..DEVIATION_ROUNDS {
             let q: Vector3<f64> = fan.v.into_inner() + base[0] * delta.x + base[1] * delta.y;
             let length = q.norm();
             v = Unit::new_unchecked(q / length);
@@ -154,7 +154,7 @@ impl Joint<'_> {
             let next = inner.try_inverse()? * h.tr_mul(&y) * (tau * tau);
             let change = (next - delta).norm();
             delta = next;
-            if change < SETTLED || round + 1 == DEPARTURE_ROUNDS {
+            if change < SETTLED || round + 1 == DEVIATION_ROUNDS {
                 break;
             }
         }

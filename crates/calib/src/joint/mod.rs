@@ -127,7 +127,7 @@ fn solve(
     mounting: Mounting,
     mean: &DVector<f64>,
     planes: &[MirrorPlane],
-    departing: bool,
+    deviating: bool,
 ) -> Result<Outcome, ProblemError> {
     let session = &work.dataset.session;
     let (mut joint, start) = begin(work, groups, mounting, mean, planes);
@@ -135,10 +135,10 @@ fn solve(
     let rigid = |joint: &Joint, from: State| {
         joint.solve(from, &exact).map(|solution| Fit {
             solution,
-            departure_statistic: 0.0,
+            deviation_statistic: 0.0,
         })
     };
-    let mut fit = if departing {
+    let mut fit = if deviating {
         joint.fit(start)?
     } else {
         rigid(&joint, start)?
@@ -157,14 +157,14 @@ fn solve(
         left_out = true;
         fit = rigid(&joint, fit.solution.state)?;
     }
-    if departing && left_out {
+    if deviating && left_out {
         // The elements left out had a share in the estimated flatness.
         fit = joint.fit(fit.solution.state)?;
     }
     let answers = joint.answers(&fit.solution);
     let solution = &fit.solution;
     let bent = joint.bent(solution);
-    let mut assessment = departing.then(|| joint.assess(session, &fit, &answers));
+    let mut assessment = deviating.then(|| joint.assess(session, &fit, &answers));
     if let Some(assessment) = &mut assessment
         && work.options.cross_validation
     {
@@ -180,8 +180,8 @@ fn solve(
             })
             .collect(),
         facets: joint.facets(solution, &names, &bent),
-        mount: if departing { joint.mount(solution) } else { None },
-        bias: if departing {
+        mount: if deviating { joint.mount(solution) } else { None },
+        bias: if deviating {
             joint.corrected_bias(solution)
         } else {
             None

@@ -62,7 +62,7 @@ impl Joint<'_> {
     }
 
     /// 1σ of an element's deviation from its facet's plane; 0 for an undeflected beam.
-    pub(super) fn departure(&self, element: &Element) -> f64 {
+    pub(super) fn deviation(&self, element: &Element) -> f64 {
         if element.facet.is_some() {
             self.flatness.tau
         } else {

@@ -13,7 +13,7 @@ struct At {
     /// If requested.
     jacobian: Option<GroupJacobian>,
     /// Σ ln det(I + τ²HᵀH) over its elements.
-    log_departures: f64,
+    log_deviations: f64,
 }
 
 impl Joint<'_> {
@@ -31,15 +31,15 @@ impl Joint<'_> {
             shared: DMatrix::zeros(count, self.shared_dimension()),
             own: DMatrix::zeros(count, group.own_dimension()),
         });
-        let (mut row, mut log_departures) = (0, 0.0);
+        let (mut row, mut log_deviations) = (0, 0.0);
         for element in &group.elements {
             let linear = self.element(element, shared, own, &boards)?;
             let rows = row..row + element.sights.len();
-            let weight = linear.weight(self.departure(element));
+            let weight = linear.weight(self.deviation(element));
             residuals.as_mut_slice()[rows.clone()].copy_from_slice((-&linear.y).as_slice());
             if let Some(weight) = &weight {
                 weight.apply(&mut residuals.as_mut_slice()[rows.clone()]);
-                log_departures += weight.log_determinant;
+                log_deviations += weight.log_determinant;
             }
             if let Some(jacobian) = &mut jacobian {
                 self.differentiate(group, element, &boards, &linear, jacobian, row);
@@ -73,7 +73,7 @@ impl Joint<'_> {
         Some(At {
             residuals,
             jacobian,
-            log_departures,
+            log_deviations,
         })
     }
 
@@ -117,7 +117,7 @@ impl GroupedProblem for Joint<'_> {
         Some(GroupRows {
             residuals: at.residuals,
             jacobian: at.jacobian?,
-            log_covariance: at.log_departures,
+            log_covariance: at.log_deviations,
         })
     }
 }

@@ -11,7 +11,7 @@ use nalgebra::{Matrix2, Vector2};
 pub const WEAKEST_SD: f64 = 3.0 * std::f64::consts::PI / 180.0;
 
 /// Range error that is always reckoned with here, in meters: no belief makes a scanner better than a millimeter.
-const LEAST_RANGE_ERROR: f64 = 1e-3;
+const MIN_RANGE_ERROR: f64 = 1e-3;
 
 /// Ratio of levers below which the boards share a tilt; above it, they all stand face-on.
 const ONE_SIDED: f64 = 0.3;
@@ -48,7 +48,7 @@ pub fn weakness(budget: &Budget, elevation: f64) -> Option<Weakness> {
             .max(0.0)
             .sqrt()
     });
-    let sd = believed.max(LEAST_RANGE_ERROR / short);
+    let sd = believed.max(MIN_RANGE_ERROR / short);
     if sd <= WEAKEST_SD {
         return None;
     }

@@ -12,7 +12,7 @@ pub struct Linearized {
     /// The step to the linear problem's minimum: Gauss and Newton's.
     pub step: DVector<f64>,
     /// ‖f + J·step‖².
-    pub least_sum_of_squares: f64,
+    pub min_sum_of_squares: f64,
     /// ln det of the covariance that the residuals were weighed by; see [`GroupRows`](super::GroupRows).
     pub log_covariance: f64,
     /// JᵀJ at the state.
@@ -23,7 +23,7 @@ impl Linearized {
     /// −2 ln of the restricted likelihood, up to a constant: of the beliefs that the residuals are weighed by, with all
     /// parameters integrated out.
     pub fn deviance(&self) -> f64 {
-        self.least_sum_of_squares + self.information.log_determinant() + self.log_covariance
+        self.min_sum_of_squares + self.information.log_determinant() + self.log_covariance
     }
 }
 
@@ -101,7 +101,7 @@ impl Reduced {
         let step = linear.solve();
         Linearized {
             // Perpendicular to what the step explains.
-            least_sum_of_squares: (self.sum_of_squares - linear.image_norm(&step).powi(2)).max(0.0),
+            min_sum_of_squares: (self.sum_of_squares - linear.image_norm(&step).powi(2)).max(0.0),
             step,
             log_covariance: self.log_covariance,
             information: Information::new(linear),

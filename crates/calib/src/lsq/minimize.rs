@@ -15,7 +15,7 @@ use rayon::prelude::*;
 const STEP_THRESHOLD: f64 = 1e-14;
 
 /// Least part of the promised reduction that a step must bring.
-const LEAST_GAIN: f64 = 1e-4;
+const MIN_GAIN: f64 = 1e-4;
 
 /// When to stop, and what counts as dependent.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -219,7 +219,7 @@ impl<'a, P: GroupedProblem> Search<'a, P> {
                     radius = 2.0 * length;
                     damping *= 0.5;
                 }
-                let taken = ratio >= LEAST_GAIN;
+                let taken = ratio >= MIN_GAIN;
                 if let (true, Some(residuals)) = (taken, outcome) {
                     self.state = next;
                     self.residuals = residuals;

@@ -12,7 +12,7 @@ use crate::judge::levers::libm_cos;
 use nalgebra::DVector;
 
 /// Smallest variance, in square meters: that of one micrometer. Keeps Σ invertible where no error is believed in.
-const LEAST_VARIANCE: f64 = 1e-12;
+const MIN_VARIANCE: f64 = 1e-12;
 
 pub(super) const ROW: Row = Row {
     name: "beam-gls",
@@ -40,7 +40,7 @@ fn generalized(task: &Task) -> Option<Solution> {
         let (information, right) = budget.weighted(&residuals)?;
         // Per board and in square meters, so that the square root is a lever arm.
         let boards = residuals.len() as f64;
-        let unit = (budget.covariance.trace() / boards).max(LEAST_VARIANCE) / boards;
+        let unit = (budget.covariance.trace() / boards).max(MIN_VARIANCE) / boards;
         let step = determined_step(&(information * unit), &(right * unit), libm_cos(at.elevation));
         at = element.place(at.azimuth + step.x, at.elevation + step.y);
         if step.norm() < options.step_tolerance_rad {

@@ -15,13 +15,13 @@ use nalgebra::{DMatrix, DVector, Matrix4, Point3};
 const CLEAR_OF_FACETS: usize = 12;
 
 /// Noise of a mean below which readings are not weighted further, in meters: whole millimeters, 1/√12 mm.
-const LEAST_NOISE: f64 = 2.9e-4;
+const MIN_NOISE: f64 = 2.9e-4;
 
 /// Step of the reported ranges, in meters.
 const ROUNDING_STEP: f64 = 1e-3;
 
 /// A board read on fewer beams than this does not tell its own plane from another.
-const LEAST_RAYS: usize = 3;
+const MIN_RAYS: usize = 3;
 
 /// Standard deviations within which a residual is taken as the board's own.
 const GATE_SIGMAS: f64 = 6.0;
@@ -69,7 +69,7 @@ impl DirectBoard {
         for ray in &mut self.rays {
             let of_mean = variance / summaries[ray.beam].count as f64;
             ray.variance = if rounded {
-                of_mean.max(LEAST_NOISE * LEAST_NOISE)
+                of_mean.max(MIN_NOISE * MIN_NOISE)
             } else {
                 of_mean
             };
@@ -204,7 +204,7 @@ impl<'a> Selector<'a> {
                     .filter(|b| self.clear[*b] && is_within(record, *b))
                     .filter_map(|b| self.ray(&board, b, &self.summaries[pose][b], stage))
                     .collect();
-                (rays.len() >= LEAST_RAYS).then_some(DirectBoard { pose, rays })
+                (rays.len() >= MIN_RAYS).then_some(DirectBoard { pose, rays })
             })
             .collect()
     }
@@ -229,7 +229,7 @@ impl<'a> Selector<'a> {
         let tan = (1.0 / (cos_incidence * cos_incidence) - 1.0).max(0.0).sqrt();
         let variance = (spread::noise_sd(summary, noise).powi(2) / summary.count as f64
             + (1e-3 * believed.element_sd_mm).powi(2))
-        .max(LEAST_NOISE * LEAST_NOISE);
+        .max(MIN_NOISE * MIN_NOISE);
         let marker = 1e-3 * believed.marker_sd_mm / cos_incidence;
         let common = self.common.row(hit.distance, cos_incidence, &board.color);
         let sd = (variance + (1e-3 * believed.drift_sd_mm).powi(2) + marker * marker + common.norm_squared())

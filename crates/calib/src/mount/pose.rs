@@ -26,7 +26,7 @@ const MAX_STEPS: usize = 50;
 const MAX_ROUNDS: usize = 12;
 
 /// Smallest tolerance taken as a prior, in radians and meters: a drawing is never better than 0.1° and 1 mm.
-const LEAST_TOLERANCE: [f64; 2] = [1.745e-3, 1e-3];
+const MIN_TOLERANCE: [f64; 2] = [1.745e-3, 1e-3];
 
 /// Tolerance, in radians and meters, that stands for none: a mounting that was measured and is known.
 const NO_TOLERANCE: f64 = 1e-9;
@@ -204,10 +204,10 @@ impl Prior {
         let least = |sd: f64, least: f64| if sd == 0.0 { NO_TOLERANCE } else { sd.max(least) };
         let shift = tolerance
             .translation_sd_mm
-            .map(|mm| least(mm * 1e-3, LEAST_TOLERANCE[1]));
+            .map(|mm| least(mm * 1e-3, MIN_TOLERANCE[1]));
         let turn = tolerance
             .rotation_sd_deg
-            .map(|deg| least(deg.to_radians(), LEAST_TOLERANCE[0]));
+            .map(|deg| least(deg.to_radians(), MIN_TOLERANCE[0]));
         Self {
             nominal: *nominal,
             sd: Vector6::new(shift[0], shift[1], shift[2], turn[0], turn[1], turn[2]),

@@ -9,7 +9,7 @@ use super::candidates::{Candidate, Site, candidates};
 use super::request::{Criterion, Request};
 use super::situation::{Element, Fan, Situation};
 use super::words;
-use crate::element::attempt::LEAST_BOARDS;
+use crate::element::attempt::MIN_BOARDS;
 use crate::error::CalibError;
 use crate::judge::common::CommonErrors;
 use crate::judge::covariance::{self, MountUncertainty, Sighting};
@@ -23,16 +23,16 @@ use nalgebra::{DMatrix, DVector, Matrix6};
 const PRIOR_SD: f64 = std::f64::consts::PI / 6.0;
 
 /// Variance that stands for none, in square meters: a micrometer's.
-const LEAST_VARIANCE: f64 = 1e-12;
+const MIN_VARIANCE: f64 = 1e-12;
 
 /// Cost of each board that an element lacks, as log det: more than any board between candidates makes.
 const LACKING_LOG_DET: f64 = 10.0;
 
 /// Relative gain below which an exchange is none.
-const LEAST_GAIN: f64 = 1e-9;
+const MIN_GAIN: f64 = 1e-9;
 
 /// Rounds of exchanges, at most; five are usual.
-const MOST_ROUNDS: usize = 50;
+const MAX_ROUNDS: usize = 50;
 
 /// Rounds of looking around the chosen poses, each at half the distance of the one before.
 const REFINEMENTS: i32 = 4;
@@ -175,7 +175,7 @@ impl<'a> Designer<'a> {
     /// Exchanges chosen candidates for others until no exchange is better.
     fn exchange(&self, chosen: &mut [usize]) {
         let mut cost = self.cost(chosen);
-        for _ in 0..MOST_ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             let mut changed = false;
             for place in 0..chosen.len() {
                 let others: Vec<usize> = (0..chosen.len())
@@ -185,7 +185,7 @@ impl<'a> Designer<'a> {
                 let without = self.with(&others);
                 let (best, gain) = self.most_useful(&without, 0..self.len());
                 let better = self.total(&without) - gain;
-                if better < cost - LEAST_GAIN * cost.abs() {
+                if better < cost - MIN_GAIN * cost.abs() {
                     chosen[place] = best;
                     cost = better;
                     changed = true;
@@ -220,9 +220,9 @@ impl<'a> Designer<'a> {
                     .filter(|c| c.served.binary_search(&number).is_ok())
                     .map(|c| self.view(c)),
             );
-            if views.len() < LEAST_BOARDS {
+            if views.len() < MIN_BOARDS {
                 return Some(format!(
-                    "it reads {} of the {} boards before its facet; {LEAST_BOARDS} are needed",
+                    "it reads {} of the {} boards before its facet; {MIN_BOARDS} are needed",
                     views.len(),
                     self.fan.boards + chosen.len()
                 ));
@@ -278,7 +278,7 @@ impl<'a> Designer<'a> {
 
     /// Cost of one element by C₁₁, C₁₂ and C₂₂ of its angles, in rad².
     fn cost_of(&self, [a, b, c]: [f64; 3], boards: usize) -> f64 {
-        let lacking = LEAST_BOARDS.saturating_sub(boards) as f64;
+        let lacking = MIN_BOARDS.saturating_sub(boards) as f64;
         let squared_deg = (180.0 / std::f64::consts::PI).powi(2);
         match self.request.criterion {
             Criterion::A => (0.5 * (a + c) + lacking * WEAKEST_SD * WEAKEST_SD) * squared_deg,
@@ -355,7 +355,7 @@ impl<'a> Designer<'a> {
         Some(Row {
             element: number,
             g,
-            variance: seen.own.max(LEAST_VARIANCE),
+            variance: seen.own.max(MIN_VARIANCE),
         })
     }
 

@@ -12,7 +12,7 @@ use catoptric_model::session::NominalFacet;
 use nalgebra::{Matrix2, Vector2};
 
 /// Beams below which nothing can be said of a facet's plane.
-const LEAST_BEAMS: usize = 8;
+const MIN_BEAMS: usize = 8;
 
 /// Standard deviations from the plane, by the median of the deviations, beyond which a distance is of something else.
 const GATE_SIGMAS: f64 = 6.0;
@@ -73,7 +73,7 @@ impl Line {
     /// The plane of the least median deviation among those through two beams half a fan apart, then fitted to all
     /// distances that are on it.
     fn through(measured: &[(f64, f64)]) -> Option<Self> {
-        if measured.len() < LEAST_BEAMS {
+        if measured.len() < MIN_BEAMS {
             return None;
         }
         let half = measured.len() / 2;

@@ -15,10 +15,10 @@ const LEVEL_FLOOR: f64 = 3e-3;
 const LEVEL_SIGMAS: f64 = 5.0;
 
 /// Readings of a beam in each half of a stretch that its levels are compared by, at least.
-const LEAST_READINGS: usize = 5;
+const MIN_READINGS: usize = 5;
 
 /// Beams, at least, whose levels say something of a pose.
-const LEAST_BEAMS: usize = 5;
+const MIN_BEAMS: usize = 5;
 
 /// How a body moved.
 pub(super) struct Movement {
@@ -108,7 +108,7 @@ pub(super) fn of_readings(record: &PoseRecord, session: &Session) -> Option<Stri
             changes.push(change);
         }
     }
-    if beams < LEAST_BEAMS || 2 * changes.len() <= beams {
+    if beams < MIN_BEAMS || 2 * changes.len() <= beams {
         return None;
     }
     let count = changes.len();
@@ -128,5 +128,5 @@ fn level(readings: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
         mean += step / count as f64;
         squares += step * (r - mean);
     }
-    (count >= LEAST_READINGS).then(|| (mean, squares / ((count - 1) * count) as f64))
+    (count >= MIN_READINGS).then(|| (mean, squares / ((count - 1) * count) as f64))
 }

@@ -112,11 +112,11 @@ fn every_other_method_errs_as_much_as_it_says() {
 }
 
 /// Mean squared error along both axes, in square degrees, of every beam, over some seeds.
-fn mean_square(method: Method, departure_deg: f64) -> f64 {
+fn mean_square(method: Method, deviation_deg: f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for seed in 0..40 {
         let world = World {
-            departure_deg,
+            deviation_deg,
             ..World::noisy(70_000 + seed)
         };
         let made = world.make();
@@ -141,14 +141,14 @@ fn mean_square(method: Method, departure_deg: f64) -> f64 {
 #[test]
 fn joint_is_never_worse_than_each_element_by_itself() {
     let mut last = 0.0;
-    for departure_deg in [0.0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.3] {
+    for deviation_deg in [0.0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.3] {
         let (joint, alone) = (
-            mean_square(Method::Joint, departure_deg).sqrt(),
-            mean_square(Method::BeamGls, departure_deg).sqrt(),
+            mean_square(Method::Joint, deviation_deg).sqrt(),
+            mean_square(Method::BeamGls, deviation_deg).sqrt(),
         );
-        let rigid = mean_square(Method::Facet, departure_deg).sqrt();
+        let rigid = mean_square(Method::Facet, deviation_deg).sqrt();
         // A thousand errors each, of which those of one run are correlated: a hundredth is chance.
-        assert!(joint < 1.01 * alone, "{departure_deg}°: {joint} against {alone}");
+        assert!(joint < 1.01 * alone, "{deviation_deg}°: {joint} against {alone}");
         last = joint / rigid;
     }
     // A plane that is none is what the rigid facet pays for.

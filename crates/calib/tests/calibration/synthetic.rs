@@ -71,7 +71,7 @@ pub(crate) struct World {
     pub(crate) color_bias_sd_mm: f64,
     pub(crate) distance_sd_mm: f64,
     /// Departure of each beam from what its facet's plane gives it, 1σ along each axis, by chance.
-    pub(crate) departure_deg: f64,
+    pub(crate) deviation_deg: f64,
 }
 
 /// A dataset and what it was made from.
@@ -127,7 +127,7 @@ impl World {
             angle_gain_sd_mm: 0.0,
             color_bias_sd_mm: 0.0,
             distance_sd_mm: 0.0,
-            departure_deg: 0.0,
+            deviation_deg: 0.0,
         }
     }
 
@@ -181,13 +181,13 @@ impl World {
         self.mirror(facet, true).deflect(beam::direction(azimuth))
     }
 
-    fn departed(&self, azimuth: f64, deflection: &Deflection, draw: &mut Draw) -> Deflection {
-        if self.departure_deg == 0.0 {
+    fn deviated(&self, azimuth: f64, deflection: &Deflection, draw: &mut Draw) -> Deflection {
+        if self.deviation_deg == 0.0 {
             return *deflection;
         }
         let v = deflection.exit_direction(azimuth);
         let (across, up) = frame::tangent_basis(&v);
-        let mut by = || self.departure_deg.to_radians() * draw.normal();
+        let mut by = || self.deviation_deg.to_radians() * draw.normal();
         let exit = Unit::new_normalize(v.into_inner() + across.into_inner() * by() + up.into_inner() * by());
         Deflection::from_exit(azimuth, &exit, deflection.distance)
     }
@@ -241,7 +241,7 @@ impl World {
                 *bare = deflection.distance
                     + 1e-3 * self.thickness_mm / mirror.normal.dot(&u).abs()
                     + 1e-3 * self.distance_sd_mm * draw.normal();
-                deflections.insert(beam, self.departed(self.azimuth(beam), &deflection, &mut draw));
+                deflections.insert(beam, self.deviated(self.azimuth(beam), &deflection, &mut draw));
             }
         }
         let session = self.session(&nominal, believed, bare);

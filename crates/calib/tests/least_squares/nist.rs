@@ -10,7 +10,7 @@ use std::fs;
 use std::path::Path;
 
 /// Digits that must agree: −log₁₀ of the relative error.
-const LEAST_DIGITS: f64 = 6.0;
+const MIN_DIGITS: f64 = 6.0;
 
 const NAMES: [&str; 27] = [
     "Bennett5", "BoxBOD", "Chwirut1", "Chwirut2", "DanWood", "ENSO", "Eckerle4", "Gauss1", "Gauss2",
@@ -193,7 +193,7 @@ fn all_from_both_starts() {
                 "{}: {right_sum}",
                 problem.name
             );
-            let enough = right >= LEAST_DIGITS && right_deviations >= LEAST_DIGITS;
+            let enough = right >= MIN_DIGITS && right_deviations >= MIN_DIGITS;
             if enough && found.stop.converged() {
                 solved += 1;
             } else {

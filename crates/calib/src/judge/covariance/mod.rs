@@ -18,7 +18,7 @@ pub(crate) use plane::PlaneFit;
 use plane::plane_variance;
 
 /// Error that keeps Σ invertible where none is believed in, in meters.
-const LEAST_ERROR: f64 = 1e-6;
+const MIN_ERROR: f64 = 1e-6;
 
 /// How well the mounting of the sensor is known: small motions of the sensor about its own axes, three shifts in
 /// meters, three turns in radians.
@@ -202,7 +202,7 @@ impl Budget {
     /// Where all errors are believed to be absent, Σ has a micrometer added: data without errors satisfy any weights.
     pub fn weighted(&self, residuals: &DVector<f64>) -> Option<(Matrix2<f64>, Vector2<f64>)> {
         let k = residuals.len();
-        let floor = DMatrix::identity(k, k) * LEAST_ERROR.powi(2);
+        let floor = DMatrix::identity(k, k) * MIN_ERROR.powi(2);
         let factor = (&self.covariance + floor).cholesky()?;
         let weighted = factor.solve(&self.jacobian).transpose();
         let right = &weighted * residuals;
