@@ -180,7 +180,7 @@ pub(super) fn along([first, last]: [usize; 2], beam: usize) -> f64 {
 pub(super) fn direct_group(work: &Workspace, selected: &DirectBoard) -> Option<Group> {
     // Readings believed to be noise-free are not rounded either.
     let exact = work.dataset.session.believed.range_noise_sd_mm == 0.0;
-    let least = |sd: f64| if exact { MIN_SD } else { sd.max(MIN_SD) };
+    let floored = |sd: f64| if exact { MIN_SD } else { sd.max(MIN_SD) };
     let elements = selected.rays.iter().map(|ray| Element {
         beam: ray.beam,
         azimuth: ray.azimuth,
@@ -190,7 +190,7 @@ pub(super) fn direct_group(work: &Workspace, selected: &DirectBoard) -> Option<G
         sights: vec![Sight {
             board: 0,
             mean: ray.mean,
-            sd: least(ray.variance.sqrt()),
+            sd: floored(ray.variance.sqrt()),
             count: work.summaries[selected.pose][ray.beam].count,
         }],
     });

@@ -78,20 +78,20 @@ impl Joint<'_> {
         let at_plane = self.with_deviations(0.0, &state)?;
         let plane = at_plane.deviance(0.0);
         let (figure, none) = search(plane, |figure| Ok(at_plane.deviance(figure)))?;
-        let (tau, least) = search(none, |tau| {
+        let (tau, lowest) = search(none, |tau| {
             Ok(self.with_deviations(tau, &state)?.deviance(figure))
         })?;
-        let (figure, least) = if tau > 0.0 {
+        let (figure, lowest) = if tau > 0.0 {
             // Deviations of single beams no longer pass for a figure.
             let deviating = self.with_deviations(tau, &state)?;
             search(deviating.deviance(0.0), |figure| Ok(deviating.deviance(figure)))?
         } else {
-            (figure, least)
+            (figure, lowest)
         };
         self.flatness = Flatness { figure, tau };
         Ok(Fit {
             solution: self.solve(state, &exact)?,
-            deviation_statistic: (plane - least).max(0.0),
+            deviation_statistic: (plane - lowest).max(0.0),
         })
     }
 
@@ -160,18 +160,18 @@ fn search(
     mut at: impl FnMut(f64) -> Result<f64, ProblemError>,
 ) -> Result<(f64, f64), ProblemError> {
     let mut seen: Vec<(f64, f64)> = Vec::new();
-    let mut least = none;
+    let mut lowest = none;
     for (i, sd) in TRIED.iter().enumerate() {
         let found = at(*sd)?;
         seen.push((libm::log(*sd), found));
-        if found < least {
-            least = found;
+        if found < lowest {
+            lowest = found;
         } else if i > 1 {
             // Past the minimum, or rising without one.
             break;
         }
     }
-    if least >= none {
+    if lowest >= none {
         return Ok((0.0, none));
     }
     // L is smooth in ln σ: parabolas through the three lowest points locate its minimum accurately enough.

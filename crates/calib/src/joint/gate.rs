@@ -36,12 +36,12 @@ impl Joint<'_> {
 
     fn is_strange(&self, linear: &Linear) -> bool {
         let tau = self.flatness.tau;
-        let departure = if tau > 0.0 {
+        let deviation = if tau > 0.0 {
             linear.delta.norm_squared() / (tau * tau)
         } else {
             0.0
         };
-        let chi_squared = linear.rest().norm_squared() + departure;
+        let chi_squared = linear.rest().norm_squared() + deviation;
         let freedom = linear.y.len() as f64;
         chi_squared > freedom + GATE_SIGMAS * (2.0 * freedom).sqrt() + GATE_SIGMAS * GATE_SIGMAS
     }

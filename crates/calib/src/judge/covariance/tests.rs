@@ -94,7 +94,7 @@ fn per_axis_deg(c: &Matrix2<f64>) -> f64 {
 
 #[test]
 fn noise_alone_is_the_closed_form() {
-    // σ_angle = σ/(s·tan α)·√(2/K) for an even spread of ψ; sandwich, bound and the paper's formula are then one.
+    // σ_angle = σ/(s·tan α)·√(2/K) for an even spread of ψ; sandwich, bound and the paper's formula are then equal.
     let budget = even(5, &session());
     let expected = (4e-4 / 2.0 * (2.0_f64 / 5.0).sqrt()).to_degrees();
     for c in [budget.bound(), budget.sandwich(), budget.noise_covariance(4e-3)] {
