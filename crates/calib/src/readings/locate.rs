@@ -1,25 +1,25 @@
-//! Where a beam's readings of one stretch lie, when some of them are of something else.
+//! Locates a beam's readings in one stretch when some of them are outliers.
 //!
-//! Another scanner's pulses, dust or a passer-by throw single readings far off, and a mean goes with them. Readings that
-//! all lie where noise puts them are averaged as they are. Otherwise their main body is sought, from the median outward;
-//! it stands for the beam as long as no more readings lie outside than happens to other beams. A beam that reads two
-//! surfaces by turns has more, keeps its wide spread and is judged by that (step 4).
+//! Another scanner's pulses, dust or a passer-by throw single readings far off, and the mean with them. Readings that
+//! are all within noise are averaged as they are. Otherwise their main body is sought, from the median outward; it
+//! represents the beam as long as no more readings are outside than for other beams. A beam that reads two surfaces
+//! alternately has more outside, keeps its wide spread and is judged by that (step 4).
 
 use crate::readings::spread;
 use catoptric_model::{Dataset, PoseRecord, Summary, Window};
 use rayon::prelude::*;
 
-/// One beam in so many, those with most readings outside, does not count when it is asked how often that happens.
+/// One beam in this many, those with the most readings outside, is ignored when the usual share is determined.
 const LEFT_OUT: usize = 4;
 
-/// Standard deviations by which a beam may have more readings outside than others.
+/// Standard deviations by which the number of a beam's readings outside may exceed the usual one.
 const CHANCE_SIGMAS: f64 = 5.0;
 
-/// Readings, and part of a beam's readings, that may be outside in any case.
+/// Number of readings, and fraction of a beam's readings, that may be outside in any case.
 const FREE: f64 = 3.0;
 const FREE_PART: f64 = 0.05;
 
-/// Statistics of every beam in every stretch: of its main body, where it has one beside outliers.
+/// Statistics of every beam in every stretch: of its main body if it also has outliers.
 pub fn summaries(dataset: &Dataset) -> Vec<Vec<Summary>> {
     let noise = dataset.session.believed.range_noise_sd_mm * 1e-3;
     let plain: Vec<Vec<Summary>> = dataset.poses.par_iter().map(PoseRecord::summarize).collect();
@@ -48,7 +48,7 @@ pub fn summaries(dataset: &Dataset) -> Vec<Vec<Summary>> {
     plain.into_iter().zip(robust).map(choose).collect()
 }
 
-/// The readings of a beam without its outliers, where its summary leaves some out.
+/// The readings of a beam without its outliers, if its summary leaves some out.
 pub(crate) fn kept(record: &PoseRecord, beam: usize, summary: &Summary, noise: f64) -> Vec<f64> {
     let window = (summary.outliers > 0)
         .then(|| Window::around(record.readings(beam), noise))
@@ -61,7 +61,7 @@ pub(crate) fn kept(record: &PoseRecord, beam: usize, summary: &Summary, noise: f
         .collect()
 }
 
-/// Whether some reading lies farther out than noise throws any, or all of them too far apart; of every beam.
+/// For every beam, whether some reading is farther out than noise explains, or all of them are too far apart.
 fn strays(record: &PoseRecord, plain: &[Summary], noise: f64) -> Vec<bool> {
     let mut strays: Vec<bool> = plain.iter().map(|s| spread::is_abnormal(s, noise)).collect();
     let far = Window::half_width(spread::largest_spread(noise, usize::MAX));
@@ -73,7 +73,7 @@ fn strays(record: &PoseRecord, plain: &[Summary], noise: f64) -> Vec<bool> {
     strays
 }
 
-/// How large a part of a beam's readings is usually outside.
+/// The usual fraction of a beam's readings outside.
 fn usual_share(plain: &[Vec<Summary>], robust: &[Vec<Option<Summary>>]) -> f64 {
     let pairs = plain.iter().flatten().zip(robust.iter().flatten());
     let mut shares: Vec<f64> = pairs
@@ -85,7 +85,7 @@ fn usual_share(plain: &[Vec<Summary>], robust: &[Vec<Option<Summary>>]) -> f64 {
     shares[..counted].iter().sum::<f64>() / counted.max(1) as f64
 }
 
-/// Whether a beam has no more readings outside than chance gives it, where others have a share of that size outside.
+/// Whether the number of a beam's readings outside is within statistical fluctuation of the usual share.
 fn is_chance(found: &Summary, usual: f64) -> bool {
     let n = (found.count + found.outliers) as f64;
     let free = FREE.min(FREE_PART * n);
@@ -111,7 +111,7 @@ mod tests {
         }
     }
 
-    /// A hundred readings of 2 m with 4 mm of something like noise, some of them off by 0.3 m either way.
+    /// A hundred readings of 2 m with 4 mm of noise-like scatter, some of them off by ±0.3 m.
     fn readings(outliers: usize) -> Vec<f64> {
         let noise = |i: usize| 0.004 * (((i * 37) % 100) as f64 / 50.0 - 0.99) * 3.0_f64.sqrt();
         let step = |i: usize| if i.is_multiple_of(2) { 0.3 } else { -0.3 };
@@ -125,7 +125,7 @@ mod tests {
         let record = record(&[readings(15), readings(0), readings(45)]);
         let found = Summary::of_main_body(record.readings(0), 0.004).expect("most readings are together");
         assert_eq!((found.count, found.outliers, found.missing), (85, 15, 0));
-        // What is left is the mean of the same 85 readings without any outlier among them.
+        // The mean of the same 85 readings without any outlier among them.
         let exact: f64 = readings(0)[15..].iter().sum::<f64>() / 85.0;
         assert!((found.mean - exact).abs() < 1e-12);
         assert_eq!(kept(&record, 0, &found, 0.004), readings(0)[15..].to_vec());

@@ -1,5 +1,5 @@
-//! Which elements a mirror deflects (step 4): what each beam read in the known room and elsewhere, against what a beam
-//! that no mirror touches would have read.
+//! Which elements a mirror deflects (step 4): compares what each beam read in the known room and elsewhere with what an
+//! undeflected beam would have read.
 
 mod abnormal;
 mod evidence;
@@ -13,14 +13,14 @@ use evidence::Screen;
 use near::facets_near;
 use rayon::prelude::*;
 
-/// What screening makes of an element.
+/// The class of an element by screening.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Candidate {
-    /// It reads what a beam without a mirror reads; the text says how often.
+    /// It reads what an undeflected beam reads; the text states how often.
     Direct(String),
     /// A mirror may deflect it: indices of facets, the likeliest first.
     Deflected(Vec<usize>),
-    /// Its readings are of no use, and why.
+    /// Its readings are unusable, with the reason.
     Rejected(String),
 }
 

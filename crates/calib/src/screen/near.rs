@@ -1,12 +1,12 @@
-//! Which facets a beam may belong to, as drawn and give or take what building them adds.
+//! Which facets a beam may belong to: as drawn, to within the errors of manufacturing.
 
 use catoptric_model::session::NominalFacet;
 
-/// How many beams beyond the drawn ones a facet as built may serve.
+/// Number of beams beyond the drawn ones that a facet as built may serve.
 ///
 /// At 65 mm a millimeter is 3.5 beams: an optical center a millimeter off in its housing, a facet half a millimeter and
-/// 1° off in its frame, and posts that hide an edge on the drawing add up to several. Being generous costs nothing:
-/// a beam that no mirror deflects is known by its readings, not by this.
+/// 1° off in its frame, and posts that hide an edge on the drawing add up to several. A generous number costs nothing,
+/// because undeflected beams are recognized by their readings, not by this.
 const EDGE_BEAMS: usize = 10;
 
 /// The facets whose drawn range of beams is at most [`EDGE_BEAMS`] away, the nearest first.
