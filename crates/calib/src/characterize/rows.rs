@@ -28,8 +28,8 @@ pub(super) fn of(
         let sighting = block.sightings[index];
         let u = beam::direction(azimuth(&dataset.session, beam));
         // The normal on the sensor's side, and whether it is turned toward larger azimuths.
-        let towards = seen.plane.normal.into_inner() * -seen.plane.normal.dot(&u).signum();
-        let side = if towards.dot(&tangent_basis(&u).0) < 0.0 {
+        let toward = seen.plane.normal.into_inner() * -seen.plane.normal.dot(&u).signum();
+        let side = if toward.dot(&tangent_basis(&u).0) < 0.0 {
             -1.0
         } else {
             1.0

@@ -3,7 +3,7 @@
 use crate::element::solve::BareDistance;
 use crate::readings::bare::Bare;
 use crate::readings::observations::azimuth;
-use crate::screen::Candidate;
+use crate::screen::ScreenClass;
 use catoptric_model::{BeamEstimate, MirrorPlane, Session, Status, beam};
 
 /// The drawing's angles of every element that a mirror may deflect, without a covariance, because their error is
@@ -11,15 +11,17 @@ use catoptric_model::{BeamEstimate, MirrorPlane, Session, Status, beam};
 pub(crate) fn as_drawn(
     session: &Session,
     bare: &Bare,
-    candidates: &[Candidate],
+    candidates: &[ScreenClass],
     drawn: &[MirrorPlane],
 ) -> Vec<BeamEstimate> {
-    let of_one = |(beam, candidate): (usize, &Candidate)| match candidate {
-        Candidate::Direct(reason) => BeamEstimate::without_angles(beam, Status::Direct, Some(reason.clone())),
-        Candidate::Rejected(reason) => {
+    let of_one = |(beam, candidate): (usize, &ScreenClass)| match candidate {
+        ScreenClass::Direct(reason) => {
+            BeamEstimate::without_angles(beam, Status::Direct, Some(reason.clone()))
+        }
+        ScreenClass::Rejected(reason) => {
             BeamEstimate::without_angles(beam, Status::Rejected, Some(reason.clone()))
         }
-        Candidate::Deflected(near) => {
+        ScreenClass::Deflected(near) => {
             let found = near
                 .iter()
                 .find_map(|f| Some((f, drawn[*f].deflect(beam::direction(azimuth(session, beam)))?)));

@@ -7,7 +7,7 @@ use crate::element::solve::{self, Element, Solution};
 use crate::element::solver::{Solver, Task};
 use crate::element::verdict::{judge, residuals_agree};
 use crate::readings::observations::azimuth;
-use crate::screen::Candidate;
+use crate::screen::ScreenClass;
 use catoptric_model::session::NominalFacet;
 use catoptric_model::{BeamEstimate, Deflection, MirrorPlane, Status, beam};
 use rayon::prelude::*;
@@ -29,16 +29,18 @@ const LARGEST_EXCESS: f64 = 0.2;
 pub(crate) fn estimates(
     work: &Workspace,
     solver: &Solver,
-    candidates: &[Candidate],
+    candidates: &[ScreenClass],
     mirrors: &[MirrorPlane],
 ) -> Vec<BeamEstimate> {
     let facets = &work.dataset.session.facets;
-    let of_one = |(beam, candidate): (usize, &Candidate)| match candidate {
-        Candidate::Direct(reason) => BeamEstimate::without_angles(beam, Status::Direct, Some(reason.clone())),
-        Candidate::Rejected(reason) => {
+    let of_one = |(beam, candidate): (usize, &ScreenClass)| match candidate {
+        ScreenClass::Direct(reason) => {
+            BeamEstimate::without_angles(beam, Status::Direct, Some(reason.clone()))
+        }
+        ScreenClass::Rejected(reason) => {
             BeamEstimate::without_angles(beam, Status::Rejected, Some(reason.clone()))
         }
-        Candidate::Deflected(near) => {
+        ScreenClass::Deflected(near) => {
             let mut tried = near
                 .iter()
                 .map(|f| estimate(work, solver, beam, &facets[*f], &mirrors[*f]));

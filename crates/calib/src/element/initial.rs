@@ -110,7 +110,7 @@ mod tests {
                     noise_sd: 0.0,
                     count: 1,
                 },
-                mean: RawRange(range::predict(&truth, 0.3, &plane).expect("it meets the board")),
+                mean: RawRange(range::predict(&truth, 0.3, &plane).expect("the beam hits the board")),
             }
         });
         let guess = Deflection {
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hinge_is_no_start() {
+    fn a_hinge_gives_no_start() {
         assert_eq!(
             found([[-0.9, 0.0, -0.4], [-0.6, 0.0, -0.6], [-0.2, 0.0, -0.9]]),
             None

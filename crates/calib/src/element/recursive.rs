@@ -41,7 +41,7 @@ enum State {
 /// let truth = Deflection { azimuth: 0.2, elevation: 0.9, distance: 0.07 };
 /// let planes = [[-0.9, 0.0, -0.4], [-0.5, 0.6, -0.6], [-0.5, -0.6, -0.6]]
 ///     .map(|n| BoardPlane::new(Point3::new(1.0, 0.4, 1.4), Unit::new_normalize(Vector3::from(n))));
-/// let readings = planes.map(|p| vec![range::predict(&truth, 0.3, &p).expect("it meets the board"); 4]);
+/// let readings = planes.map(|p| vec![range::predict(&truth, 0.3, &p).expect("the beam hits the board"); 4]);
 /// let observations: Vec<_> = planes.iter().zip(&readings).map(|(plane, z)| Observation {
 ///     board: BoardView { plane: *plane, markers: &[], color: "white", noise_sd: 0.004, count: 4 },
 ///     mean: RawRange(z[0]),

@@ -11,7 +11,7 @@ use crate::mount::mount_data::DirectBoard;
 use crate::mount::pose::{self, Mount, Prior};
 use crate::readings::observations::azimuth;
 use crate::readings::spread;
-use crate::screen::Candidate;
+use crate::screen::ScreenClass;
 use catoptric_model::{BeamEstimate, MirrorPlane, Pose, Status, beam};
 use nalgebra::{DVector, Dyn, Matrix6, OMatrix, RowDVector, U6, Vector6};
 use rayon::prelude::*;
@@ -33,13 +33,13 @@ pub(crate) struct Assigned {
 /// Elements that hit boards and can be solved together: those solved individually, and those that only lacked boards.
 pub(crate) fn assigned(
     work: &Workspace,
-    candidates: &[Candidate],
+    candidates: &[ScreenClass],
     mirrors: &[MirrorPlane],
     alone: &[BeamEstimate],
 ) -> Vec<Assigned> {
     let facets = &work.dataset.session.facets;
-    let of_one = |(candidate, estimate): (&Candidate, &BeamEstimate)| {
-        let Candidate::Deflected(near) = candidate else {
+    let of_one = |(candidate, estimate): (&ScreenClass, &BeamEstimate)| {
+        let ScreenClass::Deflected(near) = candidate else {
             return None;
         };
         let facet = match estimate.status {

@@ -24,7 +24,7 @@ const DOUBTFUL: f64 = 1e-3;
 const MIN_DETERMINED: f64 = 0.5;
 
 /// Probability of a χ² at least as large.
-pub(super) fn chance(chi_squared: f64, freedom: f64) -> f64 {
+pub(super) fn upper_tail(chi_squared: f64, freedom: f64) -> f64 {
     ChiSquared::new(freedom).map_or(1.0, |d| d.sf(chi_squared.max(0.0)))
 }
 
@@ -36,7 +36,7 @@ impl Joint<'_> {
         let global_test = ChiSquaredTest {
             chi_squared: solution.sum_of_squares,
             degrees_of_freedom: freedom,
-            p_value: chance(solution.sum_of_squares, freedom as f64),
+            p_value: upper_tail(solution.sum_of_squares, freedom as f64),
         };
         let planeness = Planeness {
             figure_deg: self.flatness.figure.to_degrees(),
@@ -45,7 +45,8 @@ impl Joint<'_> {
             // Both sizes are at the boundary of their domain under the hypothesis: each is estimated as 0 half of the
             // time.
             p_value: if fit.deviation_statistic > 0.0 {
-                0.5 * chance(fit.deviation_statistic, 1.0) + 0.25 * chance(fit.deviation_statistic, 2.0)
+                0.5 * upper_tail(fit.deviation_statistic, 1.0)
+                    + 0.25 * upper_tail(fit.deviation_statistic, 2.0)
             } else {
                 1.0
             },
@@ -80,8 +81,8 @@ impl Joint<'_> {
                 determined += 1.0 - c[(0, 0)].min(1.0);
             }
         }
-        let found = (determined > MIN_DETERMINED && believed > 0.0)
-            .then(|| believed * (squares / determined).sqrt());
+        let found =
+            (determined > MIN_DETERMINED && believed > 0.0).then(|| believed * (squares / determined).sqrt());
         VarianceComponent {
             name: name.to_owned(),
             believed_mm: believed,

@@ -228,13 +228,13 @@ mod tests {
     }
 
     #[test]
-    fn the_likeliest_size_is_found_and_none_is_kept() {
+    fn the_most_probable_size_is_found_and_zero_is_kept() {
         // ln σ² + s²/σ² is minimal at σ = s.
         let likelihood = |s: f64| move |sd: f64| Ok(2.0 * libm::log(sd) + (s / sd).powi(2));
         for s in [2e-4, 1e-3, 0.02] {
-            let (found, _) = search(f64::INFINITY, likelihood(s)).expect("it is defined everywhere");
+            let (found, _) = search(f64::INFINITY, likelihood(s)).expect("L is defined everywhere");
             assert!((found / s - 1.0).abs() < 0.15, "{found} for {s}");
         }
-        assert_eq!(search(0.0, |sd: f64| Ok(sd)).expect("it is defined"), (0.0, 0.0));
+        assert_eq!(search(0.0, |sd: f64| Ok(sd)).expect("L is defined"), (0.0, 0.0));
     }
 }

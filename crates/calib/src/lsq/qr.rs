@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn the_factors_make_the_matrix_again() {
+    fn the_factors_reproduce_the_matrix() {
         for (rows, columns) in [(7, 4), (4, 7), (5, 5), (9, 1)] {
             let a = sample(rows, columns);
             let qr = PivotedQr::new(a.clone(), DMatrix::identity(rows, rows));

@@ -155,7 +155,9 @@ impl Refusal {
             Self::Room => "the board would reach through a wall, floor or ceiling",
             Self::Rig => "the board would be inside the rig",
             Self::Incidence => "a beam would hit the board beyond the largest incidence",
-            Self::Unserved => "the board would hold no beam's whole spot, given how well directions are known",
+            Self::Unserved => {
+                "the board would hold no beam's whole spot, given how well directions are known"
+            }
         }
     }
 }

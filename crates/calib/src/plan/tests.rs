@@ -199,7 +199,9 @@ fn another_pose_never_worsens_any_bound() {
             assert!(designer.cost(&more) < designer.cost(&chosen));
             for beam in &beams {
                 if let Some(before) = designer.bound_deg(*beam, &chosen) {
-                    let after = designer.bound_deg(*beam, &more).expect("it stays determined");
+                    let after = designer
+                        .bound_deg(*beam, &more)
+                        .expect("the beam stays determined");
                     assert!(
                         after <= before * (1.0 + 1e-12),
                         "beam {beam}: {before} to {after}"
@@ -310,7 +312,7 @@ fn impossible_requests_are_refused() {
     let asked = request(1, Criterion::D);
     let refused = |name: &str, asked: &Request| {
         plan(&situation, &[name.to_owned()], asked)
-            .expect_err("it must be refused")
+            .expect_err("the request is impossible")
             .to_string()
     };
     assert!(refused("down", &asked).contains("\"down\"") && refused("down", &asked).contains("up"));

@@ -191,8 +191,8 @@ mod tests {
                     elevation,
                     distance: 0.07,
                 };
-                let exact = analytic(&given, 0.25, &board(tilt)).expect("it meets the board");
-                let near = central(&given, 0.25, &board(tilt)).expect("it meets the board");
+                let exact = analytic(&given, 0.25, &board(tilt)).expect("the beam hits the board");
+                let near = central(&given, 0.25, &board(tilt)).expect("the beam hits the board");
                 let scale = exact.angles().norm();
                 assert!((exact.angles() - near.angles()).norm() < 1e-5 * scale);
                 // The differences must differ from the derivatives, by an error of the order δ².
@@ -201,7 +201,8 @@ mod tests {
                     distance: 0.07 + 1e-4,
                     ..given
                 };
-                let r = |d: &Deflection| range::predict(d, 0.25, &board(tilt)).expect("it meets the board");
+                let r =
+                    |d: &Deflection| range::predict(d, 0.25, &board(tilt)).expect("the beam hits the board");
                 assert!(((r(&longer) - r(&given)) / 1e-4 - exact.distance).abs() < 1e-10);
             }
         }
@@ -215,7 +216,7 @@ mod tests {
             distance: 0.07,
         };
         let (plane, v) = (board(0.3), given.exit_direction(0.25));
-        let r = range::predict(&given, 0.25, &plane).expect("it meets the board");
+        let r = range::predict(&given, 0.25, &plane).expect("the beam hits the board");
         let hit = given.deflection_point(0.25) + v.into_inner() * (r - given.distance);
         let row = of_mount(&hit, &plane.normal, &v);
         for axis in 0..6 {
@@ -229,7 +230,7 @@ mod tests {
                 old_from_new.inverse() * plane.point,
                 Unit::new_normalize(old_from_new.rotation.inverse() * plane.normal.into_inner()),
             );
-            let change = range::predict(&given, 0.25, &moved).expect("it meets the board") - r;
+            let change = range::predict(&given, 0.25, &moved).expect("the beam hits the board") - r;
             assert!((change / 1e-6 - row[axis]).abs() < 1e-4, "axis {axis}");
         }
     }

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 const LEFT_OUT: usize = 4;
 
 /// Standard deviations by which the number of a beam's readings outside may exceed the usual one.
-const CHANCE_SIGMAS: f64 = 5.0;
+const USUAL_SIGMAS: f64 = 5.0;
 
 /// Number of readings, and fraction of a beam's readings, that may be outside in any case.
 const FREE: f64 = 3.0;
@@ -40,7 +40,7 @@ pub fn summaries(dataset: &Dataset) -> Vec<Vec<Summary>> {
     let usual = usual_share(&plain, &robust);
     let choose = |(plain, robust): (Vec<Summary>, Vec<Option<Summary>>)| {
         let of_one = |(plain, robust): (Summary, Option<Summary>)| match robust {
-            Some(found) if is_chance(&found, usual) && !spread::is_abnormal(&found, noise) => found,
+            Some(found) if is_usual(&found, usual) && !spread::is_abnormal(&found, noise) => found,
             _ => plain,
         };
         plain.into_iter().zip(robust).map(of_one).collect()
@@ -86,10 +86,10 @@ fn usual_share(plain: &[Vec<Summary>], robust: &[Vec<Option<Summary>>]) -> f64 {
 }
 
 /// Whether the number of a beam's readings outside is within statistical fluctuation of the usual share.
-fn is_chance(found: &Summary, usual: f64) -> bool {
+fn is_usual(found: &Summary, usual: f64) -> bool {
     let n = (found.count + found.outliers) as f64;
     let free = FREE.min(FREE_PART * n);
-    found.outliers as f64 <= n * usual + CHANCE_SIGMAS * (n * usual * (1.0 - usual)).sqrt() + free
+    found.outliers as f64 <= n * usual + USUAL_SIGMAS * (n * usual * (1.0 - usual)).sqrt() + free
 }
 
 #[cfg(test)]
@@ -135,18 +135,18 @@ mod tests {
     }
 
     #[test]
-    fn more_outliers_than_others_have_are_no_chance() {
+    fn more_outliers_than_usual_are_detected() {
         let with = |outliers: usize| Summary {
             count: 100 - outliers,
             outliers,
             ..Summary::default()
         };
-        assert!(is_chance(&with(3), 0.0) && !is_chance(&with(4), 0.0));
-        assert!(is_chance(&with(30), 0.15) && !is_chance(&with(40), 0.15));
+        assert!(is_usual(&with(3), 0.0) && !is_usual(&with(4), 0.0));
+        assert!(is_usual(&with(30), 0.15) && !is_usual(&with(40), 0.15));
     }
 
     #[test]
-    fn how_often_readings_stray_is_asked_of_most_beams() {
+    fn the_usual_share_is_that_of_most_beams() {
         let plain = vec![
             Summary {
                 count: 100,

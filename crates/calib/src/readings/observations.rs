@@ -159,13 +159,13 @@ mod tests {
         };
         let straight = board
             .hit(&Point3::origin(), &Vector3::x_axis())
-            .expect("it meets the board");
+            .expect("the beam hits the board");
         assert!((straight.distance - 2.0).abs() < 1e-15 && straight.in_board.coords.norm() < 1e-12);
         assert!(board.holds(&straight, 0.09, 0.0) && !board.holds(&straight, 0.09, 0.02));
         // From the side, at 60° against the normal and along the board's y: the spot is twice as long there.
         let from = Point3::new(1.0, -3.0_f64.sqrt(), 0.0);
         let direction = Unit::new_normalize(Point3::new(2.0, 0.0, 0.0) - from);
-        let sloped = board.hit(&from, &direction).expect("it meets the board");
+        let sloped = board.hit(&from, &direction).expect("the beam hits the board");
         assert!((sloped.slope[1].abs() - 3.0_f64.sqrt()).abs() < 1e-12);
         assert!(board.holds(&sloped, 0.049, 0.0) && !board.holds(&sloped, 0.051, 0.0));
     }

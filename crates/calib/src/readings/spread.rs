@@ -27,7 +27,7 @@ pub(crate) fn is_abnormal(summary: &Summary, believed_sd: f64) -> bool {
 pub(crate) fn noise_sd(summary: &Summary, believed_sd: f64) -> f64 {
     // Always taking the larger of the two would overestimate the noise whenever the sample happens to be larger.
     let limit = believed_sd * (1.0 + 3.0 * relative_error(summary.count));
-    if summary.sd > chance {
+    if summary.sd > limit {
         summary.sd
     } else {
         believed_sd

@@ -111,8 +111,8 @@ impl Constellation<'_> {
 
     fn shows_its_back(&self, pose: &Pose) -> bool {
         self.faces.is_some_and(|to| {
-            let way = to.coords - pose.translation.vector;
-            (pose.rotation * Vector3::z()).dot(&way) < BACK * way.norm()
+            let toward = to.coords - pose.translation.vector;
+            (pose.rotation * Vector3::z()).dot(&toward) < BACK * toward.norm()
         })
     }
 

@@ -76,7 +76,7 @@ pub fn put_right(dataset: &Dataset) -> (Cow<'_, Dataset>, Vec<String>) {
     for finding in findings {
         let record = &mut repaired.poses[finding.pose];
         let name = name_of(&finding.subject);
-        let (said, corrected) = match finding.what {
+        let (message, corrected) = match finding.what {
             What::Moved(how) => (how, None),
             What::Misfit(misfit) => (misfit.words(&name), misfit.corrected()),
         };
@@ -94,7 +94,7 @@ pub fn put_right(dataset: &Dataset) -> (Cow<'_, Dataset>, Vec<String>) {
                 "the pose is left out"
             }
         };
-        warnings.push(format!("pose {}: {said}; {remedy}", record.label.pose));
+        warnings.push(format!("pose {}: {message}; {remedy}", record.label.pose));
     }
     (Cow::Owned(repaired), warnings)
 }
@@ -126,7 +126,7 @@ fn without_templates_that_never_fit(
         let of = seen.get(subject.as_str()).copied().unwrap_or_default();
         of > 1 && 2 * *count > of
     });
-    let said = |(subject, count): (&String, &usize)| {
+    let message = |(subject, count): (&String, &usize)| {
         format!(
             "the markers of {} do not fit its template in {count} of {} poses: the template in the session, or what it \
              believes of marker errors, is wrong; the poses are used as they were tracked",
@@ -134,7 +134,7 @@ fn without_templates_that_never_fit(
             seen.get(subject.as_str()).copied().unwrap_or_default()
         )
     };
-    let warnings = odd.iter().map(said).collect();
+    let warnings = odd.iter().map(message).collect();
     let kept = |f: &Finding| !(unexplained(f) && odd.contains_key(&f.subject));
     (warnings, findings.into_iter().filter(kept).collect())
 }
