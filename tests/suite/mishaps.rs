@@ -95,7 +95,7 @@ fn a_calibration_with_exchanged_labels_is_as_good_as_without() {
     let (calibration, scored) = calibrated(&scene, 1, Method::BeamGls);
     let warning = &calibration.warnings[0];
     assert!(
-        warning.ends_with("its pose was solved anew with the labels put right"),
+        warning.ends_with("its pose was solved anew with the labels corrected"),
         "{warning}"
     );
     // The pose is solved from mean markers then, not averaged over the frames' poses: the same to the third digit.

@@ -382,9 +382,9 @@ fn what_cannot_be_planned_is_said() {
     .unwrap();
     for (arguments, words) in [
         (&["--facet", "left-2"][..], "did you mean --facet left-1?"),
-        (&["--range-m", "8,9"], "nearer than the least range"),
+        (&["--range-m", "8,9"], "nearer than the minimum range"),
         (&["--range-m", "2"], "takes two numbers"),
-        (&["--range-m", "2,1"], "at least the least range"),
+        (&["--range-m", "2,1"], "at least the minimum range"),
         (&["--max-incidence-deg", "90"], "between 0 and 90"),
         (&["--poses", "0"], "--poses"),
         (&["--set", "board.0.width_mm=9000"], "reach through a wall"),

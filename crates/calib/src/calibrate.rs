@@ -11,12 +11,11 @@ use catoptric_model::{Calibration, Dataset, Stop, calibration};
 
 /// Calibrates a recorded experiment: one entry for every beam of the scanner, in order.
 ///
-/// Every element that is not solved says why. The angles are those of the frame `sensor`; `rig_from_sensor` is the
-/// mounting as estimated, with its covariance.
+/// Every element that is not solved has a reason. The angles refer to the frame `sensor`; `rig_from_sensor` is the
+/// estimated mounting, with its covariance.
 ///
 /// # Errors
-/// [`CalibError`] if the dataset's parts do not fit together, its session holds impossible numbers or its recording can no
-/// longer be read.
+/// [`CalibError`] if the parts of the dataset are inconsistent or its session holds impossible numbers.
 ///
 /// ```
 /// use catoptric_calib::{CalibError, Method, Options, calibrate};
@@ -31,7 +30,7 @@ pub fn calibrate(dataset: &Dataset, method: Method, options: &Options) -> Result
     calibrate_until(dataset, method, options, &Stop::default())
 }
 
-/// As [`calibrate`], unless it is stopped on the way.
+/// As [`calibrate`], but can be stopped before it ends.
 ///
 /// # Errors
 /// As [`calibrate`], and [`CalibError::Stopped`].
@@ -49,7 +48,7 @@ pub fn calibrate_until(
     let (mount, drawn) = (&prepared.mount, &prepared.drawn);
     // Step 4: which elements a mirror deflects.
     let candidates = screen::candidates(dataset, &prepared.summaries, mount, &prepared.boards);
-    // The drawing decides which boards an element can hit only until its neighbors tell how the facet was built.
+    // The drawing decides which boards an element can hit until its neighbors show how the facet was built.
     let work = prepared.workspace(dataset, options);
     let first = element::estimates(&work, &BATCH, &candidates, drawn)?;
     stop.check()?;
@@ -67,7 +66,7 @@ pub fn calibrate_until(
         warnings,
         assessment: None,
     };
-    // Steps 11 to 13: the angles, and whether they are to be believed.
+    // Steps 11 to 13: the angles, and whether to believe them.
     match method.scope() {
         Scope::Drawing => {
             calibration.beams = element::as_drawn(&dataset.session, &prepared.bare, &candidates, drawn);

@@ -1,21 +1,21 @@
 //! The estimator: where each mirrored beam of a 2D scanner goes, and how well that is known.
 //!
-//! A board of plane (c, n) gives one equation per element (Cooper, Raquet, Patton 2018, Eqs. 3, 6–8):
+//! A board of plane (c, n) gives one equation per element (Cooper, Raquet, Patton 2018, Eqs. (3) and (6)–(8)):
 //!
 //! ```text
 //! z = r_raw − E_a − E_c − E_r = d + n·(c − P_L1)/(n·v(θ_a, φ)) + noise
 //! Δx = (HᵀH)⁻¹Hᵀ(z − r(x̂)),  H = [∂r/∂θ_a  ∂r/∂φ]
 //! ```
 //!
-//! [`calibrate`] runs the paper's steps 4–6 and 11–13. The folders show the way of the data: what went wrong in a
-//! recording ([`tracking`]); what beams read ([`locate`], [`observations`]); where the sensor sits in the rig ([`pose`]);
-//! which elements a mirror deflects; one element by itself on the boards that it hits ([`solve`], [`recursive`]), and all
-//! at once ([`limit`](fn@limit) says how well that can be done); beneath, what boards leave open ([`observability`],
-//! [`gauge`]) and how far an answer can be off ([`covariance`]). [`lsq`] solves problems of many parameters for estimators
-//! to be built on it, [`plan`] says which board poses to record next.
+//! [`calibrate`] runs the paper's steps 4–6 and 11–13. The modules follow the data: what went wrong in a recording
+//! ([`tracking`]); what beams read ([`locate`], [`observations`]); where the sensor sits in the rig ([`pose`]); which
+//! elements a mirror deflects; one element alone on the boards that it hits ([`solve`], [`recursive`]), and all
+//! elements at once ([`limit`](fn@limit) gives the best possible accuracy). Below these: what boards leave open
+//! ([`observability`], [`gauge`]) and how far off a result can be ([`covariance`]). [`lsq`] solves problems with many
+//! parameters, for the estimators built on it; [`plan`] proposes the board poses to record next.
 //!
-//! The crate knows the model, not the simulator: it cannot see the truth. It reads no file, prints nothing and draws
-//! nothing at random.
+//! The crate knows the model, not the simulator: it cannot see the truth. It reads no file, prints nothing and draws no
+//! random numbers.
 
 mod calibrate;
 mod calibrator;
@@ -37,7 +37,7 @@ pub mod tracking;
 pub use calibrate::{calibrate, calibrate_until};
 pub use calibrator::Calibrator;
 pub use characterize::characterize;
-pub use element::attempt::LEAST_BOARDS;
+pub use element::attempt::MIN_BOARDS;
 pub use element::{initial, recursive, solve};
 pub use error::CalibError;
 pub use joint::{TrueDirection, limit};

@@ -1,9 +1,9 @@
-//! How far a method iterates, and by which derivatives.
+//! Options of a calibration: how far a method iterates, and with which derivatives.
 
 /// How the derivatives of the range equation are formed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum JacobianForm {
-    /// By differentiating Eq. (6).
+    /// By analytic differentiation of Eq. (6).
     #[default]
     Analytic,
     /// By the central differences of Eq. (7), with δ = 10⁻³ rad.
@@ -11,10 +11,10 @@ pub enum JacobianForm {
 }
 
 impl JacobianForm {
-    /// All of them.
+    /// All forms.
     pub const ALL: [Self; 2] = [Self::Analytic, Self::CentralDifference];
 
-    /// The word that commands use.
+    /// The name used in commands.
     pub fn name(self) -> &'static str {
         match self {
             Self::Analytic => "analytic",
@@ -22,25 +22,25 @@ impl JacobianForm {
         }
     }
 
-    /// What it is, in a line.
+    /// One-line description.
     pub fn about(self) -> &'static str {
         match self {
-            Self::Analytic => "By differentiating Eq. 6",
-            Self::CentralDifference => "By the central differences of Eq. 7",
+            Self::Analytic => "By analytic differentiation of Eq. (6)",
+            Self::CentralDifference => "By the central differences of Eq. (7)",
         }
     }
 }
 
-/// What a calibration may be told besides the method.
+/// Options of a calibration besides the method.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
     /// Form of the Jacobian H.
     pub jacobian: JacobianForm,
     /// The iteration ends with a step of (θ_a, φ) shorter than this, in radians.
     pub step_tolerance_rad: f64,
-    /// Whether `joint` is asked to predict every board from the others as well, for five times the time.
+    /// Whether `joint` also predicts every board from the others, which takes five times as long.
     pub cross_validation: bool,
-    /// Steps after which an element counts as not converged.
+    /// Number of steps after which an element counts as not converged.
     pub max_iterations: usize,
 }
 

@@ -1,5 +1,5 @@
-//! What every procedure begins with: a dataset that is checked and put right, the sensor placed in the rig (step 5), and
-//! the boards seen from there (step 6).
+//! The common start of every procedure: check and correct a dataset, place the sensor in the rig (step 5), and place
+//! the boards in the sensor frame (step 6).
 
 use crate::element::attempt::Workspace;
 use crate::element::facet_plane::plane_as_drawn;
@@ -13,7 +13,7 @@ use crate::tracking;
 use catoptric_model::{Dataset, MirrorPlane, Session, Summary};
 use std::borrow::Cow;
 
-/// What everything else rests on: mounting and boards in the sensor frame.
+/// The basis of everything else: mounting and boards in the sensor frame.
 pub(crate) struct Prepared {
     pub(crate) drawn: Vec<MirrorPlane>,
     pub(crate) summaries: Vec<Vec<Summary>>,
@@ -22,7 +22,7 @@ pub(crate) struct Prepared {
     pub(crate) boards: Vec<Option<BoardInSensor>>,
 }
 
-/// Checks a dataset, and puts right or leaves out what cannot be believed of it, with a sentence for each.
+/// Checks a dataset, and corrects or leaves out what cannot be believed, with a sentence for each change.
 pub(crate) fn believable(dataset: &Dataset) -> Result<(Cow<'_, Dataset>, Vec<String>), CalibError> {
     dataset.check()?;
     check_session(&dataset.session)?;
@@ -68,7 +68,7 @@ impl Prepared {
     }
 }
 
-/// Whether the numbers of a session can be what they are said to be.
+/// Checks that the numbers of a session are possible.
 pub(crate) fn check_session(session: &Session) -> Result<(), CalibError> {
     let believed = &session.believed;
     let positive = [("scanner.range_max_m", session.scanner.range_max_m)];

@@ -1,9 +1,9 @@
-//! Does a second direction explain the ranges as well?
+//! Is there a second direction that explains the ranges equally well?
 //!
 //! With q_k = n_k/(n_k·v) a range error of board k is proportional to q_k·v − 1: a quadratic form on the sphere of
-//! directions, with two minima at most. If all q_k lie in one plane, of normal e, the ranges do not change when v is
-//! mirrored at it: boards whose tilts, as vectors tan α across the beam, lie on one line. Vertical boards are the well-known
-//! case, e = z: φ and −φ cannot be told apart.
+//! directions, with two minima at most. If all q_k are in one plane, of normal e, the ranges do not change when v is
+//! mirrored at that plane: this happens for boards whose tilts, as vectors tan α across the beam, are on one line.
+//! Vertical boards are the well-known case, e = z: φ and −φ cannot be distinguished.
 
 use crate::element::attempt::{Attempt, Fit};
 use crate::element::initial::FARTHEST_START;
@@ -11,16 +11,16 @@ use crate::element::solve;
 use catoptric_model::{Deflection, beam};
 use nalgebra::{DVector, Matrix3, SymmetricEigen};
 
-/// Difference of χ² up to which two directions count as equally good: a thousand to one (2 ln 1000).
+/// Difference of χ² up to which two directions count as equally good: odds of a thousand to one (2 ln 1000).
 const INDIFFERENT: f64 = 13.8;
 
-/// Directions nearer than this are one, in radians.
+/// Directions closer than this count as one, in radians.
 const ONE_DIRECTION: f64 = 1e-6;
 
-/// Range error that is always reckoned with, in metres.
-const LEAST_SD: f64 = 1e-6;
+/// Smallest range error assumed, in meters.
+const MIN_SD: f64 = 1e-6;
 
-/// Another direction that the readings allow as well, and the drawing too.
+/// Another direction that agrees with both the readings and the drawing.
 pub(crate) fn second_direction(attempt: &Attempt, fit: &Fit) -> Option<Deflection> {
     let observations = attempt.observations(&fit.poses);
     let at = &fit.solution.deflection;
@@ -60,7 +60,7 @@ pub(crate) fn second_direction(attempt: &Attempt, fit: &Fit) -> Option<Deflectio
     let budget = attempt.budget(at, &observations)?;
     let mut covariance = budget.covariance;
     for i in 0..covariance.nrows() {
-        covariance[(i, i)] += LEAST_SD * LEAST_SD;
+        covariance[(i, i)] += MIN_SD * MIN_SD;
     }
     let factor = covariance.cholesky()?;
     let statistic = |residuals: &[f64]| {

@@ -1,4 +1,4 @@
-//! An element on its way to an estimate: what it read of which boards, and the error budgets of what it may conclude.
+//! The state of an element while it is being estimated: its readings, its boards and its error budgets.
 
 use crate::element::solve::{BareDistance, Element, Solution};
 use crate::judge::covariance::{self, Budget, MountUncertainty};
@@ -12,10 +12,10 @@ use crate::readings::spread;
 use catoptric_model::session::NominalFacet;
 use catoptric_model::{Dataset, Deflection, Pose, PoseKind, PoseRecord, Session, Status, Summary};
 
-/// Boards that one solution needs (steps 7–10).
-pub const LEAST_BOARDS: usize = 3;
+/// Number of boards that a solution needs (steps 7–10).
+pub const MIN_BOARDS: usize = 3;
 
-/// What all elements share.
+/// Inputs shared by all elements.
 pub(crate) struct Workspace<'a> {
     pub(crate) dataset: &'a Dataset,
     pub(crate) summaries: &'a [Vec<Summary>],
@@ -29,21 +29,21 @@ pub(crate) struct Workspace<'a> {
     pub(crate) columns: Option<&'a Columns>,
 }
 
-/// An element on its way.
+/// An element being estimated.
 pub(crate) struct Attempt<'a> {
     pub(crate) work: &'a Workspace<'a>,
     pub(crate) session: &'a Session,
     pub(crate) beam: usize,
     pub(crate) azimuth: f64,
     pub(crate) facet: &'a NominalFacet,
-    /// What the facet's plane is believed to make of it.
+    /// The deflection by the believed plane of its facet.
     pub(crate) nominal: Deflection,
     pub(crate) distance: BareDistance,
-    /// Believed noise of one reading, in metres.
+    /// Believed noise of one reading, in meters.
     pub(crate) noise: f64,
-    /// Poses recorded for its facet.
+    /// Number of poses recorded for its facet.
     pub(crate) recorded: usize,
-    /// Those whose readings are ranges of ordinary spread.
+    /// Poses whose readings are ranges with an ordinary spread.
     pub(crate) usable: Vec<usize>,
 }
 
@@ -57,7 +57,7 @@ impl<'a> Attempt<'a> {
     ) -> Self {
         let noise = session.believed.range_noise_sd_mm * 1e-3;
         let distance = work.bare.distance(session, &facet.name, beam).map_or(
-            // Nobody measured it: the drawing's mirror, whose face is its own.
+            // Not measured: the mirror as drawn, whose face is the distance itself.
             BareDistance {
                 distance: nominal.distance,
                 thickness: 0.0,
@@ -129,7 +129,7 @@ impl<'a> Attempt<'a> {
         }
     }
 
-    /// The budget as if the mounting were known: what the boards themselves determine.
+    /// The budget as if the mounting were known: what the boards alone determine.
     pub(crate) fn boards_alone(&self, at: &Deflection, observations: &[Observation]) -> Option<Budget> {
         let views: Vec<BoardView> = observations.iter().map(|o| o.board).collect();
         covariance::budget(self.session, &MountUncertainty::none(), self.azimuth, at, &views)
@@ -140,14 +140,14 @@ impl<'a> Attempt<'a> {
         covariance::budget(self.session, self.work.mount, self.azimuth, at, &views)
     }
 
-    /// The direction that boards leave open, if they do.
+    /// The direction that boards leave open, if any.
     pub(crate) fn weakness(&self, at: &Deflection, poses: &[usize]) -> Option<Weakness> {
         let budget = self.boards_alone(at, &self.observations(poses))?;
         observability::weakness(&budget, at.elevation)
     }
 }
 
-/// A solution and the boards it rests on.
+/// A solution and the boards used for it.
 pub(crate) struct Fit {
     pub(crate) poses: Vec<usize>,
     pub(crate) solution: Solution,
@@ -161,14 +161,14 @@ pub(crate) struct Failure {
 }
 
 impl Fit {
-    /// Root mean square residual over the boards, in metres.
+    /// Root-mean-square residual over the boards, in meters.
     pub(crate) fn rms(&self) -> f64 {
         let sum: f64 = self.solution.residuals.iter().map(|r| r * r).sum();
         (sum / self.solution.residuals.len() as f64).sqrt()
     }
 }
 
-/// The iteration ran to where a board is no longer ahead.
+/// The iteration reached a direction in which some board is no longer ahead.
 pub(crate) fn lost() -> Failure {
     Failure {
         status: Status::NotConverged,
@@ -176,7 +176,7 @@ pub(crate) fn lost() -> Failure {
     }
 }
 
-/// Readings that cannot be those of one beam on the boards.
+/// The readings cannot be those of one beam on the boards.
 pub(crate) fn rejected(reason: String) -> Failure {
     Failure {
         status: Status::Rejected,

@@ -1,30 +1,30 @@
-//! Which boards an element hits: those that hold its spot where the estimate puts it, and whose range agrees.
+//! Chooses the boards that an element hits: those that hold its spot at the current estimate and whose range agrees.
 
-use crate::element::attempt::{Attempt, LEAST_BOARDS, Workspace};
+use crate::element::attempt::{Attempt, MIN_BOARDS, Workspace};
 use crate::readings::observations::{azimuth, cone_half_angle};
 use catoptric_model::session::NominalFacet;
 use catoptric_model::{BeamEstimate, Deflection, MirrorPlane, beam};
 
-/// Residual that is always taken as the board's own, in metres; a wall behind it differs by decimeters.
+/// Residual that always counts as the board's own, in meters; a wall behind it differs by decimeters.
 pub(crate) const GATE_FLOOR: f64 = 0.03;
 
-/// Standard deviations within which a residual is taken as the board's own.
+/// Gate on residuals that count as the board's own, in standard deviations.
 pub(crate) const GATE_SIGMAS: f64 = 6.0;
 
-/// Board to spare around a spot once the direction is known, in metres.
+/// Margin of board required around a spot once the direction is known, in meters.
 const EDGE_MARGIN: f64 = 5e-3;
 
 /// The poses whose board holds the beam and whose range agrees, for a direction known to `stage` radians.
 pub(crate) fn choose(attempt: &Attempt, at: &Deflection, stage: f64) -> Vec<usize> {
     let strict = choose_within(attempt, at, stage, 0.0);
-    if strict.len() < LEAST_BOARDS && stage > 0.0 {
+    if strict.len() < MIN_BOARDS && stage > 0.0 {
         choose_within(attempt, at, stage, stage)
     } else {
         strict
     }
 }
 
-/// `overhang` lets the predicted hit lie that far, in radians of direction, outside the board.
+/// `overhang` allows the predicted hit to be outside the board by that much, in radians of direction.
 fn choose_within(attempt: &Attempt, at: &Deflection, stage: f64, overhang: f64) -> Vec<usize> {
     let (origin, v) = (
         at.deflection_point(attempt.azimuth),
@@ -36,7 +36,7 @@ fn choose_within(attempt: &Attempt, at: &Deflection, stage: f64, overhang: f64) 
         let hit = board.hit(&origin, &v)?;
         let cos_incidence = board.plane.cos_incidence(&v);
         let tan = (1.0 / (cos_incidence * cos_incidence) - 1.0).max(0.0).sqrt();
-        // While the direction is a guess, the chief ray on the board is enough; later the whole spot has to be.
+        // While the direction is a guess, the chief ray has to hit the board; later the whole spot has to.
         let (radius, margin) = if stage > 0.0 {
             (0.0, -overhang * hit.distance / cos_incidence)
         } else {
@@ -62,7 +62,7 @@ fn choose_within(attempt: &Attempt, at: &Deflection, stage: f64, overhang: f64) 
         .collect()
 }
 
-/// The stretches whose boards an element hits, where its estimate or else its facet's plane puts it.
+/// The stretches whose boards an element hits, by its estimate or, without one, by its facet's plane.
 pub(crate) fn boards_hit(
     work: &Workspace,
     estimate: &BeamEstimate,

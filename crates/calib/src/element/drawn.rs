@@ -1,24 +1,27 @@
-//! What calibrating has to improve on: the drawing, with nothing measured but d.
+//! The baseline that a calibration has to improve on: the drawing, with nothing measured but d.
 
 use crate::element::solve::BareDistance;
 use crate::readings::bare::Bare;
 use crate::readings::observations::azimuth;
-use crate::screen::Candidate;
+use crate::screen::ScreenClass;
 use catoptric_model::{BeamEstimate, MirrorPlane, Session, Status, beam};
 
-/// What the drawing says of every element that a mirror may deflect; nobody knows how far it is off.
+/// The drawing's angles of every element that a mirror may deflect, without a covariance, because their error is
+/// unknown.
 pub(crate) fn as_drawn(
     session: &Session,
     bare: &Bare,
-    candidates: &[Candidate],
+    candidates: &[ScreenClass],
     drawn: &[MirrorPlane],
 ) -> Vec<BeamEstimate> {
-    let of_one = |(beam, candidate): (usize, &Candidate)| match candidate {
-        Candidate::Direct(reason) => BeamEstimate::without_angles(beam, Status::Direct, Some(reason.clone())),
-        Candidate::Rejected(reason) => {
+    let of_one = |(beam, candidate): (usize, &ScreenClass)| match candidate {
+        ScreenClass::Direct(reason) => {
+            BeamEstimate::without_angles(beam, Status::Direct, Some(reason.clone()))
+        }
+        ScreenClass::Rejected(reason) => {
             BeamEstimate::without_angles(beam, Status::Rejected, Some(reason.clone()))
         }
-        Candidate::Deflected(near) => {
+        ScreenClass::Deflected(near) => {
             let found = near
                 .iter()
                 .find_map(|f| Some((f, drawn[*f].deflect(beam::direction(azimuth(session, beam)))?)));

@@ -1,6 +1,6 @@
-//! One element from its readings to its estimate: boards and angles chosen in turn until both stand.
+//! Estimates one element from its readings: boards and angles are chosen alternately until neither changes.
 
-use crate::element::attempt::{Attempt, Failure, Fit, LEAST_BOARDS, Workspace, lost};
+use crate::element::attempt::{Attempt, Failure, Fit, MIN_BOARDS, Workspace, lost};
 use crate::element::choose::choose;
 use crate::element::initial::{self, FARTHEST_START};
 use crate::element::single::blocks;
@@ -10,21 +10,22 @@ use crate::element::verdict::{judge, residuals_agree};
 use crate::error::CalibError;
 use crate::readings::columns::{Columns, MOST_BYTES};
 use crate::readings::observations::azimuth;
-use crate::screen::Candidate;
+use crate::screen::ScreenClass;
 use catoptric_model::session::NominalFacet;
 use catoptric_model::{BeamEstimate, Deflection, MirrorPlane, Status, beam};
 use rayon::prelude::*;
 
-/// Direction errors allowed for while the boards of an element are chosen, in radians, from the drawing's to none.
+/// Direction errors allowed while the boards of an element are chosen, in radians, decreasing from that of the drawing
+/// to zero.
 ///
-/// A mirror doubles its tilt: 1° (1σ) of the facet and up to 1° of the scanner in its housing turn a beam by 8° now
-/// and then.
+/// A mirror doubles its tilt: 1° (1σ) of the facet and up to 1° of the scanner in its housing turn a beam by 8°
+/// occasionally.
 const STAGES: [f64; 8] = [0.15, 0.05, 0.02, 0.007, 0.0, 0.0, 0.0, 0.0];
 
-/// How far a solution may end from the estimate that its boards were chosen with, in radians.
+/// Largest distance of a solution from the estimate that its boards were chosen with, in radians.
 const FARTHEST_END: f64 = 0.007;
 
-/// Largest ||v| − 1| of a start in closed form that is believed.
+/// Largest ||v| − 1| at which a start in closed form is believed.
 const LARGEST_EXCESS: f64 = 0.2;
 
 /// The estimate of every element, with facets at the given planes.
@@ -34,7 +35,7 @@ const LARGEST_EXCESS: f64 = 0.2;
 pub(crate) fn estimates(
     work: &Workspace,
     solver: &Solver,
-    candidates: &[Candidate],
+    candidates: &[ScreenClass],
     mirrors: &[MirrorPlane],
 ) -> Result<Vec<BeamEstimate>, CalibError> {
     let mut found = Vec::with_capacity(candidates.len());
@@ -55,23 +56,25 @@ fn of_candidate(
     work: &Workspace,
     solver: &Solver,
     beam: usize,
-    candidate: &Candidate,
+    candidate: &ScreenClass,
     mirrors: &[MirrorPlane],
 ) -> BeamEstimate {
     let facets = &work.dataset.session.facets;
     match candidate {
-        Candidate::Direct(reason) => BeamEstimate::without_angles(beam, Status::Direct, Some(reason.clone())),
-        Candidate::Rejected(reason) => {
+        ScreenClass::Direct(reason) => {
+            BeamEstimate::without_angles(beam, Status::Direct, Some(reason.clone()))
+        }
+        ScreenClass::Rejected(reason) => {
             BeamEstimate::without_angles(beam, Status::Rejected, Some(reason.clone()))
         }
-        Candidate::Deflected(near) => {
+        ScreenClass::Deflected(near) => {
             let mut tried = near
                 .iter()
                 .map(|f| estimate(work, solver, beam, &facets[*f], &mirrors[*f]));
             let nearest = tried.next();
             match nearest {
                 Some(solved) if solved.status == Status::Solved => solved,
-                // At the seam of two facets the neighbor may be the one that was met.
+                // At the seam of two facets the beam may have hit the neighboring one.
                 other => tried
                     .find(|e| e.status == Status::Solved)
                     .or(other)
@@ -108,9 +111,9 @@ fn estimate(
         Err(failure) => without(failure.status, failure.reason),
     };
     if matches!(estimate.status, Status::TooFewPoses | Status::NotConverged) {
-        // A solver that wandered off may only have had nothing to hold on to.
+        // The solver may have diverged only because the boards leave a direction open.
         let chosen = choose(&attempt, &nominal, STAGES[0]);
-        if chosen.len() >= LEAST_BOARDS
+        if chosen.len() >= MIN_BOARDS
             && let Some(weakness) = attempt.weakness(&nominal, &chosen)
         {
             estimate = without(Status::Unobservable, weakness.reason.clone());
@@ -121,14 +124,14 @@ fn estimate(
     estimate
 }
 
-/// Chooses boards and solves, ever more strictly, until the choice no longer changes.
+/// Chooses boards and solves, with a decreasing allowance, until the choice no longer changes.
 fn fit(solver: &Solver, attempt: &Attempt, nominal: &Deflection) -> Result<Fit, Failure> {
     let mut at = Element::place(&attempt.element(&[]), nominal.azimuth, nominal.elevation);
     let mut poses = Vec::new();
     let mut start = at;
     for (round, stage) in STAGES.iter().enumerate() {
         let chosen = choose(attempt, &at, *stage);
-        if chosen.len() < LEAST_BOARDS {
+        if chosen.len() < MIN_BOARDS {
             return Err(too_few(attempt, chosen.len()));
         }
         if *stage == 0.0 && chosen == poses {
@@ -146,8 +149,8 @@ fn fit(solver: &Solver, attempt: &Attempt, nominal: &Deflection) -> Result<Fit, 
             .deflection;
     }
     let fit = solved_by(solver, attempt, poses, &start, &at)?;
-    if fit.poses.len() > LEAST_BOARDS && !residuals_agree(solver, attempt, &fit) {
-        // One foreign surface among the boards pulls the rest along; without it, it stands out.
+    if fit.poses.len() > MIN_BOARDS && !residuals_agree(solver, attempt, &fit) {
+        // One wrong surface among the boards biases the residuals of the others; without it, it is an obvious outlier.
         if let Some(better) = without_one(solver, attempt, &fit) {
             return Ok(better);
         }
@@ -155,7 +158,7 @@ fn fit(solver: &Solver, attempt: &Attempt, nominal: &Deflection) -> Result<Fit, 
     Ok(fit)
 }
 
-/// The solution by the solver asked for, from the start; from the present estimate if that does not settle.
+/// The solution by the given solver, from the start, or from the present estimate if that does not converge.
 fn solved_by(
     solver: &Solver,
     attempt: &Attempt,
@@ -189,7 +192,7 @@ fn solved_by(
     })
 }
 
-/// The start in closed form where it is to be believed, else the drawing.
+/// The start in closed form if it is credible, else the drawing.
 fn first_guess(attempt: &Attempt, element: &Element, nominal: &Deflection) -> Deflection {
     let found = initial::closed_form(nominal, attempt.azimuth, element.observations, element.bias);
     let v = nominal.exit_direction(attempt.azimuth);
@@ -200,7 +203,7 @@ fn first_guess(attempt: &Attempt, element: &Element, nominal: &Deflection) -> De
         })
 }
 
-/// A consistent solution without one of the boards, if that board is then plainly not what the element read.
+/// A consistent solution without one of the boards, if that board is then clearly not what the element read.
 fn without_one(solver: &Solver, attempt: &Attempt, fit: &Fit) -> Option<Fit> {
     let fits = fit.poses.iter().filter_map(|omitted| {
         let rest: Vec<usize> = fit.poses.iter().copied().filter(|p| p != omitted).collect();
@@ -219,7 +222,7 @@ fn too_few(attempt: &Attempt, chosen: usize) -> Failure {
     Failure {
         status: Status::TooFewPoses,
         reason: format!(
-            "{LEAST_BOARDS} boards are needed; of {} set up for facet {:?} it read {} in order and hit {chosen}",
+            "{MIN_BOARDS} boards are needed; of {} set up for facet {:?} it read {} in order and hit {chosen}",
             attempt.recorded,
             attempt.facet.name,
             attempt.usable.len()

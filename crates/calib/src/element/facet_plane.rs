@@ -1,4 +1,4 @@
-//! The plane of a facet: as drawn, and as its elements find it.
+//! The plane of a facet, as drawn and as estimated from its elements.
 
 use crate::error::CalibError;
 use crate::readings::observations::azimuth;
@@ -6,10 +6,10 @@ use catoptric_model::session::{NominalFacet, Session};
 use catoptric_model::{BeamEstimate, Deflection, MirrorPlane, beam, mirror};
 use nalgebra::{Unit, Vector3};
 
-/// Solved elements from which a facet's plane as built is taken.
-const LEAST_ELEMENTS: usize = 5;
+/// Minimum number of solved elements for estimating a facet's plane as built.
+const MIN_ELEMENTS: usize = 5;
 
-/// The plane that the drawing gives it, in the sensor frame.
+/// The facet's plane as drawn, in the sensor frame.
 pub(crate) fn plane_as_drawn(facet: &NominalFacet) -> Result<MirrorPlane, CalibError> {
     let plane = facet.plane().ok_or_else(|| CalibError::Facet {
         name: facet.name.clone(),
@@ -18,7 +18,7 @@ pub(crate) fn plane_as_drawn(facet: &NominalFacet) -> Result<MirrorPlane, CalibE
     Ok(MirrorPlane::through(plane.point, plane.normal))
 }
 
-/// The planes of all facets as their solved elements find them, or else as drawn.
+/// The planes of all facets as estimated from their solved elements, or as drawn if there are too few.
 pub(crate) fn as_built(
     session: &Session,
     drawn: &[MirrorPlane],
@@ -30,7 +30,7 @@ pub(crate) fn as_built(
         .collect()
 }
 
-/// The plane that most of a facet's solved elements agree on: medians, which a few strays do not move.
+/// The plane that most of a facet's solved elements agree on: medians, which are robust to a few outliers.
 pub(crate) fn plane_as_built(
     session: &Session,
     facet: &NominalFacet,
@@ -57,10 +57,10 @@ pub(crate) fn plane_as_built(
         normal: Unit::try_new(normal, f64::MIN_POSITIVE)?,
         offset: median(&|p| p.offset)?,
     };
-    (planes.len() >= LEAST_ELEMENTS).then_some(plane)
+    (planes.len() >= MIN_ELEMENTS).then_some(plane)
 }
 
-/// The plane of a mirror that deflects a beam so.
+/// The plane of a mirror that causes a given deflection.
 pub(crate) fn plane_between(azimuth: f64, deflection: &Deflection) -> Option<MirrorPlane> {
     let exit = deflection.exit_direction(azimuth);
     let normal = mirror::normal_between(&beam::direction(azimuth), &exit)?;

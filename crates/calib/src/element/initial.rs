@@ -6,14 +6,14 @@ use crate::readings::observations::Observation;
 use catoptric_model::{Deflection, RangeBias, frame};
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Matrix3xX, SymmetricEigen, Unit, Vector3};
 
-/// Smallest ratio of singular values at which the linear system counts as of rank three.
-const LEAST_CONDITION: f64 = 1e-2;
+/// Smallest ratio of singular values at which the linear system has rank three.
+const MIN_CONDITION: f64 = 1e-2;
 
-/// A start in closed form that is farther than this from the drawing is noise, in radians.
+/// Distance from the drawing beyond which a start in closed form is noise, in radians.
 pub(crate) const FARTHEST_START: f64 = 0.35;
 
-/// Times that a bias is looked up at the range corrected by it: biases change by under a hundredth of the range, so each
-/// brings two digits.
+/// Iterations in which a bias is looked up at the range corrected by it: biases change by less than a hundredth of the
+/// range, so each iteration adds two digits.
 const CORRECTIONS: usize = 7;
 
 /// A direction found in closed form.
@@ -21,11 +21,11 @@ const CORRECTIONS: usize = 7;
 pub struct ClosedForm {
     /// The exit direction v.
     pub direction: Unit<Vector3<f64>>,
-    /// |v| − 1 before it was normalized: nothing in the linear system makes it zero except the truth.
+    /// |v| − 1 before v was normalized: nothing in the linear system makes it zero except the truth.
     pub excess: f64,
 }
 
-/// Least squares for v over at least three boards, from a nominal deflection that only places P_L1 and the biases.
+/// Least squares for v over at least three boards. The nominal deflection only places P_L1 and the biases.
 ///
 /// `None` if the boards do not determine v.
 pub fn closed_form(
@@ -44,13 +44,13 @@ pub fn closed_form(
             bias.correct(o.mean, range, cos_incidence, o.board.color).0
         });
         let s = range - nominal.distance;
-        // Multiplied by s, so that every row weighs its range error alike: s·q·v = 1.
+        // Multiplied by s, so that every row weights its range error equally: s·q·v = 1.
         let row = plane.normal.into_inner() * (s / plane.normal.dot(&(plane.point - from)));
         normal += row * row.transpose();
         right += row;
     }
     let values = SymmetricEigen::new(normal).eigenvalues;
-    if observations.len() < 3 || values.min() < LEAST_CONDITION * LEAST_CONDITION * values.max() {
+    if observations.len() < 3 || values.min() < MIN_CONDITION * MIN_CONDITION * values.max() {
         return None;
     }
     let found = normal.try_inverse()? * right;
@@ -62,8 +62,8 @@ pub fn closed_form(
 
 /// Covariance of (θ_a, φ) in closed form, from the covariance Σ of the ranges, in rad².
 ///
-/// An error δz of a range changes its row's s·q·v by δz/s, so v by −(Σqqᵀ)⁻¹q·δz/s with q as in [`closed_form`], of
-/// which the part across v remains when v is normalized.
+/// An error δz of a range changes its row's s·q·v by δz/s, so v by −(Σqqᵀ)⁻¹q·δz/s with q as in [`closed_form`]. Of
+/// this, the part perpendicular to v remains when v is normalized.
 pub(crate) fn covariance(
     at: &Deflection,
     beam_azimuth: f64,
@@ -110,7 +110,7 @@ mod tests {
                     noise_sd: 0.0,
                     count: 1,
                 },
-                mean: RawRange(range::predict(&truth, 0.3, &plane).expect("it meets the board")),
+                mean: RawRange(range::predict(&truth, 0.3, &plane).expect("the beam hits the board")),
             }
         });
         let guess = Deflection {
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hinge_is_no_start() {
+    fn a_hinge_gives_no_start() {
         assert_eq!(
             found([[-0.9, 0.0, -0.4], [-0.6, 0.0, -0.6], [-0.2, 0.0, -0.9]]),
             None

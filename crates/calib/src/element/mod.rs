@@ -1,5 +1,5 @@
-//! One element by itself (steps 11 and 12): which boards it hits, its angles by the solver that a method names, and whether they are to be
-//! believed (step 13).
+//! One element individually (steps 11 and 12): which boards it hits, its angles by the solver of a method, and whether
+//! to believe them (step 13).
 
 mod ambiguity;
 pub(crate) mod attempt;

@@ -1,9 +1,9 @@
-//! The angles of one element by recursive least squares: reading after reading, in gain form.
+//! The angles of one element by recursive least squares: reading by reading, in gain form.
 //!
-//! With P the covariance over σ² and h the row of a reading, K = P·h/(1 + hᵀP·h), x ← x + K·(y − hᵀx),
-//! P ← P − K·hᵀP. A sweep over all readings solves the problem linearized at its start; sweeps repeat at the new estimate.
+//! With P the covariance over σ² and h the row of a reading, K = P·h/(1 + hᵀP·h), x ← x + K·(y − hᵀx), P ← P − K·hᵀP. A
+//! sweep over all readings solves the problem linearized at its start; sweeps repeat at the new estimate.
 //!
-//! Unlike the paper, whose "RLS" is the batch form of Eq. (8), this is the recursion; both end at the same estimate.
+//! Unlike the paper, whose "RLS" is the batch form of Eq. (8), this is the recursion; both reach the same estimate.
 
 use crate::element::solve::{Element, Solution};
 use crate::judge::levers::{levers, libm_cos};
@@ -13,14 +13,14 @@ use nalgebra::{Matrix2, Vector2};
 
 /// Smallest ratio of lever arms at which the first readings may start the recursion.
 ///
-/// A diffuse prior P = ∞ would bias the answer or cost its digits. Until the boards read so far span both angles, the
-/// sums of Eq. (8) are kept instead (the information form), and P starts as their exact inverse.
+/// A diffuse prior P = ∞ would bias the estimate or cost digits. Until the boards read so far span both angles, the
+/// sums of Eq. (8) are accumulated instead (the information form), and P starts as their exact inverse.
 const STARTING_RATIO: f64 = 1e-2;
 
-/// A sweep over thousands of readings cannot end closer than their roundings, in radians.
+/// Limit of a sweep over thousands of readings by rounding, in radians.
 const SWEEP_TOLERANCE: f64 = 1e-12;
 
-/// Where the recursion stands within a sweep.
+/// State of the recursion within a sweep.
 enum State {
     /// Both angles not yet determined: Σ h hᵀ and Σ h y.
     Gathering(Matrix2<f64>, Vector2<f64>),
@@ -30,7 +30,7 @@ enum State {
 
 /// Recursive least squares over the readings of each observation, in order, from a start.
 ///
-/// `readings` holds the raw ranges, in metres, of each observation. `None` if the ray misses a board or the readings do
+/// `readings` holds the raw ranges, in meters, of each observation. `None` if the ray misses a board or the readings do
 /// not determine both angles.
 ///
 /// ```
@@ -41,7 +41,7 @@ enum State {
 /// let truth = Deflection { azimuth: 0.2, elevation: 0.9, distance: 0.07 };
 /// let planes = [[-0.9, 0.0, -0.4], [-0.5, 0.6, -0.6], [-0.5, -0.6, -0.6]]
 ///     .map(|n| BoardPlane::new(Point3::new(1.0, 0.4, 1.4), Unit::new_normalize(Vector3::from(n))));
-/// let readings = planes.map(|p| vec![range::predict(&truth, 0.3, &p).expect("it meets the board"); 4]);
+/// let readings = planes.map(|p| vec![range::predict(&truth, 0.3, &p).expect("the beam hits the board"); 4]);
 /// let observations: Vec<_> = planes.iter().zip(&readings).map(|(plane, z)| Observation {
 ///     board: BoardView { plane: *plane, markers: &[], color: "white", noise_sd: 0.004, count: 4 },
 ///     mean: RawRange(z[0]),
@@ -90,7 +90,7 @@ fn sweep(
 }
 
 impl State {
-    /// Takes in one reading: y = hᵀx + noise.
+    /// Processes one reading: y = hᵀx + noise.
     fn update(self, h: &Vector2<f64>, y: f64, cos_elevation: f64) -> Self {
         match self {
             Self::Gathering(mut information, mut sum) => {

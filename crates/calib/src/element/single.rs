@@ -3,7 +3,7 @@
 use crate::element::attempt::Workspace;
 use crate::element::solver::Solver;
 use crate::readings::columns::{self, Wanted};
-use crate::screen::Candidate;
+use crate::screen::ScreenClass;
 use catoptric_model::{PoseKind, PoseRecord};
 use std::ops::Range;
 
@@ -17,7 +17,7 @@ pub(super) struct Block {
 pub(super) fn blocks(
     work: &Workspace,
     solver: &Solver,
-    candidates: &[Candidate],
+    candidates: &[ScreenClass],
     most_bytes: usize,
 ) -> Vec<Block> {
     if !solver.single_readings {
@@ -26,7 +26,7 @@ pub(super) fn blocks(
             wanted: Vec::new(),
         }];
     }
-    let bytes = |candidate: &Candidate| -> usize {
+    let bytes = |candidate: &ScreenClass| -> usize {
         let wanted = wanted_poses(work, candidate);
         wanted.map(|pose| columns::bytes(&work.dataset.poses[pose])).sum()
     };
@@ -43,7 +43,7 @@ pub(super) fn blocks(
     blocks
 }
 
-fn block(work: &Workspace, candidates: &[Candidate], beams: Range<usize>) -> Block {
+fn block(work: &Workspace, candidates: &[ScreenClass], beams: Range<usize>) -> Block {
     let mut wanted = vec![Vec::new(); work.dataset.poses.len()];
     for beam in beams.clone() {
         for pose in wanted_poses(work, &candidates[beam]) {
@@ -58,10 +58,10 @@ fn block(work: &Workspace, candidates: &[Candidate], beams: Range<usize>) -> Blo
 }
 
 /// The stretches whose readings may take part in an estimate: those of boards before its facets.
-fn wanted_poses<'a>(work: &'a Workspace, candidate: &'a Candidate) -> impl Iterator<Item = usize> + 'a {
+fn wanted_poses<'a>(work: &'a Workspace, candidate: &'a ScreenClass) -> impl Iterator<Item = usize> + 'a {
     let near: &[usize] = match candidate {
-        Candidate::Deflected(near) => near,
-        Candidate::Direct(_) | Candidate::Rejected(_) => &[],
+        ScreenClass::Deflected(near) => near,
+        ScreenClass::Direct(_) | ScreenClass::Rejected(_) => &[],
     };
     let facets = &work.dataset.session.facets;
     let is_near = move |name: &String| near.iter().any(|f| facets[*f].name == *name);

@@ -1,7 +1,7 @@
 //! The angles of one element from its ranges (step 11): batch Gauss–Newton, Eqs. (7)–(8).
 //!
-//! Every step corrects the readings (Eq. 3) and places the mirror at the current estimate, so that data without noise
-//! return the truth itself and not a neighbor of it.
+//! Every step corrects the readings, Eq. (3), and places the mirror at the current estimate, so that noise-free data
+//! return the truth itself and not a point near it.
 
 use crate::judge::levers::{levers, off_zero};
 use crate::options::{JacobianForm, Options};
@@ -12,31 +12,31 @@ use catoptric_model::bias::ColoredBias;
 use catoptric_model::{BoardPlane, CorrectedRange, Deflection, RangeBias, beam};
 use nalgebra::{Matrix2, Unit, Vector2, Vector3};
 
-/// Lever arm, in metres per radian, below which a direction counts as undetermined within the iteration.
+/// Lever arm, in meters per radian, below which a direction counts as undetermined within the iteration.
 ///
-/// A residual of a millimetre along such a lever would turn the beam by 11°: no step is taken along it. Elements with
+/// A residual of a millimeter along such a lever would turn the beam by 11°: no step is taken along it. Elements with
 /// levers several times longer are already reported as unobservable.
 const SHORTEST_LEVER: f64 = 5e-3;
 
-/// Longest step of one iteration, in radians; more would leave the range equation's linear neighborhood.
+/// Longest step of one iteration, in radians; a longer one would leave the linear neighborhood of the range equation.
 const LONGEST_STEP: f64 = 0.5;
 
-/// Smallest |m·u| at which a mirror's thickness is divided by it; a flatter mirror would not be met by the spot.
-const LEAST_FACING: f64 = 0.05;
+/// Smallest |m·u| by which a mirror's thickness is divided; the spot would miss a mirror at a more grazing angle.
+const MIN_FACING: f64 = 0.05;
 
-/// Step 3: range to the structure before the mirror was glued on, and the mirror's thickness along its normal.
+/// Step 3: range to the structure before the mirror was attached, and the mirror's thickness along its normal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BareDistance {
-    /// Distance from the sensor origin to the bare structure, in metres.
+    /// Distance from the sensor origin to the bare structure, in meters.
     pub distance: f64,
-    /// Thickness t of the mirror, in metres.
+    /// Thickness t of the mirror, in meters.
     pub thickness: f64,
 }
 
 impl BareDistance {
     /// Distance d to the mirror's face for a beam that leaves it in direction v: bare − t/|m·u|.
     ///
-    /// The normal m is along v − u, so |m·u| = √((1 − u·v)/2), here as |v − u|/2, which keeps its digits.
+    /// The normal m is along v − u, so |m·u| = √((1 − u·v)/2), here computed as |v − u|/2, which keeps its digits.
     #[doc(alias = "d")]
     pub fn to_mirror(&self, beam_azimuth: f64, exit: &Unit<Vector3<f64>>) -> f64 {
         self.face_along(&beam::direction(beam_azimuth), exit)
@@ -47,7 +47,7 @@ impl BareDistance {
             return self.distance;
         }
         let facing = 0.5 * (exit.into_inner() - u.into_inner()).norm();
-        self.distance - self.thickness / facing.max(LEAST_FACING)
+        self.distance - self.thickness / facing.max(MIN_FACING)
     }
 }
 
@@ -56,28 +56,28 @@ impl BareDistance {
 pub struct Element<'a> {
     /// Base azimuth θ_b, in radians.
     pub azimuth: f64,
-    /// What it read of the boards it meets.
+    /// Its readings of the boards it hits.
     pub observations: &'a [Observation<'a>],
-    /// Where its mirror is.
+    /// Measured distance of its mirror.
     pub distance: BareDistance,
     /// The believed biases.
     pub bias: &'a RangeBias,
 }
 
-/// What an iteration came to.
+/// The result of an iteration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
     /// θ_a, φ and d.
     pub deflection: Deflection,
     /// Steps taken.
     pub iterations: usize,
-    /// Whether the last step was as short as asked for.
+    /// Whether the last step was below the tolerance.
     pub converged: bool,
-    /// z − r̂ of each board, in metres.
+    /// z − r̂ of each board, in meters.
     pub residuals: Vec<f64>,
 }
 
-/// What is the same at every estimate: the beam's direction, the biases of each board, and the number of readings.
+/// What does not depend on the estimate: the beam's direction, the biases of each board, and the number of readings.
 struct Known<'e> {
     u: Unit<Vector3<f64>>,
     biases: Vec<ColoredBias<'e>>,
@@ -88,14 +88,14 @@ struct Known<'e> {
 pub(crate) struct Row {
     /// (∂r/∂θ_a, ∂r/∂φ).
     pub(crate) gradient: Vector2<f64>,
-    /// Predicted range r̂, in metres.
+    /// Predicted range r̂, in meters.
     pub(crate) predicted: f64,
-    /// E_a + E_c + E_r at the estimate, in metres.
+    /// E_a + E_c + E_r at the estimate, in meters.
     pub(crate) bias: f64,
 }
 
 impl Element<'_> {
-    /// The estimate with its distance d brought up to date.
+    /// The estimate with its distance d updated.
     pub fn place(&self, azimuth: f64, elevation: f64) -> Deflection {
         let bare = Deflection {
             azimuth,
@@ -111,7 +111,7 @@ impl Element<'_> {
         Deflection { distance, ..bare }
     }
 
-    /// What is the same at every estimate.
+    /// What does not depend on the estimate.
     fn known(&self) -> Known<'_> {
         Known {
             u: beam::direction(self.azimuth),
@@ -169,7 +169,7 @@ impl Element<'_> {
         Some((ray.range(plane)?, angles))
     }
 
-    /// HᵀH and Hᵀ(z − r̂) at an estimate, each board weighted by its part of all readings.
+    /// HᵀH and Hᵀ(z − r̂) at an estimate, each board weighted by its share of all readings.
     fn normal(
         &self,
         known: &Known,
@@ -199,7 +199,7 @@ impl Element<'_> {
         self.observations.iter().map(row).collect()
     }
 
-    /// z − r̂ of each board at an estimate, with z corrected by Eq. (3), in metres; `None` if the ray misses one.
+    /// z − r̂ of each board at an estimate, with z corrected by Eq. (3), in meters; `None` if the ray misses one.
     pub fn residuals(&self, at: &Deflection) -> Option<Vec<f64>> {
         let ray = OutgoingRay::of(at, self.azimuth);
         let mut residuals = Vec::with_capacity(self.observations.len());
@@ -227,8 +227,8 @@ impl Element<'_> {
 
 /// Batch Gauss–Newton: Δx = (HᵀH)⁻¹Hᵀ(z − r̂), Eq. (8), over all readings, repeated until the step is short.
 ///
-/// The mean of a board's readings, weighted by their number, gives the same sums as the readings one by one. `None` if
-/// the ray misses a board on the way.
+/// The mean of a board's readings, weighted by their number, gives the same sums as the individual readings. `None` if
+/// the ray misses a board during the iteration.
 #[doc(alias = "RLS")]
 pub fn batch(element: &Element, start: &Deflection, options: &Options) -> Option<Solution> {
     let known = element.known();
@@ -250,7 +250,8 @@ pub(crate) fn determined_step(
     right: &Vector2<f64>,
     cos_elevation: f64,
 ) -> Vector2<f64> {
-    // Both levers are long enough if the shorter squared, at least det/trace, is: nothing then needs to be taken apart.
+    // Both levers are long enough if the shorter one squared, which is at least det/trace, is: no decomposition is
+    // needed.
     let tangent = Matrix2::new(
         normal[(0, 0)] / (cos_elevation * cos_elevation),
         normal[(0, 1)] / cos_elevation,

@@ -1,4 +1,4 @@
-//! How an element is solved by itself: the angles from a start, and what an error of the ranges makes of them.
+//! A solver for one element alone: its angles from a start, and the effect of range errors on them.
 
 use crate::element::attempt::Attempt;
 use crate::element::solve::{Element, Solution};
@@ -7,7 +7,7 @@ use crate::options::Options;
 use catoptric_model::Deflection;
 use nalgebra::{DMatrix, Matrix2};
 
-/// One way to solve an element.
+/// One method of solving an element.
 pub(crate) struct Solver {
     /// Whether it goes through the readings one by one, which have to be in memory then.
     pub(crate) single_readings: bool,
@@ -19,13 +19,13 @@ pub(crate) struct Solver {
     pub(crate) covariance: fn(&Element, &Deflection, &Budget) -> Option<Matrix2<f64>>,
 }
 
-/// What is to be solved.
+/// The problem to be solved.
 pub(crate) struct Task<'a> {
     pub(crate) attempt: &'a Attempt<'a>,
     pub(crate) element: &'a Element<'a>,
     /// The stretches whose boards are used, in the order of the element's observations.
     pub(crate) poses: &'a [usize],
-    /// Where the iteration starts.
+    /// Start of the iteration.
     pub(crate) from: &'a Deflection,
     /// The estimate that the boards were chosen with.
     pub(crate) at: &'a Deflection,

@@ -1,4 +1,4 @@
-//! Can an estimate be believed? Its residuals, its weakest direction, and the known room (step 13).
+//! Is an estimate credible? Checks its residuals, its weakest direction and the known room (step 13).
 
 use crate::element::ambiguity::second_direction;
 use crate::element::attempt::{Attempt, Failure, Fit, lost, rejected};
@@ -11,14 +11,14 @@ use crate::readings::spread;
 use catoptric_model::{BeamEstimate, Deflection, PoseKind, RawRange, Status, frame};
 use nalgebra::{Matrix2, Vector2};
 
-/// How much larger than expected the residuals of a good element may be. A solution from three boards leaves one
-/// Gaussian number: one in a million exceeds five standard deviations.
+/// Largest ratio of a good element's residuals to the expected ones. A solution from three boards leaves one Gaussian
+/// number: one in a million exceeds five standard deviations.
 const RESIDUAL_FACTOR: f64 = 5.0;
 
-/// Residual that no belief covers, in metres: whole millimetres, beam size, laws that miss their own tables.
+/// Residual that no belief covers, in meters: whole millimeters, beam size, laws that deviate from their own tables.
 const RESIDUAL_FLOOR: f64 = 4e-3;
 
-/// Largest credible rms residual of a fit, and the expected one, in metres.
+/// Largest credible rms residual of a fit, and the expected one, in meters.
 fn residual_limit(solver: &Solver, attempt: &Attempt, fit: &Fit) -> Option<(f64, f64)> {
     let observations = attempt.observations(&fit.poses);
     let budget = attempt.budget(&fit.solution.deflection, &observations)?;
@@ -27,12 +27,12 @@ fn residual_limit(solver: &Solver, attempt: &Attempt, fit: &Fit) -> Option<(f64,
     Some((RESIDUAL_FACTOR * expected + RESIDUAL_FLOOR, expected))
 }
 
-/// Whether what a fit leaves is as small as everything believed in makes it.
+/// Whether a fit's residuals are as small as all believed errors predict.
 pub(crate) fn residuals_agree(solver: &Solver, attempt: &Attempt, fit: &Fit) -> bool {
     residual_limit(solver, attempt, fit).is_some_and(|(limit, _)| fit.rms() <= limit)
 }
 
-/// The estimate, if nothing speaks against it.
+/// The estimate, if it passes every check.
 pub(crate) fn judge(solver: &Solver, attempt: &Attempt, fit: &Fit) -> Result<BeamEstimate, Failure> {
     let solution = &fit.solution;
     let observations = attempt.observations(&fit.poses);
@@ -100,7 +100,7 @@ pub(crate) fn judge(solver: &Solver, attempt: &Attempt, fit: &Fit) -> Result<Bea
     let element = attempt.element(&observations);
     let covariance = (solver.covariance)(&element, &solution.deflection, &budget).ok_or_else(lost)?;
     check_room(attempt, &solution.deflection, &covariance)?;
-    // One number for all readings, as the paper has it: their pooled noise.
+    // One number for all readings, as in the paper: their pooled noise.
     let pooled: f64 = observations
         .iter()
         .map(|o| o.board.count as f64 * o.board.noise_sd.powi(2))

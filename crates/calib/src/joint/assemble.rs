@@ -1,4 +1,4 @@
-//! The joint problem put together from a dataset: groups of facets, boards before undeflected beams, the mounting.
+//! Builds the joint problem from a dataset: groups of facets, boards in front of undeflected beams, and the mounting.
 
 use super::fan::Flatness;
 use super::group::{BareFacet, Board, Element, Facet, Group, Sight};
@@ -11,17 +11,17 @@ use crate::mount::mount_data::DirectBoard;
 use crate::mount::pose::{self, Mount, Prior};
 use crate::readings::observations::azimuth;
 use crate::readings::spread;
-use crate::screen::Candidate;
+use crate::screen::ScreenClass;
 use catoptric_model::{BeamEstimate, MirrorPlane, Pose, ScanGeometry, Status, beam};
 use nalgebra::{DVector, Dyn, Matrix6, OMatrix, RowDVector, U6, Vector6};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// Motions of the mounting, the first of the shared numbers.
+/// Number of motions of the mounting, which come first among the shared parameters.
 const MOTIONS: usize = 6;
 
-/// Error that stands for none, in metres, so that everything has a weight.
-const LEAST_SD: f64 = 1e-6;
+/// Smallest standard deviation, in meters: keeps every weight finite where no error is believed in.
+const MIN_SD: f64 = 1e-6;
 
 /// An element that takes part: its facet, and the stretches whose boards it hits.
 pub(crate) struct Assigned {
@@ -30,16 +30,16 @@ pub(crate) struct Assigned {
     pub(crate) poses: Vec<usize>,
 }
 
-/// Elements with boards to be solved together: those solved by themselves, and those that only lacked boards.
+/// Elements that hit boards and can be solved together: those solved individually, and those that only lacked boards.
 pub(crate) fn assigned(
     work: &Workspace,
-    candidates: &[Candidate],
+    candidates: &[ScreenClass],
     mirrors: &[MirrorPlane],
     alone: &[BeamEstimate],
 ) -> Vec<Assigned> {
     let facets = &work.dataset.session.facets;
-    let of_one = |(candidate, estimate): (&Candidate, &BeamEstimate)| {
-        let Candidate::Deflected(near) = candidate else {
+    let of_one = |(candidate, estimate): (&ScreenClass, &BeamEstimate)| {
+        let ScreenClass::Deflected(near) = candidate else {
             return None;
         };
         let facet = match estimate.status {
@@ -59,7 +59,7 @@ pub(crate) fn assigned(
     candidates.par_iter().zip(alone).filter_map(of_one).collect()
 }
 
-/// Facets that share boards, each set by the indices of its facets; facets without elements are in none.
+/// Connected sets of facets that share boards, as facet indices. Facets without elements are in no set.
 pub(super) fn components(facets: usize, assigned: &[Assigned]) -> Vec<Vec<usize>> {
     let mut of: Vec<usize> = (0..facets).collect();
     let mut seen: BTreeMap<usize, usize> = BTreeMap::new();
@@ -85,7 +85,7 @@ pub(super) fn components(facets: usize, assigned: &[Assigned]) -> Vec<Vec<usize>
     sets.into_values().collect()
 }
 
-/// A board as it was tracked in a stretch.
+/// A board as tracked in a stretch.
 fn board(work: &Workspace, pose: usize) -> Option<Board> {
     let (session, record) = (&work.dataset.session, &work.dataset.poses[pose]);
     let sheet = session.board(record.label.board.as_deref()?)?;
@@ -98,7 +98,7 @@ fn board(work: &Workspace, pose: usize) -> Option<Board> {
     })
 }
 
-/// Some facets with their boards and elements.
+/// A group: the given facets with their boards and elements.
 pub(super) fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) -> Group {
     let session = &work.dataset.session;
     let noise = session.believed.range_noise_sd_mm * 1e-3;
@@ -115,7 +115,7 @@ pub(super) fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) 
         let drawn = session.facets[facet].plane();
         let (mut row, mut variance) = (RowDVector::zeros(common.len()), 0.0);
         for (u, distance) in &distances {
-            // By the drawing, as the distances were corrected.
+            // From the drawing, because the distances were corrected by it.
             let cos = drawn.as_ref().map_or(1.0, |plane| plane.normal.dot(u).abs());
             row += common.bare_row(*distance, cos);
             variance += common.bare_sd(*distance, cos).powi(2);
@@ -125,7 +125,7 @@ pub(super) fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) 
             distances,
             thickness: session.bare_structure.mirror_thickness_mm * 1e-3,
             common: row / count,
-            sd: (variance / count).sqrt().max(LEAST_SD),
+            sd: (variance / count).sqrt().max(MIN_SD),
         }
     };
     let mut group = Group {
@@ -152,7 +152,7 @@ pub(super) fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) 
                 sights.push(Sight {
                     board: place,
                     mean: summary.mean,
-                    sd: sd.max(LEAST_SD),
+                    sd: sd.max(MIN_SD),
                     count: summary.count,
                 });
             }
@@ -180,11 +180,11 @@ pub(super) fn along(scan: &ScanGeometry, fan: [usize; 2], beam: usize) -> f64 {
     (scan.along(fan, beam) / half - 1.0).clamp(-1.5, 1.5)
 }
 
-/// One board before undeflected beams.
+/// One board in front of undeflected beams.
 pub(super) fn direct_group(work: &Workspace, selected: &DirectBoard) -> Option<Group> {
-    // Readings believed to have no noise are not rounded either.
+    // Readings believed to be noise-free are not rounded either.
     let exact = work.dataset.session.believed.range_noise_sd_mm == 0.0;
-    let least = |sd: f64| if exact { LEAST_SD } else { sd.max(LEAST_SD) };
+    let floored = |sd: f64| if exact { MIN_SD } else { sd.max(MIN_SD) };
     let elements = selected.rays.iter().map(|ray| Element {
         beam: ray.beam,
         azimuth: ray.azimuth,
@@ -194,7 +194,7 @@ pub(super) fn direct_group(work: &Workspace, selected: &DirectBoard) -> Option<G
         sights: vec![Sight {
             board: 0,
             mean: ray.mean,
-            sd: least(ray.variance.sqrt()),
+            sd: floored(ray.variance.sqrt()),
             count: work.summaries[selected.pose][ray.beam].count,
         }],
     });
@@ -205,7 +205,7 @@ pub(super) fn direct_group(work: &Workspace, selected: &DirectBoard) -> Option<G
     })
 }
 
-/// The mounting as step 5 found it, with what is not known of it among the shared numbers.
+/// The mounting as estimated in step 5, with its uncertainty among the shared parameters.
 pub(super) fn mounting_as_found(work: &Workspace, mount: &Mount) -> (Mounting, DVector<f64>) {
     let count = CommonErrors::of(&work.dataset.session).len();
     let known = &mount.uncertainty;
@@ -216,7 +216,7 @@ pub(super) fn mounting_as_found(work: &Workspace, mount: &Mount) -> (Mounting, D
     (mounting, DVector::zeros(6 + count))
 }
 
-/// The mounting as drawn, to be found anew from everything; motions are counted from where step 5 has put it.
+/// The mounting as drawn, to be estimated from all data; motions are counted from the estimate of step 5.
 pub(super) fn mounting_as_drawn(work: &Workspace, mount: &Mount) -> (Mounting, DVector<f64>) {
     let session = &work.dataset.session;
     let count = CommonErrors::of(session).len();
@@ -236,7 +236,7 @@ pub(super) fn mounting_as_drawn(work: &Workspace, mount: &Mount) -> (Mounting, D
     (mounting, prior_mean(&back, &drawn.sd, count))
 }
 
-/// The problem, and the state to begin with.
+/// The problem and its initial state.
 pub(super) fn begin<'w>(
     work: &Workspace<'w>,
     groups: Vec<Group>,
@@ -260,7 +260,7 @@ pub(super) fn begin<'w>(
     (joint, start)
 }
 
-/// Motion matrix of a mounting that is known as its uncertainty says: independent errors first, then the common ones.
+/// Motion matrix of a mounting with a known uncertainty: independent errors first, then the common ones.
 fn motion_of(
     independent: &Matrix6<f64>,
     common: &OMatrix<f64, U6, Dyn>,
@@ -276,7 +276,7 @@ fn motion_of(
     motion
 }
 
-/// Mean of w for a prior at another mounting: what of it is a motion over its standard deviation.
+/// Mean of w for a prior centered on another mounting: the motion over its standard deviation.
 fn prior_mean(motion: &Vector6<f64>, sd: &Vector6<f64>, count: usize) -> DVector<f64> {
     let mut mean = DVector::zeros(6 + count);
     for i in 0..6 {

@@ -1,4 +1,4 @@
-//! What is said of an element whose direction the joint solution has.
+//! The calibration's entry for an element with a direction from the joint solution.
 
 use super::answer::Answer;
 use super::reach::STRAIGHT_SD;
@@ -8,7 +8,8 @@ use catoptric_model::{BeamEstimate, Status};
 use nalgebra::{Matrix2, Vector2};
 
 impl Answer {
-    /// What is said of the element; where its facet is `bent`, not what is known too badly for its covariance to hold.
+    /// Entry for the element. If its facet is `bent`, a direction that is too uncertain for its covariance to hold is
+    /// reported as open.
     pub(super) fn estimate(&self, facet: String, iterations: usize, bent: bool) -> BeamEstimate {
         let found = BeamEstimate {
             facet: Some(facet),
@@ -48,8 +49,8 @@ impl Answer {
                     sd.to_degrees()
                 )
             } else {
-                "the boards of its facet tell a direction only by how their ranges bend over it: two directions fit \
-                 nearly alike"
+                "the boards of its facet determine a direction only by the curvature of their ranges: two directions fit \
+                 almost equally well"
                     .to_owned()
             };
             return open(direction, reason);

@@ -1,22 +1,22 @@
-//! What a facet makes of a beam: its plane gives the distance, its normal as it is at the beam the direction.
+//! Deflection of a beam by a facet: its plane gives the distance, its local normal at the beam gives the direction.
 
 use super::group::{Element, FIGURE, FIGURE_ORDERS};
 use catoptric_model::{frame, mirror};
 use nalgebra::{DVector, Unit, Vector3};
 
-/// Root mean square of a figure over a fan, in its 1σ: √(1 + 1/4 + 1/9).
+/// Root mean square of a figure over a fan, in units of its 1σ: √(1 + 1/4 + 1/9).
 pub(super) const FIGURE_RMS: f64 = 1.166_666_666_666_666_7;
 
-/// How far facets are from plane, 1σ.
+/// How far facets are from flat, 1σ.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Flatness {
-    /// Of a facet's normal from its mean along the fan, about each axis, in radians.
+    /// Variation of a facet's normal about its mean along the fan, about each axis, in radians.
     pub(super) figure: f64,
-    /// Of a beam's direction from what its facet gives it, along each axis, in radians.
+    /// Deviation of a beam's direction from what its facet gives it, along each axis, in radians.
     pub(super) tau: f64,
 }
 
-/// What an element's direction depends on: derivatives of v and d with respect to its facet's plane.
+/// Dependence of an element's direction on its facet: derivatives of v and d with respect to the facet's plane.
 pub(super) struct Fan {
     pub(super) v: Unit<Vector3<f64>>,
     pub(super) distance: f64,
@@ -28,15 +28,15 @@ pub(super) struct Fan {
     pub(super) orders: [f64; FIGURE_ORDERS],
 }
 
-/// A facet as its parameters have it.
+/// A facet at given parameters.
 pub(super) struct Shape<'p> {
     pub(super) normal: Unit<Vector3<f64>>,
     pub(super) offset: f64,
-    /// In standard deviations: the orders about one axis, then about the other.
+    /// In standard deviations: all orders about one axis, then all about the other.
     pub(super) figure: &'p DVector<f64>,
 }
 
-/// Legendre polynomials P₁, P₂, P₃ of unit mean square over the fan, falling off with the order as 1/k.
+/// Legendre polynomials P₁, P₂, P₃ of unit mean square over the fan, scaled by 1/k with the order k.
 pub(super) fn orders(t: f64) -> [f64; FIGURE_ORDERS] {
     [
         3.0_f64.sqrt() * t,
@@ -46,9 +46,9 @@ pub(super) fn orders(t: f64) -> [f64; FIGURE_ORDERS] {
 }
 
 impl Fan {
-    /// A facet's deflection of a beam; `None` where it does not face it.
+    /// A facet's deflection of a beam; `None` if the facet does not face it.
     ///
-    /// The plane gives the distance, its normal as it is at the beam the direction.
+    /// The plane gives the distance, its local normal at the beam gives the direction.
     pub(super) fn of(element: &Element, shape: &Shape, flatness: &Flatness) -> Option<Self> {
         let u = &element.u;
         let (a, b) = frame::tangent_basis(&shape.normal);
@@ -77,7 +77,7 @@ impl Fan {
         })
     }
 
-    /// ∂v/∂(tilts and figure), with the column of each among its facet's parameters.
+    /// ∂v/∂(tilts and figure), each with its column among the facet's parameters.
     pub(super) fn directions(&self) -> impl Iterator<Item = (usize, Vector3<f64>)> + '_ {
         let tilts = self.turned.iter().copied().enumerate();
         let figure = (0..FIGURE).map(|i| {

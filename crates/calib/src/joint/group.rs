@@ -1,4 +1,4 @@
-//! What is solved together: facets, the boards that any of them sees, and the elements that read them.
+//! What is solved together: facets, the boards that any of them sees, and the elements that read these.
 
 use catoptric_model::Pose;
 use nalgebra::{Point3, RowDVector, Unit, Vector3};
@@ -6,7 +6,7 @@ use nalgebra::{Point3, RowDVector, Unit, Vector3};
 /// Own parameters of a board: drift, offset and two tilts of its plane.
 pub(super) const BOARD_ERRORS: usize = 4;
 
-/// Orders of the polynomial along the fan by which a facet's normal departs from its mean.
+/// Orders of the polynomial along the fan by which a facet's normal varies about its mean.
 pub(super) const FIGURE_ORDERS: usize = 3;
 
 /// Own parameters of a facet's figure: every order about two axes.
@@ -18,13 +18,13 @@ pub(super) const FACET_PARAMETERS: usize = 3 + FIGURE;
 /// Blocks of a facet's parameters: normal, offset, figure.
 pub(super) const FACET_BLOCKS: usize = 3;
 
-/// A board as tracked, once for each pose.
+/// A board as tracked in one pose.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Board {
-    /// Index of the stretch in the dataset, and its number.
+    /// Index of the stretch in the dataset, and the number of its pose.
     pub(super) pose: usize,
     pub(super) number: usize,
-    /// The board's place in the rig, as tracked.
+    /// Tracked pose of the board in the rig.
     pub(super) rig_from_board: Pose,
     pub(super) color: String,
     /// Markers in the board frame.
@@ -37,12 +37,12 @@ pub(super) struct Sight {
     /// Index of the board in its group.
     pub(super) board: usize,
     pub(super) mean: f64,
-    /// Standard deviation by what no other reading shares, in metres.
+    /// Standard deviation of the error that no other reading shares, in meters.
     pub(super) sd: f64,
     pub(super) count: usize,
 }
 
-/// An element and what it read; without a facet it is an undeflected beam.
+/// An element and its readings; without a facet it is an undeflected beam.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Element {
     pub(super) beam: usize,
@@ -50,18 +50,18 @@ pub(super) struct Element {
     pub(super) u: Unit<Vector3<f64>>,
     /// Index of the facet in its group.
     pub(super) facet: Option<usize>,
-    /// Place along the facet's fan, −1 at its first beam and 1 at its last.
+    /// Position in the facet's fan: −1 at its first beam, 1 at its last.
     pub(super) along: f64,
     pub(super) sights: Vec<Sight>,
 }
 
-/// What step 3 says of a facet: distances of some of its beams, all off by one error.
+/// The result of step 3 for a facet: distances of some of its beams, which share one error.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct BareFacet {
     /// Direction and measured distance to the bare structure.
     pub(super) distances: Vec<(Unit<Vector3<f64>>, f64)>,
     pub(super) thickness: f64,
-    /// Mean error by one standard deviation of each of the common errors, and 1σ of what the facet shares with no other.
+    /// Mean error per standard deviation of each common error, and 1σ of the error that the facet shares with no other.
     pub(super) common: RowDVector<f64>,
     pub(super) sd: f64,
 }
@@ -73,7 +73,7 @@ pub(super) struct Facet {
     pub(super) bare: BareFacet,
 }
 
-/// Facets, and all boards that any of them sees; or one board before undeflected beams.
+/// Facets and all boards that any of them sees, or one board in front of undeflected beams.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Group {
     pub(super) facets: Vec<Facet>,
@@ -82,7 +82,7 @@ pub(super) struct Group {
 }
 
 impl Group {
-    /// Where the parameters of a board begin among the group's own.
+    /// Index of a board's first parameter among the group's own.
     pub(super) fn board_column(&self, board: usize) -> usize {
         self.facets.len() * FACET_PARAMETERS + board * BOARD_ERRORS
     }

@@ -1,7 +1,7 @@
-//! The least covariance that any estimate can have, given what is believed: the limit of one experiment.
+//! The minimum covariance of any estimate under the given beliefs: the limit of one experiment.
 //!
-//! The joint problem linearized at the true directions, with facets as far from plane as they truly are. Its parameters have
-//! priors, so this is the Bayesian (van Trees) form of the Cramér–Rao bound; for an element by itself see
+//! The joint problem is linearized at the true directions, with facets as far from flat as they truly are. Its
+//! parameters have priors, so this is the Bayesian (van Trees) form of the Cramér–Rao bound. For one element alone see
 //! [`crate::covariance::Budget::bound`].
 
 use super::assemble::{Assigned, along, begin, components, direct_group, group, mounting_as_drawn};
@@ -19,7 +19,7 @@ use catoptric_model::{Dataset, Deflection, MirrorPlane, frame};
 use nalgebra::{DMatrix, DVector, Matrix2, Unit, Vector3};
 use std::collections::BTreeMap;
 
-/// A beam's true direction, and the name of its facet.
+/// A beam's true direction and the name of its facet.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrueDirection {
     /// The beam.
@@ -30,8 +30,8 @@ pub struct TrueDirection {
     pub deflection: Deflection,
 }
 
-/// Covariance of (θ_a, φ), in rad², below which no estimate of each of these beams can get from this dataset's boards;
-/// `None` where they leave a direction open.
+/// Lower bound of the covariance of (θ_a, φ) of each of these beams, in rad², for any estimate from this dataset's
+/// boards; `None` if the boards leave a direction open.
 ///
 /// Of the readings only their number and spread are used.
 ///
@@ -112,7 +112,7 @@ pub fn limit(
         .collect())
 }
 
-/// The plane that most planes agree on.
+/// Mean plane of several.
 fn mean(planes: &[MirrorPlane]) -> Option<MirrorPlane> {
     let normal: Vector3<f64> = planes.iter().map(|p| p.normal.into_inner()).sum();
     Some(MirrorPlane {
@@ -121,7 +121,7 @@ fn mean(planes: &[MirrorPlane]) -> Option<MirrorPlane> {
     })
 }
 
-/// How far normals are from their mean: along a polynomial, and from that.
+/// Deviation of normals from their mean: along a polynomial, and from that polynomial.
 fn flatness(mean: &MirrorPlane, planes: &[MirrorPlane], places: &[f64]) -> Flatness {
     let (a, b) = frame::tangent_basis(&mean.normal);
     let tilts = |axis: &Unit<Vector3<f64>>| {
@@ -145,7 +145,7 @@ fn flatness(mean: &MirrorPlane, planes: &[MirrorPlane], places: &[f64]) -> Flatn
         figure += fitted.norm_squared() / count;
         rest += (tilt - fitted).norm_squared() / count;
     }
-    // Along each of two axes; a mirror turns a beam twice as far as itself.
+    // Along each of two axes; a mirror turns a beam by twice its own tilt.
     Flatness {
         figure: (0.5 * figure).sqrt() / FIGURE_RMS,
         tau: 2.0 * (0.5 * rest).sqrt(),

@@ -1,8 +1,9 @@
 //! All elements at once: facets are planes that their beams share, and what all readings share is estimated once.
 //!
-//! Methods `facet` (one connected set of facets by itself, rigid planes, the mounting as already found) and `joint` (all
-//! of them with the boards before undeflected beams, beams free to depart from their planes by an estimated τ). Both keep
-//! the choice of boards and the verdict on an element's readings that calibrating it by itself has come to.
+//! Methods `facet` (each connected set of facets separately, rigid planes, the mounting as already found) and `joint`
+//! (all of them with the boards in front of undeflected beams, and beams that may deviate from their planes by an
+//! estimated τ). Both keep the boards and the verdict on an element's readings that its individual calibration arrived
+//! at.
 
 mod answer;
 mod assemble;
@@ -35,19 +36,19 @@ use std::collections::BTreeMap;
 pub(crate) use assemble::assigned;
 pub use limit::{TrueDirection, limit};
 
-/// Rounds of leaving elements out.
+/// Maximum number of rounds of leaving elements out.
 const ROUNDS: usize = 3;
 
 /// What is solved at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Extent {
-    /// Facets that share boards, with the mounting as step 5 found it and rigid planes.
+    /// Each set of facets that share boards, with rigid planes and the mounting from step 5.
     EachFacet,
-    /// All facets and the boards before undeflected beams, beams free to depart from their facet's plane.
+    /// All facets and the boards in front of undeflected beams; beams may deviate from their facet's plane.
     Everything,
 }
 
-/// What came of it.
+/// The result.
 #[derive(Default)]
 struct Outcome {
     /// Elements that took part.
@@ -58,7 +59,7 @@ struct Outcome {
     assessment: Option<Assessment>,
 }
 
-/// Calibrates the assigned elements together, and replaces what they found by themselves.
+/// Calibrates the assigned elements together and replaces their individual results.
 pub(crate) fn together(
     extent: Extent,
     work: &Workspace,
@@ -67,7 +68,7 @@ pub(crate) fn together(
     assigned: &[Assigned],
     calibration: &mut Calibration,
 ) {
-    // Within the pool: groups are handed out over and over, and from outside each time would wake it.
+    // Within the pool: groups are dispatched many times, and from outside each dispatch would wake the pool.
     match rayon::scope(|_| within_pool(extent, work, mount, planes, assigned)) {
         Ok(outcome) => {
             for (beam, estimate) in outcome.beams {
@@ -79,7 +80,7 @@ pub(crate) fn together(
             calibration.assessment = outcome.assessment;
         }
         Err(problem) => calibration.warnings.push(format!(
-            "the elements could not be solved together ({problem}); each was solved by itself"
+            "the elements could not be solved together ({problem}); each was solved individually"
         )),
     }
 }
@@ -126,7 +127,7 @@ fn solve(
     mounting: Mounting,
     mean: &DVector<f64>,
     planes: &[MirrorPlane],
-    departing: bool,
+    deviating: bool,
 ) -> Result<Outcome, ProblemError> {
     let session = &work.dataset.session;
     let (mut joint, start) = begin(work, groups, mounting, mean, planes);
@@ -134,10 +135,10 @@ fn solve(
     let rigid = |joint: &Joint, from: State| {
         joint.solve(from, &exact).map(|solution| Fit {
             solution,
-            departure_statistic: 0.0,
+            deviation_statistic: 0.0,
         })
     };
-    let mut fit = if departing {
+    let mut fit = if deviating {
         joint.fit(start)?
     } else {
         rigid(&joint, start)?
@@ -156,14 +157,14 @@ fn solve(
         left_out = true;
         fit = rigid(&joint, fit.solution.state)?;
     }
-    if departing && left_out {
-        // They had their part in how plane the facets seemed.
+    if deviating && left_out {
+        // The elements left out had a share in the estimated flatness.
         fit = joint.fit(fit.solution.state)?;
     }
     let answers = joint.answers(&fit.solution);
     let solution = &fit.solution;
     let bent = joint.bent(solution);
-    let mut assessment = departing.then(|| joint.assess(session, &fit, &answers));
+    let mut assessment = deviating.then(|| joint.assess(session, &fit, &answers));
     if let Some(assessment) = &mut assessment
         && work.options.cross_validation
     {
@@ -179,8 +180,8 @@ fn solve(
             })
             .collect(),
         facets: joint.facets(solution, &names, &bent),
-        mount: if departing { joint.mount(solution) } else { None },
-        bias: if departing {
+        mount: if deviating { joint.mount(solution) } else { None },
+        bias: if deviating {
             joint.corrected_bias(solution)
         } else {
             None

@@ -1,4 +1,4 @@
-//! The boards of a group in the sensor frame, with their errors and the biases on their colors.
+//! The boards of a group in the sensor frame, with their errors and the biases of their colors.
 
 use super::group::{BOARD_ERRORS, Board, Group};
 use super::problem::Joint;
@@ -12,7 +12,7 @@ use nalgebra::{DVector, Dyn, Matrix3, Matrix6, OMatrix, Point3, U6, Unit, UnitQu
 /// Step of (range, cosine) over which a bias is differentiated: tables are linear over centimeters and degrees.
 const BIAS_STEP: f64 = 1e-4;
 
-/// Boards of a group in the sensor frame, and how w moves the sensor.
+/// Boards of a group in the sensor frame, and the motion of the sensor with w.
 pub(super) struct Boards<'j> {
     pub(super) placed: Vec<Placed<'j>>,
     pub(super) motion: OMatrix<f64, U6, Dyn>,
@@ -22,17 +22,17 @@ pub(super) struct Boards<'j> {
 pub(super) struct Placed<'j> {
     pub(super) plane: BoardPlane,
     pub(super) fit: PlaneFit,
-    /// Height error of each of three unit errors, by (1, x, y).
+    /// Height error of each of three unit errors, as coefficients of (1, x, y).
     pub(super) errors: Matrix3<f64>,
-    /// Drift, in metres.
+    /// Drift, in meters.
     pub(super) drift: f64,
     pub(super) paint: Paint<'j>,
 }
 
-/// The believed biases on one color.
+/// The believed biases of one color.
 pub(super) struct Paint<'j> {
     pub(super) bias: ColoredBias<'j>,
-    /// Where the color stands among the common errors.
+    /// Index of the color among the common errors.
     pub(super) place: Option<usize>,
 }
 
@@ -54,7 +54,7 @@ impl<'j> Paint<'j> {
 }
 
 impl Joint<'_> {
-    /// The mounting moved by w, and the derivative of the motion about the moved axes with respect to w.
+    /// The mounting moved by w, and the derivative of the motion, about the moved axes, with respect to w.
     fn mounted(&self, w: &DVector<f64>) -> (Pose, OMatrix<f64, U6, Dyn>) {
         let motion: Vector6<f64> = &self.mounting.motion * w;
         let pose = pose::moved(&self.mounting.rig_from_sensor, &motion);
@@ -64,7 +64,7 @@ impl Joint<'_> {
         to_moved
             .fixed_view_mut::<3, 3>(0, 0)
             .copy_from(rotation.inverse().to_rotation_matrix().matrix());
-        // Jᵣ = I − [ω]/2 + [ω]²/6: the next term is 10⁻⁷ for a turn of a degree.
+        // Jᵣ = I − [ω]/2 + [ω]²/6: the next term is 10⁻⁷ for a rotation of one degree.
         let cross = turn.cross_matrix();
         let right = Matrix3::identity() - cross * 0.5 + cross * cross / 6.0;
         to_moved.fixed_view_mut::<3, 3>(3, 3).copy_from(&right);
@@ -80,7 +80,7 @@ impl Joint<'_> {
         let height: Vector3<f64> = errors * Vector3::new(b[1], b[2], b[3]);
         let [x, y] = fit.axes();
         let normal = tracked.normal.into_inner() - x * height[1] - y * height[2];
-        // The fit's origin is a point of the plane up to the markers' own heights, which the tracked pose has averaged.
+        // The fit's origin is on the plane up to the markers' own heights, which the tracked pose has averaged.
         let origin = Point3::from(fit.centroid());
         let onto = origin - tracked.normal.into_inner() * tracked.normal.dot(&(origin - tracked.point));
         let point = onto + tracked.normal.into_inner() * height[0];

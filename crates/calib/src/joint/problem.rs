@@ -1,13 +1,13 @@
-//! The joint problem as least squares: what every reading of every board should be, and how it changes.
+//! The joint problem as least squares: the predicted reading of every board by every element, and its derivatives.
 //!
 //! ```text
 //! z = d + s + E(r, θ_N, color) + c·w + σ_d·b₀ + noise            u → v₀ = u − 2(m·u)m,  d = h/(m·u),  v = v₀ ⊞ δ
 //! ```
 //!
-//! Shared by all groups: `w`, standard normal by its prior, which moves the mounting and the biases. A group's own: the
-//! planes (m, h) of its facets, and of each of its boards b: drift and the plane's offset and two tilts. Each beam departs
-//! by δ ~ N(0, τ²) from its facet's plane; δ is eliminated beam by beam, which leaves (I + τ²HHᵀ)^(−½) as the weight of
-//! its rows.
+//! All groups share `w`, standard normal by its prior, which moves the mounting and the biases. A group owns the planes
+//! (m, h) of its facets and, for each of its boards, b: drift, and the offset and two tilts of the plane. Each beam
+//! deviates by δ ~ N(0, τ²) from its facet's plane; δ is eliminated beam by beam, which leaves (I + τ²HHᵀ)^(−½) as the
+//! weight of its rows.
 
 use super::fan::{Flatness, Shape};
 use super::group::{BOARD_ERRORS, Element, FACET_BLOCKS, FIGURE, Group};
@@ -16,27 +16,27 @@ use crate::lsq::{Block, Point};
 use catoptric_model::{MirrorPlane, Pose, RangeBias};
 use nalgebra::{DVector, Dyn, OMatrix, U6};
 
-/// How the shared numbers w move the sensor: motion = M·w about a mounting.
+/// How the shared parameters w move the sensor: motion = M·w about a mounting.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Mounting {
     pub(super) rig_from_sensor: Pose,
     pub(super) motion: OMatrix<f64, U6, Dyn>,
 }
 
-/// All of it.
+/// The whole problem.
 #[derive(Clone)]
 pub(super) struct Joint<'a> {
     pub(super) groups: Vec<Group>,
     pub(super) mounting: Mounting,
     pub(super) bias: &'a RangeBias,
     pub(super) common: CommonErrors<'a>,
-    /// Where in w the common errors begin.
+    /// Index of the first common error in w.
     pub(super) first_common: usize,
     pub(super) drift_sd: f64,
     pub(super) marker_sd: f64,
-    /// How far facets are from plane.
+    /// How far facets are from flat.
     pub(super) flatness: Flatness,
-    /// What w is believed to be.
+    /// Prior mean of w.
     pub(super) prior_mean: DVector<f64>,
 }
 
@@ -61,8 +61,8 @@ impl Joint<'_> {
         own.numbers(FACET_BLOCKS * group.facets.len())
     }
 
-    /// 1σ of an element's departure from its facet's plane; an undeflected beam has none.
-    pub(super) fn departure(&self, element: &Element) -> f64 {
+    /// 1σ of an element's deviation from its facet's plane; 0 for an undeflected beam.
+    pub(super) fn deviation(&self, element: &Element) -> f64 {
         if element.facet.is_some() {
             self.flatness.tau
         } else {
@@ -70,7 +70,7 @@ impl Joint<'_> {
         }
     }
 
-    /// The own parameters of a group with given planes, and boards as tracked.
+    /// A group's own parameters with the given planes, and boards as tracked.
     pub(super) fn start(group: &Group, planes: &[MirrorPlane]) -> Point {
         let mut blocks = Vec::new();
         for facet in &group.facets {

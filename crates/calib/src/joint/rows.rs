@@ -1,4 +1,4 @@
-//! The rows of a group: of its elements, each weighted by its departure, then of its facets' distances.
+//! The rows of a group: those of its elements, each weighted for its deviation, then those of its facets' distances.
 
 use super::fan::Shape;
 use super::group::{BareFacet, FACET_PARAMETERS};
@@ -10,14 +10,14 @@ use nalgebra::{DMatrix, DVector};
 /// Residuals of a group at a point.
 struct At {
     residuals: DVector<f64>,
-    /// If it is wanted.
+    /// If requested.
     jacobian: Option<GroupJacobian>,
     /// Σ ln det(I + τ²HᵀH) over its elements.
-    log_departures: f64,
+    log_deviations: f64,
 }
 
 impl Joint<'_> {
-    /// The rows of a group at a point: of its elements, then of its facets' distances.
+    /// The rows of a group at a point: those of its elements, then those of its facets' distances.
     fn at(&self, group: usize, shared: &Point, own: &Point, derivatives: bool) -> Option<At> {
         let group = &self.groups[group];
         let boards = self.boards(group, shared, own)?;
@@ -31,15 +31,15 @@ impl Joint<'_> {
             shared: DMatrix::zeros(count, self.shared_dimension()),
             own: DMatrix::zeros(count, group.own_dimension()),
         });
-        let (mut row, mut log_departures) = (0, 0.0);
+        let (mut row, mut log_deviations) = (0, 0.0);
         for element in &group.elements {
             let linear = self.element(element, shared, own, &boards)?;
             let rows = row..row + element.sights.len();
-            let weight = linear.weight(self.departure(element));
+            let weight = linear.weight(self.deviation(element));
             residuals.as_mut_slice()[rows.clone()].copy_from_slice((-&linear.y).as_slice());
             if let Some(weight) = &weight {
                 weight.apply(&mut residuals.as_mut_slice()[rows.clone()]);
-                log_departures += weight.log_determinant;
+                log_deviations += weight.log_determinant;
             }
             if let Some(jacobian) = &mut jacobian {
                 self.differentiate(group, element, &boards, &linear, jacobian, row);
@@ -73,11 +73,12 @@ impl Joint<'_> {
         Some(At {
             residuals,
             jacobian,
-            log_departures,
+            log_deviations,
         })
     }
 
-    /// Predicted less measured distance of a facet, in standard deviations, and its derivatives by the plane.
+    /// Predicted minus measured distance of a facet, in standard deviations, and its derivatives with respect to the
+    /// plane.
     fn bare(&self, facet: &BareFacet, shape: &Shape, w: &DVector<f64>) -> Option<(f64, [f64; 3])> {
         let (mut sum, mut derivative) = (0.0, [0.0; 3]);
         let (a, b) = frame::tangent_basis(&shape.normal);
@@ -116,7 +117,7 @@ impl GroupedProblem for Joint<'_> {
         Some(GroupRows {
             residuals: at.residuals,
             jacobian: at.jacobian?,
-            log_covariance: at.log_departures,
+            log_covariance: at.log_deviations,
         })
     }
 }

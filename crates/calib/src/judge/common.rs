@@ -1,14 +1,14 @@
-//! Errors of the believed biases, which all boards and the mounting share.
+//! Errors of the believed biases, shared by all boards and the mounting.
 
 use catoptric_model::{RangeBias, Session};
 use nalgebra::RowDVector;
 
-/// Color of the bare structure, which boards do not have.
+/// Color of the bare structure, which no board has.
 const STRUCTURE: &str = "structure";
 
 /// The uncertain numbers behind E_r, E_a and E_c, each with its standard deviation: the nodes of the distance table,
-/// then A_a, then E_c of each color a board has; and last the drift while the scanner ranged the bare structure, if it was
-/// the scanner that did.
+/// then A_a, then E_c of each color of a board, and last the drift while the bare structure was ranged, if the scanner
+/// itself ranged it.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CommonErrors<'a> {
     session: &'a Session,
@@ -24,15 +24,15 @@ impl<'a> CommonErrors<'a> {
         Self { session, colors }
     }
 
-    /// How many there are.
+    /// Number of them.
     pub(crate) fn len(&self) -> usize {
         let drift = usize::from(self.session.bare_structure.scanned);
         self.session.believed.bias.distance.range_m.len() + 1 + self.colors.len() + drift
     }
 
-    /// Error of a corrected range that one standard deviation of each number causes, in metres.
+    /// Error of a corrected range per standard deviation of each number, in meters.
     ///
-    /// A_a is uncertain with A_a + B_a, the error at normal incidence, held: its column is cos θ_N − 1.
+    /// A_a is uncertain with A_a + B_a, the error at normal incidence, held fixed: its column is cos θ_N − 1.
     pub(crate) fn row(&self, range: f64, cos_incidence: f64, color: &str) -> RowDVector<f64> {
         let mut row = RowDVector::zeros(self.len());
         for (number, error) in self.entries(range, cos_incidence, self.place(color)) {
@@ -41,13 +41,14 @@ impl<'a> CommonErrors<'a> {
         row
     }
 
-    /// Where a color that a board has stands among the numbers.
+    /// Index of a board's color among the numbers.
     pub(crate) fn place(&self, color: &str) -> Option<usize> {
         let place = self.colors.iter().position(|c| *c == color)?;
         Some(self.session.believed.bias.distance.range_m.len() + 1 + place)
     }
 
-    /// The numbers that change a range, each with its error as in [`row`](Self::row); one that is named twice adds up.
+    /// The numbers that change a range, each with its error as in [`row`](Self::row); entries with the same index add
+    /// up.
     pub(crate) fn entries(&self, range: f64, cos_incidence: f64, color: Option<usize>) -> [(usize, f64); 4] {
         let beliefs = &self.session.believed;
         let nodes = beliefs.bias.distance.range_m.len();
@@ -61,8 +62,8 @@ impl<'a> CommonErrors<'a> {
         [below, above, (nodes, gain), color]
     }
 
-    /// Error of a bare distance that one standard deviation of each number causes, in metres: of what the scanner ranged
-    /// and the believed biases corrected.
+    /// Error of a bare distance per standard deviation of each number, in meters, for a distance that the scanner
+    /// ranged and the believed biases corrected.
     pub(crate) fn bare_row(&self, distance: f64, cos_incidence: f64) -> RowDVector<f64> {
         if !self.session.bare_structure.scanned {
             return RowDVector::zeros(self.len());
@@ -73,14 +74,14 @@ impl<'a> CommonErrors<'a> {
         row
     }
 
-    /// Standard deviation of a bare distance by all else, which the facets do not share, in metres.
+    /// Standard deviation of a bare distance from all other errors, which the facets do not share, in meters.
     pub(crate) fn bare_sd(&self, distance: f64, cos_incidence: f64) -> f64 {
         let whole = self.session.bare_structure.distance_sd_mm * 1e-3;
         let shared = self.bare_row(distance, cos_incidence).norm_squared();
         (whole * whole - shared).max(0.0).sqrt()
     }
 
-    /// What each number is called, and its standard deviation in the unit of that name.
+    /// Name of each number, and its standard deviation in the unit of that name.
     pub(crate) fn named(&self) -> Vec<(String, f64)> {
         let beliefs = &self.session.believed;
         let nodes = beliefs.bias.distance.range_m.iter();
@@ -90,11 +91,11 @@ impl<'a> CommonErrors<'a> {
         let colors = colors.map(|color| (format!("E_c of {color} (mm)"), beliefs.color_bias_sd_mm));
         let drift = beliefs.drift_sd_mm;
         let bare = (self.session.bare_structure.scanned)
-            .then(|| ("drift before the bare structure (mm)".to_owned(), drift));
+            .then(|| ("drift at the bare structure (mm)".to_owned(), drift));
         nodes.chain([gain]).chain(colors).chain(bare).collect()
     }
 
-    /// The believed biases changed by so many standard deviations of each number.
+    /// The believed biases, changed by a given number of standard deviations for each number.
     pub(crate) fn applied(&self, deviations: &[f64]) -> RangeBias {
         let beliefs = &self.session.believed;
         let mut bias = beliefs.bias.clone();
@@ -115,7 +116,7 @@ impl<'a> CommonErrors<'a> {
         bias
     }
 
-    /// Variance of E_c for a color that no board of the session has, in square metres; zero for a listed one.
+    /// Variance of E_c for a color that no board of the session has, in square meters; zero for a listed color.
     pub(crate) fn unlisted_variance(&self, color: &str) -> f64 {
         if self.colors.contains(&color) {
             0.0

@@ -1,7 +1,7 @@
-//! What a set of boards determines at all: rank, and the directions that change no range, in words.
+//! What a set of boards can determine at all: rank, and the directions that change no range, named in plain language.
 //!
-//! Nothing is believed here and nothing is measured: only the geometry counts. Columns of the Jacobian are what is asked
-//! for ([`Unknowns`]): the angles of an element or the planes of facets, the sensor's place, and range errors
+//! No beliefs and no measurements enter, only the geometry. The columns of the Jacobian are the unknowns requested
+//! ([`Unknowns`]): the angles of an element or the planes of facets, the pose of the sensor, and range errors
 //!
 //! ```text
 //! δz = B + A_c·r + A_a·cos θ_N          B_a and B_c are one column: only their sum B exists
@@ -13,24 +13,24 @@ use crate::readings::jacobian;
 use catoptric_model::{BoardPlane, Deflection, MirrorPlane, beam, frame, range};
 use nalgebra::{DMatrix, DVector, Point3, Unit, Vector3};
 
-/// Part of a null vector's largest component below which a component is not worth a word.
+/// Component of a null vector, relative to the largest, below which it is not named.
 const NAMED: f64 = 0.02;
 
-/// A derivative below this, in metres per unit of its unknown, is rounding.
+/// A derivative below this, in meters per unit of its unknown, is rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// What is unknown besides directions.
+/// The unknowns besides directions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Unknowns {
-    /// The sensor's place among the boards: six motions.
+    /// The pose of the sensor relative to the boards: six motions.
     pub mounting: bool,
     /// A constant range error B.
     pub constant: bool,
     /// A range error that grows with the range, A_c.
-    pub per_metre: bool,
+    pub per_meter: bool,
     /// A range error that grows with the cosine of the incidence, A_a.
     pub incidence: bool,
-    /// The distance d of each element to its mirror; facets have theirs among their planes.
+    /// The distance d of each element to its mirror; for a facet it is part of the plane.
     pub distance: bool,
 }
 
@@ -42,11 +42,11 @@ pub enum Ray {
         /// Base azimuth, in radians.
         azimuth: f64,
     },
-    /// A mirror that it shares with no other: θ_a and φ are unknown.
+    /// A mirror that the beam shares with no other: θ_a and φ are unknown.
     Alone {
         /// Base azimuth, in radians.
         azimuth: f64,
-        /// Where it goes.
+        /// The beam's deflection.
         deflection: Deflection,
     },
     /// A facet whose plane is unknown, by its index.
@@ -76,7 +76,7 @@ pub struct Layout {
 pub struct Determined {
     /// Names of the unknowns.
     pub unknowns: Vec<String>,
-    /// How many independent combinations of them the ranges determine.
+    /// Number of independent combinations of them that the ranges determine.
     pub rank: usize,
     /// The combinations that change no range, each with its terms, the largest first.
     pub open: Vec<Open>,
@@ -88,21 +88,21 @@ pub struct Determined {
 pub struct Open {
     /// Name and share of each unknown, the largest first.
     pub terms: Vec<(String, f64)>,
-    /// What it is, and what would determine it.
+    /// Description of the combination, and what would determine it.
     pub words: String,
 }
 
 impl Determined {
     /// Standard deviation of an unknown for ranges of 1 m standard deviation; `None` if it is open.
-    pub fn per_metre(&self, unknown: &str) -> Option<f64> {
+    pub fn per_meter(&self, unknown: &str) -> Option<f64> {
         let index = self.unknowns.iter().position(|n| n == unknown)?;
         Some(self.information.covariance_among(&[index])?[(0, 0)].sqrt())
     }
 }
 
-/// What the ranges of a layout determine of the unknowns.
+/// What the ranges of a layout determine about the unknowns.
 ///
-/// `None` if a ray does not meet a board that it is said to read, or a facet does not face its beam.
+/// `None` if a ray misses a board that it reads by `sights`, or a facet does not face its beam.
 ///
 /// ```
 /// use catoptric_calib::gauge::{self, Layout, Ray, Unknowns};
@@ -130,7 +130,7 @@ pub fn determine(layout: &Layout, unknowns: &Unknowns) -> Option<Determined> {
     let mut jacobian = DMatrix::zeros(layout.sights.len(), columns.names.len());
     for (row, (ray, board)) in layout.sights.iter().enumerate() {
         for (column, value) in columns.derivatives(layout, *ray, &layout.boards[*board])? {
-            // A column of roundings alone must not pass for a lever.
+            // A column of rounding errors must not count as a lever.
             if value.abs() > ROUNDING {
                 jacobian[(row, column)] = value;
             }
@@ -148,7 +148,7 @@ pub fn determine(layout: &Layout, unknowns: &Unknowns) -> Option<Determined> {
             .filter(|t| t.1.abs() > NAMED * largest)
             .map(|(name, share)| (name.to_owned(), share))
             .collect();
-        let words = in_words(&terms, layout);
+        let words = description(&terms, layout);
         Open { terms, words }
     });
     Some(Determined {
@@ -174,7 +174,7 @@ impl Problem for Geometry {
     }
 }
 
-/// Which column holds what.
+/// The column of each unknown.
 struct Columns {
     names: Vec<String>,
     rays: Vec<Option<usize>>,
@@ -182,7 +182,7 @@ struct Columns {
     facets: Vec<usize>,
     mounting: Option<usize>,
     constant: Option<usize>,
-    per_metre: Option<usize>,
+    per_meter: Option<usize>,
     incidence: Option<usize>,
 }
 
@@ -228,7 +228,7 @@ impl Columns {
         let mut one = |wanted: bool, name: &str| wanted.then(|| add(&[name.to_owned()]));
         Self {
             constant: one(unknowns.constant, "B"),
-            per_metre: one(unknowns.per_metre, "A_c"),
+            per_meter: one(unknowns.per_meter, "A_c"),
             incidence: one(unknowns.incidence, "A_a"),
             rays,
             distances,
@@ -271,7 +271,7 @@ impl Columns {
         }
         let errors = [
             (self.constant, 1.0),
-            (self.per_metre, r),
+            (self.per_meter, r),
             (self.incidence, board.cos_incidence(&v)),
         ];
         all.extend(
@@ -300,8 +300,8 @@ fn of_plane(plane: &MirrorPlane, azimuth: f64, board: &BoardPlane) -> Option<[f6
     Some([tilted(&a), tilted(&b), by_distance / facing])
 }
 
-/// What an open combination is, and what would determine it.
-fn in_words(terms: &[(String, f64)], layout: &Layout) -> String {
+/// Describes an open combination, and what would determine it.
+fn description(terms: &[(String, f64)], layout: &Layout) -> String {
     let has = |start: &str| terms.iter().any(|(name, _)| name.starts_with(start));
     let angles = has("θ") || has("φ");
     let planes = has("tilt of facet") || has("offset of facet");
@@ -309,17 +309,17 @@ fn in_words(terms: &[(String, f64)], layout: &Layout) -> String {
     let list = match names.as_slice() {
         [] => return "nothing".to_owned(),
         [one] => format!("{one} changes no range"),
-        [one, other] => format!("{one} and {other} cannot be told apart"),
-        [first @ .., last] => format!("{} and {last} cannot be told apart", first.join(", ")),
+        [one, other] => format!("{one} and {other} cannot be distinguished"),
+        [first @ .., last] => format!("{} and {last} cannot be distinguished", first.join(", ")),
     };
     let advice = if has("A_c") && angles {
         "boards share one tilt axis: an angle across it is a scale of the range; add a board pitched the other way"
     } else if (has("B") || has("d") || has("A_a")) && angles {
         "the boards' tilts do not surround the beam: add boards tilted to the other side, and at another range"
     } else if has("A_a") && has("B") {
-        "all boards are met under one incidence: add a board with another tilt"
+        "the incidence is the same on all boards: add a board with another tilt"
     } else if has("A_c") && has("B") {
-        "all boards stand equally far: add one at another range"
+        "all boards are at the same range: add one at another range"
     } else if has("d") && has("B") {
         "a distance to the mirror and a constant of the range add up: measure d on the bare structure"
     } else if has("x of the sensor")
@@ -332,17 +332,17 @@ fn in_words(terms: &[(String, f64)], layout: &Layout) -> String {
         match layout.facets.len() {
             0 => "the boards leave a motion of the sensor open: add boards with other tilts",
             1 => {
-                "the sensor and its mirror move together: only the mirrored sensor is seen; add boards before \
-                 undeflected beams, or facets that look elsewhere"
+                "the sensor and its mirror move together: only the mirrored sensor is seen; add boards in \
+                 front of undeflected beams, or facets that face elsewhere"
             }
             2 => {
                 "both mirrors turn about the line in which their planes meet, and the sensor with them; add boards \
-                 before undeflected beams, or a third facet"
+                 in front of undeflected beams, or a third facet"
             }
-            _ => "the sensor and its mirrors move together; add boards before undeflected beams",
+            _ => "the sensor and its mirrors move together; add boards in front of undeflected beams",
         }
     } else if angles || planes {
-        "boards share one tilt axis, or stand face-on: add a board tilted across the others"
+        "boards share one tilt axis, or are face-on: add a board tilted across the others"
     } else {
         "more boards are needed"
     };

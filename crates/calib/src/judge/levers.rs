@@ -1,4 +1,4 @@
-//! Lever arms: how far a small turn of a beam moves its ranges, in the tangent plane (cos φ·δθ, δφ).
+//! Lever arms: how far a small rotation of a beam changes its ranges, in the tangent plane (cos φ·δθ, δφ).
 
 use catoptric_model::beam;
 use nalgebra::{Matrix2, SymmetricEigen, Vector2};
@@ -10,7 +10,7 @@ pub(crate) fn levers(normal: &Matrix2<f64>, cos_elevation: f64) -> (Vector2<f64>
     (eigen.eigenvalues, eigen.eigenvectors)
 }
 
-/// cos φ of an elevation, the same on every machine; kept off zero, where azimuth means nothing.
+/// cos φ of an elevation, the same on every machine; kept off zero, where azimuth is meaningless.
 pub(crate) fn libm_cos(elevation: f64) -> f64 {
     off_zero(beam::direction(elevation).x)
 }

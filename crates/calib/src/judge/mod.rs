@@ -1,5 +1,5 @@
-//! Can it be believed? What boards determine at all, which directions they leave open, and how far an estimate can be off
-//! under every error believed in.
+//! Is an estimate credible? What boards determine at all, which directions they leave open, and how far an estimate can
+//! be off under all believed errors.
 
 pub(crate) mod common;
 pub mod covariance;

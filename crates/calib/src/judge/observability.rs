@@ -1,7 +1,7 @@
 //! Do the boards determine both angles? A direction that they leave open is named, never given a number.
 //!
-//! Each board contributes p = s·tan α along the direction of its tilt, seen along the beam; if all p are collinear
-//! with the origin (one tilt axis, one orientation, boards face-on) one direction of (θ_a, φ) changes no range.
+//! Each board contributes p = s·tan α along the direction of its tilt, seen along the beam; if all p are collinear with
+//! the origin (one tilt axis, one orientation, boards face-on) one direction of (θ_a, φ) changes no range.
 
 use crate::judge::covariance::Budget;
 use crate::judge::levers::{levers, libm_cos};
@@ -10,10 +10,10 @@ use nalgebra::{Matrix2, Vector2};
 /// Standard deviation beyond which a direction counts as unobservable, in radians (3°): more than the drawing's error.
 pub const WEAKEST_SD: f64 = 3.0 * std::f64::consts::PI / 180.0;
 
-/// Range error that is always reckoned with here, in metres: no belief makes a scanner better than a millimetre.
-const LEAST_RANGE_ERROR: f64 = 1e-3;
+/// Smallest range error assumed here, in meters: no belief makes a scanner better than a millimeter.
+const MIN_RANGE_ERROR: f64 = 1e-3;
 
-/// Ratio of levers below which the boards share a tilt; above it, they all stand face-on.
+/// Ratio of levers below which the boards share a tilt; above it, all of them are face-on.
 const ONE_SIDED: f64 = 0.3;
 
 /// A direction that the boards leave open.
@@ -25,9 +25,9 @@ pub struct Weakness {
     pub reason: String,
 }
 
-/// The open direction of an element's boards, if there is one.
+/// The open direction of an element's boards, if any.
 ///
-/// The budget should leave the mounting out: what is not known of it turns all beams alike, whatever the boards.
+/// The budget should leave the mounting out: its uncertainty turns all beams identically, whatever the boards.
 pub fn weakness(budget: &Budget, elevation: f64) -> Option<Weakness> {
     let cos_elevation = libm_cos(elevation);
     let by_board = budget.jacobian.transpose() * &budget.jacobian;
@@ -48,7 +48,7 @@ pub fn weakness(budget: &Budget, elevation: f64) -> Option<Weakness> {
             .max(0.0)
             .sqrt()
     });
-    let sd = believed.max(LEAST_RANGE_ERROR / short);
+    let sd = believed.max(MIN_RANGE_ERROR / short);
     if sd <= WEAKEST_SD {
         return None;
     }
@@ -59,7 +59,7 @@ pub fn weakness(budget: &Budget, elevation: f64) -> Option<Weakness> {
     let reason = if short < ONE_SIDED * long {
         format!("the {boards} boards are tilted along one direction only, seen along the beam")
     } else {
-        format!("the {boards} boards stand nearly face-on to the beam")
+        format!("the {boards} boards are nearly face-on to the beam")
     };
     let sd = if sd.is_finite() && sd < std::f64::consts::PI {
         format!(

@@ -1,12 +1,13 @@
-//! The linear problem min ‖J·p − b‖ of an arrow-shaped J: each group's own columns are eliminated by QR, then the rest.
+//! The linear problem min ‖J·p − b‖ for an arrow-shaped J: each group's own columns are eliminated by QR, then the
+//! rest.
 //!
 //! ```text
 //! Q_gᵀ (B_g A_g b_g) = ( R_g T_g t_g )      R_g·y_g = t_g − T_g·x
 //!                      (  0  A'_g b'_g )     all A'_g together: R·x = t   (the Schur complement, as a QR)
 //! ```
 //!
-//! Columns are first brought to length 1, so one threshold tells dependence in any units. A damped problem, with rows
-//! √μ·D below, starts from the triangles and not from J: its cost does not depend on the number of residuals.
+//! Columns are first normalized to length 1, so that one threshold detects dependence in any units. A damped problem,
+//! with rows √μ·D below, starts from the triangles and not from J: its cost does not depend on the number of residuals.
 
 use super::problem::{GroupJacobian, ProblemError};
 use super::qr::{PivotedQr, dot};
@@ -22,7 +23,7 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// Rows of residuals f and their derivatives, as many columns as there are shared and own parameters.
+    /// Rows of residuals f and their derivatives, which must have one column per shared and own parameter.
     pub(super) fn of_group(
         group: usize,
         f: &DVector<f64>,
@@ -85,7 +86,7 @@ struct Triangle {
 }
 
 impl Elimination {
-    /// Eliminates; columns shorter than `threshold`, in parts of their whole length, count as dependent.
+    /// Eliminates; a column counts as dependent if the others leave less than `threshold` of its length.
     pub(super) fn new(mut rows: Vec<Rows>, shared_width: usize, threshold: f64) -> Self {
         let scale = column_lengths(&rows, shared_width).map(|s| if s > 0.0 { s } else { 1.0 });
         let shorten: Vec<f64> = scale.iter().map(|s| 1.0 / s).collect();
@@ -99,14 +100,14 @@ impl Elimination {
         Self::scaled(rows, scale, shared_width, threshold)
     }
 
-    /// The problem with rows √μ·D of right side 0 added.
+    /// The problem with rows √μ·D added, whose right side is 0.
     pub(super) fn damped(&self, mu: f64, d: &DVector<f64>) -> Self {
         let same = DVector::from_element(d.len(), 1.0);
         let rows = self.triangles(&same, &(d.component_div(&self.scale) * mu.sqrt()));
         Self::scaled(rows, self.scale.clone(), self.shared.width(), 0.0)
     }
 
-    /// The problem with its columns multiplied by factors, and with a row of right side 0 for each weight that is not 0.
+    /// The problem with its columns multiplied by factors, and with a row of right side 0 for each nonzero weight.
     pub(super) fn changed(&self, factors: &DVector<f64>, weights: &DVector<f64>, threshold: f64) -> Self {
         let rows = self.triangles(factors, &weights.component_div(&self.scale));
         let mut changed = Self::new(rows, self.shared.width(), threshold);
@@ -114,8 +115,8 @@ impl Elimination {
         changed
     }
 
-    /// The triangles as rows of a problem in scaled parameters, changed as [`changed`](Self::changed) says; last those of
-    /// the shared parameters, as a group that owns nothing.
+    /// The triangles as rows of a problem in scaled parameters, with factors and weights as in
+    /// [`changed`](Self::changed). Those of the shared parameters come last, as a group without own parameters.
     fn triangles(&self, factors: &DVector<f64>, weights: &DVector<f64>) -> Vec<Rows> {
         let width = self.shared.width();
         let (factors, weights) = (factors.as_slice(), weights.as_slice());
@@ -190,7 +191,7 @@ impl Elimination {
         2.0 * (diagonal + scale)
     }
 
-    /// p of the least ‖J·p − b‖, with 0 for dependent columns.
+    /// p that minimizes ‖J·p − b‖, with 0 for dependent columns.
     pub(super) fn solve(&self) -> DVector<f64> {
         let x = self.shared.solve(&self.shared_right);
         self.complete(&x, |group, x| &group.right - &group.coupling * x)
@@ -219,8 +220,8 @@ impl Elimination {
         DVector::from_vec(z)
     }
 
-    /// The part of z of [`half_solve`](Self::half_solve) that is not 0 for a g of shared and one group's own parameters: that
-    /// of the group, then that of what is shared.
+    /// The part of z of [`half_solve`](Self::half_solve) that is nonzero for a g of shared and one group's own
+    /// parameters: that of the group, then that of the shared parameters.
     pub(super) fn half_solve_within(&self, group: usize, shared: &[f64], own: &[f64]) -> DVector<f64> {
         let width = self.shared.width();
         let from = width + self.own_widths().take(group).sum::<usize>();
@@ -316,7 +317,7 @@ impl Elimination {
 }
 
 impl Eliminated {
-    /// The group without its own parameters, and the rows that are left of it: shared columns, right side.
+    /// The group without its own parameters, and its remaining rows: shared columns, right side.
     fn of(group: Rows, shared_width: usize, threshold: f64) -> (Self, DMatrix<f64>) {
         let height = group.own.nrows();
         let mut carried = group.shared.resize_horizontally(shared_width + 1, 0.0);
@@ -348,7 +349,7 @@ impl Triangle {
         self.order.len()
     }
 
-    /// R with its columns in the order of the matrix, multiplied by factors, and below a row for each weight that is not 0.
+    /// R with its columns in the order of the matrix, multiplied by factors, followed by a row for each nonzero weight.
     fn rows_in_order(&self, factors: &[f64], weights: &[f64]) -> DMatrix<f64> {
         let weighted = weights.iter().enumerate().filter(|(_, w)| **w != 0.0);
         let mut rows = DMatrix::zeros(self.rank + weighted.clone().count(), self.width());
@@ -362,7 +363,7 @@ impl Triangle {
         rows
     }
 
-    /// The columns of the square part of R, which are those of as many independent parameters.
+    /// The columns of the square part of R, one per independent parameter.
     fn columns(&self) -> impl DoubleEndedIterator<Item = &[f64]> + ExactSizeIterator {
         // A rank of 0 has no columns, yet chunks must not be empty.
         self.r.as_slice().chunks_exact(self.rank.max(1)).take(self.rank)

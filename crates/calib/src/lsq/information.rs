@@ -1,8 +1,9 @@
-//! What the residuals say of the parameters: rank, open directions, covariance, correlations, from one factorization.
+//! What the residuals determine about the parameters: rank, open directions, covariance and correlations, from one
+//! factorization.
 //!
-//! With residuals in units of their standard deviations the covariance is (JᵀJ)⁻¹. Where J has a null space N no number
-//! answers for it: a combination g·x of parameters has a variance gᵀ(JᵀJ)⁻g only if g is perpendicular to N, and then any
-//! generalized inverse gives the same one. Everything else is `None`, never 0.
+//! With residuals in units of their standard deviations the covariance is (JᵀJ)⁻¹. If J has a null space N, no single
+//! covariance matrix exists: a combination g·x of parameters has a variance gᵀ(JᵀJ)⁻g only if g is perpendicular to N,
+//! and then any generalized inverse gives the same one. Everything else is `None`, never 0.
 
 use super::elimination::Elimination;
 use nalgebra::{DMatrix, DVector};
@@ -10,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 /// Cosine between a combination of parameters and the null space above which the combination is open.
 const OPEN_COSINE: f64 = 1e-7;
 
-/// Part of its largest component below which a component of a null vector is rounding.
+/// Component of a null vector, relative to the largest, below which it is rounding.
 const NAMED_PART: f64 = 1e-6;
 
 /// JᵀJ at a point, factored.
@@ -44,7 +45,7 @@ impl Information {
         self.linear.rank()
     }
 
-    /// ln det(JᵀJ) over the independent columns, what a likelihood of variances needs.
+    /// ln det(JᵀJ) over the independent columns, as needed for a likelihood of variances.
     pub fn log_determinant(&self) -> f64 {
         self.linear.log_determinant()
     }
@@ -56,11 +57,11 @@ impl Information {
         &self.null
     }
 
-    /// The open directions in the caller's names: for each null vector its components, the largest first.
+    /// The open directions in the caller's names: the components of each null vector, the largest first.
     ///
     /// # Panics
     ///
-    /// If there are not as many names as parameters.
+    /// If the numbers of names and parameters differ.
     pub fn open_directions<'n>(&self, names: &[&'n str]) -> Vec<Vec<(&'n str, f64)>> {
         assert_eq!(names.len(), self.dimension(), "one name for each parameter");
         self.null
@@ -89,11 +90,11 @@ impl Information {
         (self.scaled_null.transpose() * &scaled).norm() > OPEN_COSINE * scaled.norm()
     }
 
-    /// Covariance G(JᵀJ)⁻¹Gᵀ of combinations G·x, one a row; `None` if one of them is open.
+    /// Covariance G(JᵀJ)⁻¹Gᵀ of combinations G·x, one per row; `None` if one of them is open.
     ///
     /// # Panics
     ///
-    /// If G has not n columns.
+    /// If G does not have n columns.
     pub fn covariance_of(&self, combinations: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         let mut halves = Vec::with_capacity(combinations.nrows());
         for row in combinations.row_iter() {
@@ -107,12 +108,12 @@ impl Information {
         Some(DMatrix::from_fn(count, count, |i, j| halves[i].dot(&halves[j])))
     }
 
-    /// [`covariance_of`](Self::covariance_of) combinations of the shared parameters and of one group's own: the same without
+    /// [`covariance_of`](Self::covariance_of) for combinations of the shared parameters and of one group's own, without
     /// the zeros of all other groups.
     ///
     /// # Panics
     ///
-    /// If there is no such group, or the columns are not its.
+    /// If there is no such group, or the numbers of columns differ from its parameters.
     pub fn covariance_within(
         &self,
         group: usize,
@@ -153,7 +154,7 @@ impl Information {
         })
     }
 
-    /// The likeliest change of all parameters that changes g·x by one standard deviation: (JᵀJ)⁻¹g/√(gᵀ(JᵀJ)⁻¹g).
+    /// The most probable change of all parameters that changes g·x by one standard deviation: (JᵀJ)⁻¹g/√(gᵀ(JᵀJ)⁻¹g).
     ///
     /// ‖J·step‖ = 1. `None` if g·x is open, or g is zero.
     ///

@@ -1,4 +1,4 @@
-//! A problem linearized at a state, and that again with some of its columns and priors changed.
+//! A problem linearized at a state, and variants of it in which some columns and priors are changed.
 
 use super::elimination::{Elimination, Rows};
 use super::information::Information;
@@ -9,25 +9,26 @@ use nalgebra::DVector;
 /// A problem linearized at a state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Linearized {
-    /// The step to the linear problem's minimum: Gauss and Newton's.
+    /// The step to the minimum of the linear problem (Gauss–Newton).
     pub step: DVector<f64>,
     /// ‖f + J·step‖².
-    pub least_sum_of_squares: f64,
-    /// ln det of the covariance that the residuals were weighed by; see [`GroupRows`](super::GroupRows).
+    pub min_sum_of_squares: f64,
+    /// ln det of the covariance by which the residuals were weighted; see [`GroupRows`](super::GroupRows).
     pub log_covariance: f64,
     /// JᵀJ at the state.
     pub information: Information,
 }
 
 impl Linearized {
-    /// −2 ln of the restricted likelihood, up to a constant: of the beliefs that the residuals are weighed by, with all
-    /// parameters integrated out.
+    /// −2 ln of the restricted likelihood, up to a constant: the likelihood of the beliefs by which the residuals are
+    /// weighted, with all parameters integrated out.
     pub fn deviance(&self) -> f64 {
-        self.least_sum_of_squares + self.information.log_determinant() + self.log_covariance
+        self.min_sum_of_squares + self.information.log_determinant() + self.log_covariance
     }
 }
 
-/// A linearized problem as triangles: what changes only columns or priors starts from these, whatever the number of rows.
+/// A linearized problem reduced to triangles: changes of columns or priors start from these, whatever the number of
+/// rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reduced {
     linear: Elimination,
@@ -74,12 +75,12 @@ impl Reduced {
         })
     }
 
-    /// The problem with each column multiplied by a factor, and with a prior of mean 0 about the state for each parameter
-    /// whose weight, one over its standard deviation, is not 0.
+    /// The problem with each column multiplied by a factor, and with a prior of mean 0 about the state for each
+    /// parameter whose weight, one over its standard deviation, is nonzero.
     ///
     /// # Panics
     ///
-    /// If there is not one factor and one weight for each parameter.
+    /// If the number of factors or weights differs from the number of parameters.
     pub fn changed(&self, factors: &DVector<f64>, weights: &DVector<f64>) -> Linearized {
         assert_eq!(
             factors.len(),
@@ -101,7 +102,7 @@ impl Reduced {
         let step = linear.solve();
         Linearized {
             // Perpendicular to what the step explains.
-            least_sum_of_squares: (self.sum_of_squares - linear.image_norm(&step).powi(2)).max(0.0),
+            min_sum_of_squares: (self.sum_of_squares - linear.image_norm(&step).powi(2)).max(0.0),
             step,
             log_covariance: self.log_covariance,
             information: Information::new(linear),

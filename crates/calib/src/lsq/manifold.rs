@@ -13,7 +13,7 @@
 use catoptric_model::{Pose, frame};
 use nalgebra::{DMatrix, DVector, Matrix3, Translation3, Unit, UnitQuaternion, Vector3};
 
-/// Turn, in radians, below which a series replaces a quotient of small numbers.
+/// Rotation angle, in radians, below which a series replaces a quotient of small numbers.
 const SMALL_TURN: f64 = 1e-4;
 
 /// One parameter block.
@@ -25,14 +25,14 @@ pub enum Block {
     Direction(Unit<Vector3<f64>>),
     /// A rotation, SO(3); three radians.
     Rotation(UnitQuaternion<f64>),
-    /// A pose, SE(3); three metres, then three radians.
+    /// A pose, SE(3); three meters, then three radians.
     Pose(Pose),
 }
 
-/// Parameter blocks, one after another.
+/// A list of parameter blocks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Point {
-    /// The blocks; tangent coordinates stand in their order.
+    /// The blocks; tangent coordinates are in the same order.
     pub blocks: Vec<Block>,
 }
 
@@ -111,8 +111,8 @@ impl Block {
 
     /// ∂((y ⊞ δ) ⊟ x)/∂δ at δ = 0, with x this block.
     ///
-    /// It is the identity at y = x: S² stretches steps across the way by θ/sin θ, turns stretch by the inverse right
-    /// Jacobian of SO(3).
+    /// It is the identity at y = x: S² stretches steps across the path by θ/sin θ, rotations stretch by the inverse
+    /// right Jacobian of SO(3).
     ///
     /// # Panics
     ///
@@ -138,7 +138,7 @@ impl Block {
         }
     }
 
-    /// Size of each tangent coordinate, against which a step is large or small: |x| of numbers and metres, 1 radian.
+    /// Scale of each tangent coordinate, to judge whether a step is small: |x| for numbers and meters, 1 for radians.
     pub fn extent(&self) -> Vec<f64> {
         match self {
             Self::Vector(x) => x.iter().map(|v| v.abs()).collect(),
@@ -153,7 +153,7 @@ impl Block {
 }
 
 impl Point {
-    /// Numbers only.
+    /// A point with one block of numbers.
     pub fn vector(values: &[f64]) -> Self {
         Self {
             blocks: vec![Block::Vector(DVector::from_column_slice(values))],
@@ -189,7 +189,7 @@ impl Point {
         Self { blocks }
     }
 
-    /// Size of each tangent coordinate; see [`Block::extent`].
+    /// Scale of each tangent coordinate; see [`Block::extent`].
     pub fn extent(&self) -> Vec<f64> {
         self.blocks.iter().flat_map(Block::extent).collect()
     }
@@ -237,9 +237,9 @@ fn turned(r: &UnitQuaternion<f64>, step: &[f64]) -> UnitQuaternion<f64> {
     UnitQuaternion::new_normalize(r.into_inner() * exponential)
 }
 
-/// Log: the vector ω, no longer than π, whose Exp is a rotation.
+/// Log: the rotation vector ω, of length π at most, whose Exp is the given rotation.
 fn turn_vector(r: &UnitQuaternion<f64>) -> Vector3<f64> {
-    // q and −q are one rotation; the one with w ≥ 0 turns by at most π.
+    // q and −q are the same rotation; the one with w ≥ 0 has an angle of at most π.
     let sign = if r.w < 0.0 { -1.0 } else { 1.0 };
     let part = r.imag() * sign;
     let sin = part.norm();

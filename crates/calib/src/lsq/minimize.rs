@@ -1,8 +1,8 @@
 //! Levenberg–Marquardt with a trust region (Levenberg 1944, Marquardt 1963, Moré 1978; "lmder" of MINPACK).
 //!
-//! D holds the longest that each column of J has been (monotone scaling), so the result does not depend on the units of
-//! the parameters. A step is taken if it lowers ‖f‖² by at least 10⁻⁴ of what the linear model promises; the ratio of
-//! both widens or narrows the region.
+//! D holds the maximum length of each column of J so far (monotone scaling), so the result does not depend on the units
+//! of the parameters. A step is accepted if it lowers ‖f‖² by at least 10⁻⁴ of the reduction that the linear model
+//! predicts; the ratio of the two widens or narrows the region.
 
 use super::elimination::{Elimination, Rows};
 use super::information::Information;
@@ -11,26 +11,26 @@ use super::trust_region;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-/// Columns shorter than this part of their length are left out of a step.
+/// Columns of which less than this fraction of their length is independent are left out of a step.
 const STEP_THRESHOLD: f64 = 1e-14;
 
-/// Least part of the promised reduction that a step must bring.
-const LEAST_GAIN: f64 = 1e-4;
+/// Minimum fraction of the predicted reduction that a step must achieve.
+const MIN_GAIN: f64 = 1e-4;
 
 /// When to stop, and what counts as dependent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Options {
-    /// Relative reduction of ‖f‖², promised and seen, that is not worth another step.
+    /// Relative reduction of ‖f‖², predicted and actual, that is not worth another step.
     pub reduction_tolerance: f64,
     /// Radius of the trust region, relative to the scaled parameters, that is not worth another step.
     pub step_tolerance: f64,
     /// Cosine of the angle between f and the columns of J at which f counts as perpendicular to all of them.
     pub gradient_tolerance: f64,
-    /// Evaluations of the residuals, at most.
+    /// Maximum number of evaluations of the residuals.
     pub max_evaluations: usize,
-    /// Radius of the first trust region, in parts of the scaled parameters.
+    /// Radius of the first trust region, relative to the scaled parameters.
     pub first_radius: f64,
-    /// Length, in parts of its whole, of what other columns leave of a column, below which it depends on them.
+    /// Fraction of a column's length that other columns leave of it, below which it depends on them.
     pub rank_threshold: f64,
 }
 
@@ -56,20 +56,20 @@ pub enum Stop {
     Reduction,
     /// The steps have become short.
     Step,
-    /// Rounding hides what a further step would bring, though a tolerance asks for it.
+    /// Rounding hides any further reduction, although a tolerance asks for it.
     Rounding,
-    /// `max_evaluations` are used up: not a minimum.
+    /// `max_evaluations` reached: not a minimum.
     Limit,
 }
 
 impl Stop {
-    /// Whether this is the end of a converging iteration.
+    /// Whether the iteration converged.
     pub fn converged(self) -> bool {
         self != Self::Limit
     }
 }
 
-/// A minimum of ‖f‖² and what is known there.
+/// A minimum of ‖f‖² and its properties.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
     /// The parameters.
@@ -91,7 +91,7 @@ pub struct Solution {
 }
 
 impl Solution {
-    /// Number of residuals less the rank.
+    /// Number of residuals minus the rank.
     pub fn degrees_of_freedom(&self) -> usize {
         let rows: usize = self.residuals.iter().map(|r| r.len()).sum();
         rows.saturating_sub(self.information.rank())
@@ -106,7 +106,7 @@ impl Solution {
 ///
 /// # Panics
 ///
-/// If the state has own parameters for more groups than there are.
+/// If the state has own parameters for more groups than the problem has.
 pub fn minimize<P: GroupedProblem>(
     problem: &P,
     start: impl Into<State>,
@@ -219,7 +219,7 @@ impl<'a, P: GroupedProblem> Search<'a, P> {
                     radius = 2.0 * length;
                     damping *= 0.5;
                 }
-                let taken = ratio >= LEAST_GAIN;
+                let taken = ratio >= MIN_GAIN;
                 if let (true, Some(residuals)) = (taken, outcome) {
                     self.state = next;
                     self.residuals = residuals;
@@ -278,7 +278,7 @@ pub(super) fn norm(residuals: &[DVector<f64>]) -> f64 {
     residuals.iter().map(|r| r.norm_squared()).sum::<f64>().sqrt()
 }
 
-/// Something of each group, side by side; of several errors that of the first group.
+/// Evaluates a function for all groups in parallel; of several errors, returns that of the first group.
 pub(super) fn of_groups<T: Send, E: Send>(
     groups: usize,
     one: impl Fn(usize) -> Result<T, E> + Send + Sync,

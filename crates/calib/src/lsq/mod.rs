@@ -1,9 +1,9 @@
 //! Dense nonlinear least squares on manifolds: min ‖f(x)‖², its rank, its open directions and its covariance.
 //!
-//! The caller supplies residuals and Jacobian ([`Problem`]; [`GroupedProblem`] with parameters that only one group of
-//! residuals sees, which are eliminated). Parameters are blocks of Rⁿ, S², SO(3), SE(3) ([`Block`]). [`minimize`] is
-//! MINPACK's trust region over QR with column pivoting; [`Prior`]s are rows. [`Information`] answers for the solution, and
-//! says what is open.
+//! The caller supplies residuals and Jacobian ([`Problem`]; [`GroupedProblem`] for parameters that only one group of
+//! residuals depends on, which are eliminated). Parameters are blocks of Rⁿ, S², SO(3), SE(3) ([`Block`]). [`minimize`]
+//! is MINPACK's trust region over QR with column pivoting; [`Prior`]s are rows. [`Information`] holds the covariance of
+//! the solution and the directions that are open.
 //!
 //! ```
 //! use catoptric_calib::lsq::{Options, Point, Problem, minimize};
@@ -28,7 +28,7 @@
 //! let found = minimize(&two_sides, Point::vector(&[0.0, 0.0]), &Options::default())?;
 //! assert!((found.state.shared.numbers(0).expect("a vector")[0] - 2.0).abs() < 1e-12);
 //!
-//! // x and −x are one measurement: a and b cannot be told apart, and neither gets a number.
+//! // x and −x give the same measurement: a and b cannot be separated, and neither gets a number.
 //! let one_side = Parabola { x: vec![-1.0, 1.0], y: vec![3.0, 3.0] };
 //! let found = minimize(&one_side, Point::vector(&[0.0, 0.0]), &Options::default())?;
 //! assert_eq!(found.information.rank(), 1);

@@ -4,7 +4,7 @@ use super::manifold::{Block, Point};
 use super::problem::{GroupJacobian, GroupRows, GroupedProblem};
 use nalgebra::{DMatrix, DVector};
 
-/// What is believed of one block before any residual.
+/// Gaussian prior of one block.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
     block: usize,
@@ -13,9 +13,9 @@ pub struct Prior {
 }
 
 impl Prior {
-    /// A belief with independent errors: one standard deviation for each tangent coordinate of the block.
+    /// A prior with independent errors: one standard deviation for each tangent coordinate of the block.
     ///
-    /// An infinite standard deviation says nothing of its coordinate.
+    /// An infinite standard deviation does not constrain its coordinate.
     ///
     /// # Panics
     ///
@@ -62,14 +62,14 @@ impl Prior {
     }
 }
 
-/// A problem with priors on shared parameters, as one more group, and on the groups' own, as their last rows.
+/// A problem with priors: those on shared parameters form one more group, those on a group's own are its last rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WithPriors<'a, P> {
-    /// The problem without them.
+    /// The problem without priors.
     pub problem: &'a P,
-    /// On the blocks of the shared point.
+    /// Priors on the blocks of the shared point.
     pub shared: Vec<Prior>,
-    /// On the blocks of each group's own point; groups beyond the last one have none.
+    /// Priors on the blocks of each group's own point; groups beyond the last one have none.
     pub own: Vec<Vec<Prior>>,
 }
 
@@ -78,7 +78,7 @@ impl<P> WithPriors<'_, P> {
         self.own.get(group).map_or(&[], Vec::as_slice)
     }
 
-    /// What is measured of a group, with its priors as the last rows.
+    /// The measured residuals of a group, with its priors as the last rows.
     fn residuals_below(&self, group: usize, own: &Point, measured: DVector<f64>) -> DVector<f64> {
         let priors = self.own(group).iter().map(|p| p.residuals(own));
         stacked(std::iter::once(measured).chain(priors))

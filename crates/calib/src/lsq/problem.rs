@@ -1,16 +1,18 @@
-//! What is to be minimized: residuals and their Jacobian, as the caller supplies them.
+//! The problem to be minimized: residuals and their Jacobian, supplied by the caller.
 //!
-//! A [`Problem`] is a plain one. A [`GroupedProblem`] has an arrow of a Jacobian: each group of residuals depends on the
-//! shared parameters and on its own, which no other group sees, so that its own can be eliminated group by group.
+//! A [`Problem`] has no structure. A [`GroupedProblem`] has an arrow-shaped Jacobian: each group of residuals depends
+//! on the shared parameters and on its own, which no other group depends on, so that they can be eliminated group by
+//! group.
 
 use super::manifold::Point;
 use nalgebra::{DMatrix, DVector};
 use thiserror::Error;
 
-/// Residuals of one point, with derivatives from the caller.
+/// Residuals at a point, with derivatives from the caller.
 ///
 /// Residuals are best given in units of their standard deviations: then covariances need no further factor. A residual
-/// function that is undefined at a point (a ray that misses its board) returns `None`; the solver then tries nearer.
+/// function that is undefined at a point (a ray that misses its board) returns `None`; the solver then tries a shorter
+/// step.
 pub trait Problem: Sync {
     /// f(x), m numbers; the same m at every point.
     fn residuals(&self, at: &Point) -> Option<DVector<f64>>;
@@ -34,14 +36,14 @@ pub struct GroupRows {
     pub residuals: DVector<f64>,
     /// Its derivatives.
     pub jacobian: GroupJacobian,
-    /// ln det of the covariance that the residuals were divided by the root of, 0 for one that is never compared with
+    /// ln det of the covariance by whose square root the residuals were divided; 0 if it is never compared with
     /// another.
     pub log_covariance: f64,
 }
 
 /// Residuals in groups, each depending on the shared parameters and on the group's own.
 ///
-/// Every [`Problem`] is one: a single group that owns nothing. Groups are worked at side by side, in any order.
+/// Every [`Problem`] is one: a single group without own parameters. Groups are evaluated in parallel, in any order.
 pub trait GroupedProblem: Sync {
     /// Number of groups.
     fn groups(&self) -> usize;
@@ -80,9 +82,9 @@ impl<P: Problem> GroupedProblem for P {
 /// Its tangent space has the coordinates of `shared` first, then those of `own[0]`, `own[1]`, …
 #[derive(Debug, Clone, PartialEq)]
 pub struct State {
-    /// What all groups share.
+    /// The parameters that all groups share.
     pub shared: Point,
-    /// What each group owns; groups beyond the last one own nothing.
+    /// The own parameters of each group; groups beyond the last one have none.
     pub own: Vec<Point>,
 }
 
@@ -125,17 +127,17 @@ impl State {
         Self { shared, own }
     }
 
-    /// Size of each coordinate, against which a step is large or small; see [`Point::extent`].
+    /// Scale of each coordinate, to judge whether a step is small; see [`Point::extent`].
     pub fn extent(&self) -> DVector<f64> {
         let own = self.own.iter().flat_map(Point::extent);
         DVector::from_vec(self.shared.extent().into_iter().chain(own).collect())
     }
 }
 
-/// What keeps a problem from being solved at all.
+/// The errors that keep a problem from being solved at all.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum ProblemError {
-    /// The residuals or their derivatives are undefined or not finite at a point that the solver must be at.
+    /// The residuals or their derivatives are undefined or not finite at a point where the solver needs them.
     #[error("the residuals of group {group} are undefined or not finite at the {place}")]
     Undefined {
         /// Group of residuals.

@@ -1,17 +1,16 @@
-//! QR with column pivoting: A·P = Q·R, the diagonal of R falling in size (Businger, Golub 1965).
+//! QR with column pivoting: A·P = Q·R, the diagonal of R decreasing in size (Businger, Golub 1965).
 //!
-//! At each step the column whose remaining part is longest comes next, so a small diagonal element shows that all
-//! later columns depend on the earlier ones. (nalgebra's `ColPivQR` chooses by the largest element instead, which does
-//! not reveal the rank.) Lengths are brought up to date and recomputed where cancellation would spoil them (Drmač,
-//! Bujanović 2008).
+//! At each step the column with the longest remaining part comes next, so a small diagonal element shows that all later
+//! columns depend on the earlier ones. (nalgebra's `ColPivQR` pivots by the largest element instead, which does not
+//! reveal the rank.) Lengths are updated, and recomputed where cancellation would spoil them (Drmač, Bujanović 2008).
 
 use fearless_simd::{Level, dispatch};
 use nalgebra::DMatrix;
 
-/// Relative loss of a column's length at which it is measured anew: √ε.
+/// Relative loss of a column's length at which the length is recomputed: √ε.
 const CANCELLATION: f64 = 1.5e-8;
 
-/// The factors of a matrix, with Q applied to whatever was carried along.
+/// The factors of a matrix, with Q applied to the carried columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PivotedQr {
     /// R, min(m, n) × n, upper triangular; its columns are those of A in `order`.
@@ -44,7 +43,7 @@ impl PivotedQr {
             carried.nrows(),
             "carried columns need the rows of the matrix"
         );
-        // With the widest lanes of the machine, which change nothing: what is added to what, and when, is the same.
+        // With the widest lanes of the machine, which do not change the result: the order of all sums stays the same.
         dispatch!(Level::new(), _simd => Self::factor(a, carried))
     }
 
@@ -101,13 +100,13 @@ impl PivotedQr {
     }
 }
 
-/// I − v·vᵀ/γ with v in place of the column.
+/// I − v·vᵀ/γ, with v stored in place of the column.
 struct Reflection {
     gamma: f64,
     diagonal: f64,
 }
 
-/// Turns a column into the vector of the reflection that clears it below its first element.
+/// Turns a column into the vector of the reflection that zeroes it below its first element.
 #[inline(always)]
 fn reflect(column: &mut [f64]) -> Option<Reflection> {
     let length = norm(column);
@@ -132,7 +131,7 @@ impl Reflection {
     }
 }
 
-/// Sums that a product is added up in side by side: one sum has to wait for each addition before the next.
+/// Number of partial sums of a product, accumulated in parallel: a single sum would have to wait for each addition.
 const SUMS: usize = 8;
 
 /// a·b.
@@ -160,10 +159,11 @@ fn longest(lengths: &[f64], from: usize) -> usize {
     best
 }
 
-/// Largest elements of a vector whose squares neither overflow nor lose what matters of their sum.
+/// Range of the largest element of a vector within which squares neither overflow nor lose significant parts of the
+/// sum.
 const SQUARED_SAFELY: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
 
-/// Length of a vector that neither overflows nor loses what is small.
+/// Length of a vector, without overflow or loss of small elements.
 #[inline(always)]
 fn norm(values: &[f64]) -> f64 {
     let largest = values.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
@@ -180,7 +180,7 @@ fn norm(values: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Numbers without a pattern, the same everywhere.
+    /// Numbers without a pattern, the same on every machine.
     fn sample(rows: usize, columns: usize) -> DMatrix<f64> {
         DMatrix::from_fn(rows, columns, |i, j| {
             libm::sin(12.9898 * i as f64 + 78.233 * j as f64 + 0.37 * (i * j) as f64)
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn the_factors_make_the_matrix_again() {
+    fn the_factors_reproduce_the_matrix() {
         for (rows, columns) in [(7, 4), (4, 7), (5, 5), (9, 1)] {
             let a = sample(rows, columns);
             let qr = PivotedQr::new(a.clone(), DMatrix::identity(rows, rows));

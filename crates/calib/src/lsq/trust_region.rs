@@ -1,6 +1,6 @@
 //! The step within a trust region: min ‖J·p + f‖ subject to ‖D·p‖ ≤ Δ (Moré 1978, "lmpar" of MINPACK).
 //!
-//! p(μ) = −(JᵀJ + μD²)⁻¹Jᵀf; μ is 0 if the Gauss–Newton step lies within, else the root of φ(μ) = ‖D·p(μ)‖ − Δ, which a
+//! p(μ) = −(JᵀJ + μD²)⁻¹Jᵀf; μ is 0 if the Gauss–Newton step is inside, else the root of φ(μ) = ‖D·p(μ)‖ − Δ, which a
 //! safeguarded Newton iteration on 1/φ finds to 10 %: μ ← μ + (φ/Δ)·(‖D·p‖/‖z‖)², with Rᵀz = D²p and R of [J; √μ·D].
 
 use super::elimination::Elimination;
@@ -9,16 +9,16 @@ use nalgebra::DVector;
 /// Relative error of ‖D·p‖ that is accepted.
 const SLACK: f64 = 0.1;
 
-/// Newton steps for μ, at most.
+/// Maximum number of Newton steps for μ.
 const MAX_STEPS: usize = 10;
 
-/// A step and the damping that made it.
+/// A step and its damping.
 pub(super) struct DampedStep {
     pub(super) step: DVector<f64>,
     pub(super) damping: f64,
 }
 
-/// The step for a radius; `damping` is where to begin the search.
+/// The step for a radius; the search starts at `damping`.
 pub(super) fn step(
     linear: &Elimination,
     gradient: &DVector<f64>,

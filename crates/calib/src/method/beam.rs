@@ -1,5 +1,5 @@
-//! `beam`: batch Gauss–Newton per element over all readings alike, Eqs. (7)–(8): what the paper prints and calls RLS. Its
-//! covariance is the sandwich: what that sum makes of all errors believed in.
+//! `beam`: batch Gauss–Newton per element with equal weights for all readings, Eqs. (7)–(8), which the paper prints and
+//! calls RLS. Its covariance is the sandwich: the effect of all believed errors on that estimate.
 
 use super::row::{Row, Scope};
 use crate::element::solve;
@@ -8,7 +8,7 @@ use crate::judge::covariance::Budget;
 
 pub(super) const ROW: Row = Row {
     name: "beam",
-    about: "Each element by itself, all readings alike, Eqs. 7 and 8",
+    about: "Each element individually, all readings with equal weight, Eqs. (7)–(8)",
     scope: Scope::Element(&BATCH),
 };
 

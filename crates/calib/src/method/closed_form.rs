@@ -1,4 +1,4 @@
-//! `closed-form`: linear in the exit direction, without iteration, with the covariance that errors of the ranges give it.
+//! `closed-form`: linear in the exit direction, without iteration, with the covariance that range errors cause.
 
 use super::row::{Row, Scope};
 use crate::element::initial;
@@ -9,7 +9,7 @@ use catoptric_model::Deflection;
 
 pub(super) const ROW: Row = Row {
     name: "closed-form",
-    about: "Each element by itself, without iteration",
+    about: "Each element individually, without iteration",
     scope: Scope::Element(&Solver {
         single_readings: false,
         solve: without_iteration,
@@ -20,7 +20,7 @@ pub(super) const ROW: Row = Row {
     }),
 };
 
-/// The closed form as the answer, its mirror and biases placed by the estimate that the boards were chosen with.
+/// The closed form as the result, with mirror and biases from the estimate that the boards were chosen with.
 fn without_iteration(task: &Task) -> Option<Solution> {
     let (element, at) = (task.element, task.at);
     let found = initial::closed_form(at, element.azimuth, element.observations, element.bias)?;

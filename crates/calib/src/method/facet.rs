@@ -1,4 +1,4 @@
-//! `facet`: one rigid plane per facet, facets that share no board each by themselves, the mounting as step 5 found it.
+//! `facet`: one rigid plane per facet, each set of facets that share boards separately, the mounting from step 5.
 //! Covariances are those of the facet's solution ([`crate::joint`]).
 
 use super::row::{Row, Scope};
@@ -6,6 +6,6 @@ use crate::joint::Extent;
 
 pub(super) const ROW: Row = Row {
     name: "facet",
-    about: "One plane per facet, each facet by itself",
+    about: "One plane per facet, each facet separately",
     scope: Scope::Together(Extent::EachFacet),
 };

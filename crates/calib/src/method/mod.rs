@@ -1,6 +1,6 @@
-//! The methods: what each needs, how it solves, which covariance it states, and what it says of itself, in a file each.
+//! The methods, one file each: what a method needs, how it solves, which covariance it states, and its description.
 //!
-//! To add one, write its file with its [`Row`] and give it a row of the table below.
+//! To add a method, write its file with its [`Row`] and add a row to the table below.
 
 mod beam;
 mod beam_gls;
@@ -21,7 +21,8 @@ use catoptric_model::place::nearest;
 use row::Row;
 use std::str::FromStr;
 
-/// The enum, the list of all, and the way from a method to its row: three things that cannot fall apart.
+/// Defines the enum, the list of all methods and the mapping from a method to its row from one table, so that they
+/// cannot diverge.
 macro_rules! table {
     ($($(#[$doc:meta])* $method:ident => $row:path,)+) => {
         /// How the angles of the elements are estimated from their ranges.
@@ -31,7 +32,7 @@ macro_rules! table {
         }
 
         impl Method {
-            /// All of them.
+            /// All methods.
             pub const ALL: [Self; [$(Self::$method),+].len()] = [$(Self::$method),+];
 
             const fn row(self) -> &'static Row {
@@ -44,25 +45,25 @@ macro_rules! table {
 }
 
 table! {
-    /// Everything at once: facets, mounting, boards, drifts and biases, beams free to depart from their facet's plane.
+    /// Everything at once: facets, mounting, boards, drifts and biases; beams may deviate from their facet's plane.
     #[default]
     Joint => joint::ROW,
-    /// One plane per facet, each facet by itself.
+    /// One plane per facet, each facet separately.
     Facet => facet::ROW,
-    /// Per element, weighted by the covariance of all errors believed in.
+    /// Per element, weighted by the covariance of all believed errors.
     BeamGls => beam_gls::ROW,
-    /// Batch Gauss–Newton per element, Eqs. (7)–(8): what the paper prints and calls RLS.
+    /// Batch Gauss–Newton per element, Eqs. (7)–(8), which the paper prints and calls RLS.
     Beam => beam::ROW,
-    /// Recursive least squares per element, reading after reading: what the paper names.
+    /// Recursive least squares per element, reading by reading: what the paper names.
     Recursive => recursive::ROW,
     /// Per element without iteration: linear in the exit direction.
     ClosedForm => closed_form::ROW,
-    /// The drawing, with nothing measured but d: what calibrating has to improve on.
+    /// The drawing, with nothing measured but d: the baseline that a calibration has to improve on.
     Prior => prior::ROW,
 }
 
 impl Method {
-    /// The word that files and commands use.
+    /// The name used in files and commands.
     ///
     /// ```
     /// use catoptric_calib::Method;
@@ -73,18 +74,18 @@ impl Method {
         self.row().name
     }
 
-    /// What it is, in a line.
+    /// One-line description.
     pub fn about(self) -> &'static str {
         self.row().about
     }
 
-    /// What it needs, and how it solves.
+    /// What the method needs, and how it solves.
     pub(crate) fn scope(self) -> &'static Scope {
         &self.row().scope
     }
 
-    /// Whether it can be asked to predict boards from the others, as
-    /// [`Options::cross_validation`](crate::Options::cross_validation) has it.
+    /// Whether the method supports predicting boards from the others,
+    /// [`Options::cross_validation`](crate::Options::cross_validation).
     pub fn cross_validates(self) -> bool {
         match self.scope() {
             Scope::Together(Extent::Everything) => true,
@@ -117,9 +118,9 @@ mod tests {
         for method in Method::ALL {
             assert_eq!(method.name().parse(), Ok(method));
         }
-        let refused = "beems".parse::<Method>().expect_err("it is no method's");
+        let refused = "beems".parse::<Method>().expect_err("not a method");
         assert_eq!(refused.help().as_deref(), Some("did you mean \"beam\"?"));
-        let refused = "annealing".parse::<Method>().expect_err("it is no method's");
+        let refused = "annealing".parse::<Method>().expect_err("not a method");
         assert_eq!(refused.help(), None);
     }
 }

@@ -1,4 +1,4 @@
-//! `prior`: the drawing, with nothing measured but d. It states no covariance: nobody knows how far it is off.
+//! `prior`: the drawing, with nothing measured but d. It states no covariance, because its error is unknown.
 
 use super::row::{Row, Scope};
 

@@ -1,5 +1,5 @@
-//! `recursive`: recursive least squares per element, reading after reading, which is what the paper names. It ends where
-//! `beam` ends, with its covariance.
+//! `recursive`: recursive least squares per element, reading by reading, which is what the paper names. It reaches the
+//! same estimate as `beam`, with the same covariance.
 
 use super::row::{Row, Scope};
 use crate::element::recursive::recursive;
@@ -9,7 +9,7 @@ use crate::judge::covariance::Budget;
 
 pub(super) const ROW: Row = Row {
     name: "recursive",
-    about: "The same, one reading after the other: recursive least squares",
+    about: "The same, reading by reading: recursive least squares",
     scope: Scope::Element(&Solver {
         single_readings: true,
         solve: over_readings,
@@ -24,7 +24,7 @@ fn over_readings(task: &Task) -> Option<Solution> {
         .iter()
         .map(|p| task.attempt.single_readings(*p))
         .collect();
-    // Where the readings leave a direction open there is nothing to recurse on; the batch says which.
+    // If the readings leave a direction open, the recursion cannot start; the batch solution shows which direction.
     recursive(task.element, &readings, task.from, task.options())
         .or_else(|| solve::batch(task.element, task.from, task.options()))
 }

@@ -1,15 +1,15 @@
-//! What there is to say of a method.
+//! The description of a method: its name, what it needs, and how it solves.
 
 use crate::element::solver::Solver;
 use crate::joint::Extent;
 
 /// One method.
 pub(crate) struct Row {
-    /// The word that files and commands use.
+    /// The name used in files and commands.
     pub(super) name: &'static str,
-    /// What it is, in a line.
+    /// One-line description.
     pub(super) about: &'static str,
-    /// What it needs, and how it solves.
+    /// What the method needs, and how it solves.
     pub(super) scope: Scope,
 }
 
@@ -17,7 +17,7 @@ pub(crate) struct Row {
 pub(crate) enum Scope {
     /// Nothing: it needs no board.
     Drawing,
-    /// Each element by itself: it needs boards enough of its own.
+    /// Each element individually: it needs enough boards of its own.
     Element(&'static Solver),
     /// Elements that share facets: each needs one board.
     Together(Extent),

@@ -1,4 +1,4 @@
-//! Which readings of which boards place the sensor in the rig, and what each of them says.
+//! Selects the readings of boards that place the sensor in the rig, and linearizes them.
 
 use crate::judge::common::CommonErrors;
 use crate::judge::covariance::PlaneFit;
@@ -14,28 +14,28 @@ use nalgebra::{DMatrix, DVector, Matrix4, Point3};
 /// Beams this close to a served range may meet a mirror as built, in degrees: half a spot and some facet tilt.
 const CLEAR_OF_FACETS_DEG: f64 = 3.0;
 
-/// Noise of a mean below which readings are not weighted further, in metres: whole millimetres, 1/√12 mm.
-const LEAST_NOISE: f64 = 2.9e-4;
+/// Noise of a mean below which its weight does not grow, in meters: whole millimeters, 1/√12 mm.
+const MIN_NOISE: f64 = 2.9e-4;
 
-/// Step of the reported ranges, in metres.
+/// Step of the reported ranges, in meters.
 const ROUNDING_STEP: f64 = 1e-3;
 
-/// A board read on fewer beams than this does not tell its own plane from another.
-const LEAST_RAYS: usize = 3;
+/// Minimum number of beams on a board; with fewer, its plane cannot be distinguished from another one.
+const MIN_RAYS: usize = 3;
 
-/// Standard deviations within which a residual is taken as the board's own.
+/// Gate on residuals that count as the board's own, in standard deviations.
 const GATE_SIGMAS: f64 = 6.0;
 
-/// Residual that is always taken as the board's own, in metres: beam size and incidence, none of them modelled.
+/// Residual that always counts as the board's own, in meters: beam size and incidence, neither of them modeled.
 const GATE_FLOOR: f64 = 0.02;
 
-/// One mean of a beam over a board.
+/// The mean of one beam's readings of a board.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Ray {
     pub(crate) beam: usize,
     pub(crate) azimuth: f64,
     pub(crate) mean: f64,
-    /// Variance of the mean by noise, in square metres.
+    /// Variance of the mean by noise, in square meters.
     pub(crate) variance: f64,
 }
 
@@ -47,9 +47,9 @@ pub(crate) struct DirectBoard {
 }
 
 impl DirectBoard {
-    /// Weights all means by the spread that the board's readings have together, instead of the believed one.
+    /// Weights all means by the pooled spread of the board's readings instead of the believed noise.
     ///
-    /// Readings that scatter over a step of rounding or more average it out; others keep its floor.
+    /// Readings that scatter over a rounding step or more average it out; others keep its floor.
     pub(crate) fn pool_noise(&mut self, summaries: &[Summary]) {
         let of = |ray: &Ray| {
             (
@@ -69,7 +69,7 @@ impl DirectBoard {
         for ray in &mut self.rays {
             let of_mean = variance / summaries[ray.beam].count as f64;
             ray.variance = if rounded {
-                of_mean.max(LEAST_NOISE * LEAST_NOISE)
+                of_mean.max(MIN_NOISE * MIN_NOISE)
             } else {
                 of_mean
             };
@@ -77,7 +77,7 @@ impl DirectBoard {
     }
 }
 
-/// How strictly beams are chosen: motions of the sensor that must be allowed for.
+/// How strictly beams are selected: the motions of the sensor that must be allowed for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Selection {
     shift: f64,
@@ -88,17 +88,17 @@ pub(crate) struct Selection {
 pub(crate) struct Block {
     /// ∂r/∂(motion of the sensor), one row per ray.
     pub(crate) jacobian: DMatrix<f64>,
-    /// Where each ray meets the board, and what was read there.
+    /// Where each ray hits the board, and its reading there.
     pub(crate) sightings: Vec<Sighting>,
     /// Color of the board.
     pub(crate) color: String,
-    /// 1σ of drift and of the plane's offset and two tilts, as they change the readings.
+    /// 1σ of drift and of the plane's offset and two tilts, as changes of the readings.
     board_errors: DMatrix<f64>,
     /// Noise of each mean.
     variance: DVector<f64>,
 }
 
-/// A mean of a beam over a board, and what the board's place makes of it.
+/// The mean of a beam's readings of a board, and its prediction from the board's pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sighting {
     pub(crate) mean: RawRange,
@@ -127,21 +127,21 @@ impl Block {
     }
 }
 
-/// The poses recorded for the mounting, and what to choose from.
+/// The poses recorded for the mounting, and the conditions for selecting from them.
 pub(crate) struct Selector<'a> {
     dataset: &'a Dataset,
     summaries: &'a [Vec<Summary>],
     pub(crate) common: CommonErrors<'a>,
-    /// What is corrected before a reading is held against the board.
+    /// The bias subtracted before a reading is compared with the board.
     bias: &'a RangeBias,
-    /// Residual that is always taken as the board's own, in metres.
+    /// Residual that always counts as the board's own, in meters.
     gate_floor: f64,
     /// Whether each beam is far from every facet.
     clear: Vec<bool>,
 }
 
 impl Selection {
-    /// Three tolerances of the drawing.
+    /// Three times the tolerances of the drawing.
     pub(crate) fn initial(tolerance: &MountTolerance) -> Self {
         let largest = |sd: &[f64; 3]| sd.iter().fold(0.0, |a: f64, b| a.max(*b));
         Self {
@@ -185,7 +185,7 @@ impl<'a> Selector<'a> {
         }
     }
 
-    /// The same with another bias, and with residuals up to `gate_floor` taken for the board's own.
+    /// The same with another bias, and with residuals up to `gate_floor` counted as the board's own.
     pub(crate) fn with_bias(self, bias: &'a RangeBias, gate_floor: f64) -> Self {
         Self {
             bias,
@@ -194,7 +194,7 @@ impl<'a> Selector<'a> {
         }
     }
 
-    /// The beams that read the boards, for a mounting known as well as `stage` says.
+    /// The beams that read the boards, for a mounting known to within `stage`.
     pub(crate) fn select(&self, rig_from_sensor: &Pose, stage: &Selection) -> Vec<DirectBoard> {
         self.dataset
             .poses
@@ -207,7 +207,7 @@ impl<'a> Selector<'a> {
                     .filter(|b| self.clear[*b] && self.is_within(record, *b))
                     .filter_map(|b| self.ray(&board, b, &self.summaries[pose][b], stage))
                     .collect();
-                (rays.len() >= LEAST_RAYS).then_some(DirectBoard { pose, rays })
+                (rays.len() >= MIN_RAYS).then_some(DirectBoard { pose, rays })
             })
             .collect()
     }
@@ -238,7 +238,7 @@ impl<'a> Selector<'a> {
         let tan = (1.0 / (cos_incidence * cos_incidence) - 1.0).max(0.0).sqrt();
         let variance = (spread::noise_sd(summary, noise).powi(2) / summary.count as f64
             + (1e-3 * believed.element_sd_mm).powi(2))
-        .max(LEAST_NOISE * LEAST_NOISE);
+        .max(MIN_NOISE * MIN_NOISE);
         let marker = 1e-3 * believed.marker_sd_mm / cos_incidence;
         let common = self.common.row(hit.distance, cos_incidence, &board.color);
         let sd = (variance + (1e-3 * believed.drift_sd_mm).powi(2) + marker * marker + common.norm_squared())
@@ -259,7 +259,7 @@ impl<'a> Selector<'a> {
             .correct(seen.mean, seen.distance, seen.cos_incidence, color)
     }
 
-    /// The readings of a board linearized at a mounting; `None` if a ray no longer meets it.
+    /// The readings of a board linearized at a mounting; `None` if a ray no longer hits it.
     pub(crate) fn linearize(&self, board: &DirectBoard, rig_from_sensor: &Pose) -> Option<Block> {
         let session = &self.dataset.session;
         let seen = BoardInSensor::of(&self.dataset.poses[board.pose], session, rig_from_sensor)?;

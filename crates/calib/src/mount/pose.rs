@@ -1,8 +1,8 @@
-//! Where the sensor sits in the rig (step 5), from boards before beams that no mirror deflects.
+//! Where the sensor sits in the rig (step 5), from boards in front of beams that no mirror deflects.
 //!
 //! The tracked board predicts the range of a beam from the origin, r = n·c/(n·u), for any mounting `rig_from_sensor`;
-//! Gauss–Newton over small motions of the sensor makes the predictions meet the corrected ranges. The readings of one
-//! board share its drift and its markers' error, so each board is weighted by its whole covariance (Woodbury), not
+//! Gauss–Newton over small motions of the sensor fits the predictions to the corrected ranges. The readings of one
+//! board share its drift and its markers' error, so each board is weighted by its full covariance (Woodbury), not
 //! reading by reading.
 
 use crate::judge::covariance::MountUncertainty;
@@ -13,36 +13,37 @@ use nalgebra::{
     DMatrix, Dyn, Matrix6, OMatrix, SymmetricEigen, Translation3, U6, UnitQuaternion, Vector3, Vector6,
 };
 
-/// A step shorter than this (metres and radians alike) ends the iteration: some roundings of a pose.
+/// A step shorter than this (in meters and in radians) ends the iteration: some roundings of a pose.
 const STEP_TOLERANCE: f64 = 1e-14;
 
 /// Below this length a step that no longer shrinks is rounding, and the iteration has ended.
 const ROUNDING_STEP: f64 = 1e-11;
 
-/// Steps of one iteration, at most.
+/// Maximum number of steps of one iteration.
 const MAX_STEPS: usize = 50;
 
-/// Rounds of choosing beams and solving, at most.
+/// Maximum number of rounds of selecting beams and solving.
 const MAX_ROUNDS: usize = 12;
 
-/// Smallest tolerance taken as a prior, in radians and metres: a drawing is never better than 0.1° and 1 mm.
-const LEAST_TOLERANCE: [f64; 2] = [1.745e-3, 1e-3];
+/// Smallest tolerance used as a prior, in radians and meters: a drawing is never better than 0.1° and 1 mm.
+const MIN_TOLERANCE: [f64; 2] = [1.745e-3, 1e-3];
 
-/// Tolerance, in radians and metres, that stands for none: a mounting that was measured and is known.
+/// Tolerance of a mounting that was measured and is known, in radians and meters.
 const NO_TOLERANCE: f64 = 1e-9;
 
 /// The mounting of the sensor as estimated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mount {
-    /// Takes coordinates in the sensor frame to the rig as tracked.
+    /// Transforms coordinates from the sensor frame to the rig as tracked.
     pub rig_from_sensor: Pose,
-    /// How well it is known.
+    /// Its uncertainty.
     pub uncertainty: MountUncertainty,
-    /// Boards used.
+    /// Number of boards used.
     pub boards: usize,
-    /// Means of a beam over a board used.
+    /// Number of means used, each of a beam over a board.
     pub sightings: usize,
-    /// Motions, of six, that the boards did not determine to better than the mount tolerance, which then stands in.
+    /// Number of motions, of six, that the boards did not determine better than the mount tolerance, which then
+    /// replaces them.
     pub undetermined: usize,
     /// The boards and the beams on them.
     pub(crate) selection: Vec<DirectBoard>,
@@ -56,17 +57,17 @@ struct NormalEquations {
     common: OMatrix<f64, U6, Dyn>,
 }
 
-/// The drawing's word on the mounting, used only along motions that the boards leave open.
+/// The mounting by the drawing, used only along motions that the boards leave open.
 pub(crate) struct Prior {
     pub(crate) nominal: Pose,
-    /// 1σ of each motion: shifts, then turns.
+    /// 1σ of each motion: shifts, then rotations.
     pub(crate) sd: Vector6<f64>,
 }
 
 /// Estimates the mounting from the poses recorded for it; `summaries` holds every pose's statistics by beam.
 ///
-/// Without boards, or along motions that they do not determine, the answer is the nominal mounting with the session's
-/// tolerance, and its covariance says so. A well determined mounting is not drawn towards the nominal one.
+/// Without boards, or along motions that they do not determine, the result is the nominal mounting with the session's
+/// tolerance, and its covariance reflects that. A well-determined mounting is not pulled toward the nominal one.
 pub fn estimate(dataset: &Dataset, summaries: &[Vec<Summary>]) -> Mount {
     let session = &dataset.session;
     let prior = Prior::of(
@@ -104,14 +105,14 @@ pub fn estimate(dataset: &Dataset, summaries: &[Vec<Summary>]) -> Mount {
 }
 
 impl Mount {
-    /// The mounting as the calibration file holds it.
+    /// The mounting in the form of the calibration file.
     pub fn to_file(&self) -> MountEstimate {
         let data = PoseData::from(&self.rig_from_sensor);
         let total = self.uncertainty.total();
         let mut covariance = [[0.0; 6]; 6];
         for (row, values) in covariance.iter_mut().enumerate() {
             for (column, value) in values.iter_mut().enumerate() {
-                // Halved over both sides of the diagonal: symmetric to the last bit.
+                // Mean of both sides of the diagonal: symmetric bit for bit.
                 *value = 0.5 * (total[(row, column)] + total[(column, row)]);
             }
         }
@@ -132,7 +133,7 @@ pub fn moved(rig_from_sensor: &Pose, motion: &Vector6<f64>) -> Pose {
     pose
 }
 
-/// The small motion that takes one mounting to another, about the first one's axes.
+/// The small motion from one mounting to another, about the first one's axes.
 pub fn motion_between(from: &Pose, to: &Pose) -> Vector6<f64> {
     let between = from.inverse() * to;
     let (t, w) = (between.translation.vector, between.rotation.scaled_axis());
@@ -200,14 +201,14 @@ fn normal_equations(
 
 impl Prior {
     pub(crate) fn of(nominal: &Pose, tolerance: &MountTolerance) -> Self {
-        // None at all says that the mounting is known, not that it was drawn with care.
-        let least = |sd: f64, least: f64| if sd == 0.0 { NO_TOLERANCE } else { sd.max(least) };
+        // A tolerance of zero means that the mounting is known, not that it was drawn with care.
+        let floored = |sd: f64, floor: f64| if sd == 0.0 { NO_TOLERANCE } else { sd.max(floor) };
         let shift = tolerance
             .translation_sd_mm
-            .map(|mm| least(mm * 1e-3, LEAST_TOLERANCE[1]));
+            .map(|mm| floored(mm * 1e-3, MIN_TOLERANCE[1]));
         let turn = tolerance
             .rotation_sd_deg
-            .map(|deg| least(deg.to_radians(), LEAST_TOLERANCE[0]));
+            .map(|deg| floored(deg.to_radians(), MIN_TOLERANCE[0]));
         Self {
             nominal: *nominal,
             sd: Vector6::new(shift[0], shift[1], shift[2], turn[0], turn[1], turn[2]),
@@ -218,7 +219,7 @@ impl Prior {
         Matrix6::from_diagonal(&self.sd.component_mul(&self.sd))
     }
 
-    /// Projector, in units of the tolerance, onto the motions about which the boards say less than the drawing.
+    /// Projector, in units of the tolerance, onto the motions that the boards determine less well than the drawing.
     fn open_motions(&self, information: &Matrix6<f64>) -> (Matrix6<f64>, usize) {
         let scale = Matrix6::from_diagonal(&self.sd);
         let eigen = SymmetricEigen::new(scale * information * scale);
@@ -233,7 +234,7 @@ impl Prior {
         (projector, count)
     }
 
-    /// The information with the prior's added along open motions, and how many those are.
+    /// The information with the prior's added along open motions, and the number of these motions.
     fn complete(&self, information: &Matrix6<f64>) -> (Matrix6<f64>, usize) {
         let (projector, count) = self.open_motions(information);
         let unscale = Matrix6::from_diagonal(&self.sd.map(|sd| 1.0 / sd));

@@ -1,16 +1,16 @@
-//! Which board poses to record next: optimal experiment design on what the experimenter knows.
+//! Which board poses to record next: optimal experiment design from what the experimenter knows.
 //!
-//! Seen along an element's beam a board contributes p = s·tan α·(cos ψ, sin ψ), s being the way from the mirror, α the
-//! tilt and ψ its direction. Errors that boards share (biases, d) are nuisances q with unit variance, so that the
-//! information about (cos φ·θ_a, φ, q) is a sum over boards and the angles' covariance C its inverse's corner:
+//! Seen along an element's beam a board contributes p = s·tan α·(cos ψ, sin ψ), with s the distance from the mirror, α
+//! the tilt and ψ its direction. Errors that boards share (biases, d) are nuisances q with unit variance, so that the
+//! information about (cos φ·θ_a, φ, q) is a sum over boards and the angles' covariance C a corner of its inverse:
 //!
 //! ```text
 //! Λ = diag(0, I) + Σ_k g_k g_kᵀ/σ_k²        A: mean of tr C / 2        D: mean of log det C
 //! ```
 //!
-//! σ_k² holds a board's own errors: noise of the mean, drift, markers. The mounting turns all beams alike, whatever the
-//! boards, so it is left out of the choice and stated beside. Poses are chosen from candidates ([`candidates`]) one by
-//! one, then exchanged until no exchange is better.
+//! σ_k² contains a board's own errors: noise of the mean, drift, markers. The mounting turns all beams identically,
+//! whatever the boards, so it does not enter the choice and is reported separately. Poses are chosen from candidates
+//! ([`candidates`]) one at a time, then exchanged until no exchange improves the set.
 
 mod answer;
 pub mod candidates;
@@ -30,11 +30,11 @@ pub use words::facing;
 
 use crate::error::CalibError;
 
-/// Plans the next poses before each of the facets named, or before all.
+/// Plans the next poses in front of each of the named facets, or of all facets.
 ///
 /// # Errors
-/// [`CalibError::UnknownFacet`] for a name that is no facet's, [`CalibError::NoPlace`] where no board can stand,
-/// [`CalibError::Session`] for limits that leave nothing.
+/// [`CalibError::UnknownFacet`] for an unknown name, [`CalibError::NoPlace`] if no board can be placed,
+/// [`CalibError::Session`] for limits that exclude everything.
 ///
 /// ```
 /// use catoptric_calib::plan::{Plan, Request, Situation, plan};
@@ -63,7 +63,7 @@ pub fn plan(situation: &Situation, facets: &[String], request: &Request) -> Resu
     })
 }
 
-/// Plans the next poses before one facet; facets do not depend on each other.
+/// Plans the next poses in front of one facet; facets do not depend on each other.
 ///
 /// # Errors
 /// As [`plan`].

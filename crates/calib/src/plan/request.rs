@@ -1,8 +1,8 @@
-//! What is asked of a plan: how many poses, what they are to make small, and the limits of each.
+//! A request for a plan: how many poses, the criterion to minimize, and the limits of each pose.
 
 use serde::Serialize;
 
-/// What is to be small over the elements of a facet.
+/// The quantity to minimize over the elements of a facet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Criterion {
@@ -14,10 +14,10 @@ pub enum Criterion {
 }
 
 impl Criterion {
-    /// All of them.
+    /// All criteria.
     pub const ALL: [Self; 2] = [Self::D, Self::A];
 
-    /// The word that commands use.
+    /// The name used in commands.
     pub fn name(self) -> &'static str {
         match self {
             Self::D => "d",
@@ -25,7 +25,7 @@ impl Criterion {
         }
     }
 
-    /// What it is, in a line.
+    /// One-line description.
     pub fn about(self) -> &'static str {
         match self {
             Self::D => "The area of the error ellipse: mean log det of the covariance",
@@ -34,23 +34,23 @@ impl Criterion {
     }
 }
 
-/// What is asked for, and the limits of a pose.
+/// The number of poses, the criterion, and the limits of a pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Request {
-    /// Poses for each facet.
+    /// Number of poses for each facet.
     pub poses: usize,
-    /// What is to be small.
+    /// The criterion to minimize.
     pub criterion: Criterion,
-    /// Where the sequence of candidates begins.
+    /// Start of the sequence of candidates.
     pub seed: u64,
-    /// Least and greatest way from the mirror to the board along the beam it is aimed at, in metres; the room and the
-    /// divergence of the beam set limits of their own.
+    /// Minimum and maximum distance from the mirror to the board along the beam it is aimed at, in meters; the room and
+    /// the divergence of the beam set further limits.
     pub range_m: [f64; 2],
     /// Largest incidence of any beam that the board serves, in degrees.
     pub max_incidence_deg: f64,
-    /// Readings of each element at each pose.
+    /// Number of readings of each element at each pose.
     pub readings: usize,
-    /// Poses that are tried for each facet; those that are possible are its candidates.
+    /// Number of poses tried for each facet; the possible ones are its candidates.
     pub tries: usize,
 }
 

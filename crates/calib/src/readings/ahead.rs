@@ -1,22 +1,22 @@
-//! What a ray in the sensor frame meets: the board of the pose, or the known room.
+//! What a ray in the sensor frame hits: the board of the pose, or the known room.
 
 use crate::readings::observations::{BoardInSensor, cone_half_angle};
 use catoptric_model::{BoardPlane, Pose, Session, frame};
 use nalgebra::{Point3, Unit, Vector3};
 
-/// Disagreement that is always allowed, in metres: survey of the room, beam size, whole millimetres.
+/// Disagreement that is always allowed, in meters: survey of the room, beam size, whole millimeters.
 pub(crate) const AGREEMENT_FLOOR: f64 = 0.02;
 
 /// A surface ahead of a ray, as far as it is known.
 pub(crate) struct Ahead {
     pub(crate) distance: f64,
     pub(crate) plane: BoardPlane,
-    /// How much the range changes where part of the beam meets another surface, in metres: nothing on one surface, the
-    /// difference of two walls in a corner of the room, without limit at the edge of a board.
+    /// Change of the range where part of the beam hits another surface, in meters: zero on one surface, the difference
+    /// of two walls in a corner of the room, infinite at the edge of a board.
     pub(crate) spread: f64,
 }
 
-/// What a ray in the sensor frame meets, board or room, and the surface's color; `None` where no room is known.
+/// What a ray in the sensor frame hits, board or room, and the surface's color; `None` if no room is known.
 pub(crate) fn ahead<'s>(
     session: &'s Session,
     room_from_sensor: &Pose,
@@ -32,7 +32,7 @@ pub(crate) fn ahead<'s>(
     let path = origin.coords.norm();
     if let Some((board, hit)) = board.and_then(|b| Some((b, b.hit(origin, direction)?))) {
         let radius = cone * (path + hit.distance);
-        // An edge of the board as well as its corners: allowed for by twice the spot outside.
+        // An edge of the board as well as its corners: covered by a margin of twice the spot outside.
         let near = board.holds(&hit, -2.0 * radius, -AGREEMENT_FLOOR);
         if near && hit.distance < distance {
             let whole = board.holds(&hit, radius, AGREEMENT_FLOOR);

@@ -1,4 +1,4 @@
-//! Step 3 judged: the bare structure under a facet is a plane, and a distance that is not on it is of something else.
+//! Checks step 3: the bare structure under a facet is a plane, and a distance off that plane is of another surface.
 //!
 //! ```text
 //! 1/d(θ) = p·cos θ + q·sin θ          a plane's distances along beams from the origin
@@ -11,19 +11,19 @@ use catoptric_model::Session;
 use catoptric_model::session::NominalFacet;
 use nalgebra::{Matrix2, Vector2};
 
-/// Beams below which nothing can be said of a facet's plane.
-const LEAST_BEAMS: usize = 8;
+/// Minimum number of beams for checking a facet's plane.
+const MIN_BEAMS: usize = 8;
 
-/// Standard deviations from the plane, by the median of the deviations, beyond which a distance is of something else.
+/// Gate on the deviation from the plane, in standard deviations estimated from the median deviation.
 const GATE_SIGMAS: f64 = 6.0;
 
-/// Median of |x| of a normal variable, in its standard deviations.
+/// Median of |x| of a normal variable, in units of its standard deviation.
 const MEDIAN_OF_NORMAL: f64 = 0.6745;
 
-/// Deviation that is always allowed, in metres: what arithmetic leaves.
+/// Deviation that is always allowed, in meters: rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Rounds of fitting the plane to the distances that are on it.
+/// Maximum number of rounds of fitting the plane to the distances that are on it.
 const ROUNDS: usize = 5;
 
 /// Distances to the bare structure, facet by facet.
@@ -32,7 +32,7 @@ pub(crate) struct Bare {
     facets: Vec<(String, Option<Line>)>,
 }
 
-/// A plane's distances, and how far one may be off it.
+/// A plane's distances, and the allowed deviation from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Line {
     coefficients: Vector2<f64>,
@@ -40,7 +40,7 @@ struct Line {
 }
 
 impl Bare {
-    /// The planes that the measured distances lie on.
+    /// Fits the planes of the measured distances.
     pub(crate) fn of(session: &Session) -> Self {
         let of_facet = |facet: &NominalFacet| (facet.name.clone(), Line::through(&measured(session, facet)));
         Self {
@@ -48,8 +48,8 @@ impl Bare {
         }
     }
 
-    /// Bare distance of a beam that meets a facet, in metres: as measured, or where its facet's plane is if that was
-    /// plainly something else; `None` where nothing was measured.
+    /// Bare distance of a beam that hits a facet, in meters: as measured, or from its facet's plane if the measured one
+    /// is clearly of another surface; `None` if nothing was measured.
     pub(crate) fn distance(&self, session: &Session, facet: &str, beam: usize) -> Option<f64> {
         let measured = session.bare_structure.distance(beam)?;
         let line = self.facets.iter().find(|(name, _)| name == facet)?.1;
@@ -61,7 +61,7 @@ impl Bare {
     }
 }
 
-/// Azimuth and distance of every beam of a facet's fan that met the structure.
+/// Azimuth and distance of every beam of a facet's fan that hit the structure.
 fn measured(session: &Session, facet: &NominalFacet) -> Vec<(f64, f64)> {
     let beams = session.scanner.scan.run(facet.beams);
     beams
@@ -70,10 +70,10 @@ fn measured(session: &Session, facet: &NominalFacet) -> Vec<(f64, f64)> {
 }
 
 impl Line {
-    /// The plane of the least median deviation among those through two beams half a fan apart, then fitted to all
+    /// The plane of minimal median deviation among those through two beams half a fan apart, then fitted to all
     /// distances that are on it.
     fn through(measured: &[(f64, f64)]) -> Option<Self> {
-        if measured.len() < LEAST_BEAMS {
+        if measured.len() < MIN_BEAMS {
             return None;
         }
         let half = measured.len() / 2;
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_neighbors_structure_is_seen_and_replaced() {
+    fn a_neighbors_structure_is_detected_and_replaced() {
         let good = plane();
         let mut measured = good.clone();
         for seam in &mut measured[..7] {
@@ -153,19 +153,19 @@ mod tests {
         let line = Line::through(&measured).expect("most of them are on one plane");
         for (i, (m, g)) in measured.iter().zip(&good).enumerate() {
             assert_eq!(line.holds(m), (7..59).contains(&i), "beam {i}");
-            let distance = line.distance(m.0).expect("it is ahead");
+            let distance = line.distance(m.0).expect("the plane is ahead");
             assert!((distance - g.1).abs() < 1e-12, "beam {i}: {distance} for {}", g.1);
         }
     }
 
     #[test]
     fn noise_is_kept_and_few_beams_are_not_judged() {
-        // ±0.3 mm in turn: a spread, not a neighbor.
+        // ±0.3 mm alternately: a spread, not a neighbor.
         let mut measured = plane();
         for (i, m) in measured.iter_mut().enumerate() {
             m.1 += if i % 2 == 0 { 3e-4 } else { -3e-4 };
         }
-        let line = Line::through(&measured).expect("it is a plane");
+        let line = Line::through(&measured).expect("the distances are on a plane");
         assert!(measured.iter().all(|m| line.holds(m)));
         assert_eq!(Line::through(&measured[..7]), None);
     }

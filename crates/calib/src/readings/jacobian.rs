@@ -1,7 +1,7 @@
-//! Derivatives of the range equation, Cooper Eq. (6), by calculus and by the central differences of Eq. (7).
+//! Derivatives of the range equation, Cooper Eq. (6): analytic, and by the central differences of Eq. (7).
 //!
-//! With s = n·(c − P_L1)/(n·v) a change dv of the direction changes s by −s·(n·dv)/(n·v), and a change of d moves
-//! P_L1 along u: dr/dd = 1 − (n·u)/(n·v).
+//! With s = n·(c − P_L1)/(n·v) a change dv of the direction changes s by −s·(n·dv)/(n·v), and a change of d moves P_L1
+//! along u: dr/dd = 1 − (n·u)/(n·v).
 
 use catoptric_model::{BoardPlane, Deflection, beam, range};
 use nalgebra::{Point3, RowVector6, Unit, Vector2, Vector3};
@@ -12,11 +12,11 @@ pub const DIFFERENCE_STEP: f64 = 1e-3;
 /// Derivatives of a range with respect to the three numbers of a deflection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RangeGradient {
-    /// ∂r/∂θ_a, in metres per radian.
+    /// ∂r/∂θ_a, in meters per radian.
     pub azimuth: f64,
-    /// ∂r/∂φ, in metres per radian.
+    /// ∂r/∂φ, in meters per radian.
     pub elevation: f64,
-    /// ∂r/∂d, in metres per metre.
+    /// ∂r/∂d, in meters per meter.
     pub distance: f64,
 }
 
@@ -27,7 +27,7 @@ impl RangeGradient {
     }
 }
 
-/// The derivatives by calculus. `None` if the outgoing ray does not meet the plane.
+/// The analytic derivatives. `None` if the outgoing ray misses the plane.
 ///
 /// ```
 /// use catoptric_calib::jacobian;
@@ -44,14 +44,14 @@ pub fn analytic(deflection: &Deflection, beam_azimuth: f64, board: &BoardPlane) 
     OutgoingRay::of(deflection, beam_azimuth).gradient(board)
 }
 
-/// A deflected beam with its derivatives, to be held against several boards.
+/// A deflected beam with its derivatives, for use with several boards.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OutgoingRay {
-    /// P_L1, in the sensor frame, in metres.
+    /// P_L1, in the sensor frame, in meters.
     pub origin: Point3<f64>,
     /// v.
     pub direction: Unit<Vector3<f64>>,
-    /// u, the direction before the mirror, and d, in metres.
+    /// u, the direction before the mirror, and d, in meters.
     base: Unit<Vector3<f64>>,
     distance: f64,
     /// ∂v/∂θ_a and ∂v/∂φ.
@@ -67,7 +67,7 @@ impl OutgoingRay {
             .leaving_at(deflection.distance)
     }
 
-    /// The ray of a beam in direction `base` that leaves the sensor's origin under an azimuth and an elevation.
+    /// The ray of a beam in direction `base` that leaves the sensor's origin with an added azimuth and an elevation.
     pub(crate) fn aimed(base: &Unit<Vector3<f64>>, azimuth: f64, elevation: f64) -> Self {
         let (sin_a, cos_a) = libm_sincos(azimuth);
         let (sin_e, cos_e) = libm_sincos(elevation);
@@ -95,7 +95,7 @@ impl OutgoingRay {
         self.by_elevation.z
     }
 
-    /// The range r to a board, Eq. (6), in metres; `None` if the ray does not meet its plane.
+    /// The range r to a board, Eq. (6), in meters; `None` if the ray misses its plane.
     pub fn range(&self, board: &BoardPlane) -> Option<f64> {
         Some(self.distance + board.distance_along(&self.origin, &self.direction)?)
     }
@@ -112,7 +112,7 @@ impl OutgoingRay {
         Some((self.distance + s, angles))
     }
 
-    /// The derivatives of that range; `None` if the ray does not meet the plane.
+    /// The derivatives of that range; `None` if the ray misses the plane.
     pub fn gradient(&self, board: &BoardPlane) -> Option<RangeGradient> {
         let s = board.distance_along(&self.origin, &self.direction)?;
         let closing = board.normal.dot(&self.direction);
@@ -125,10 +125,10 @@ impl OutgoingRay {
     }
 }
 
-/// The derivatives by central differences, Eq. (7), with [`DIFFERENCE_STEP`]; ∂r/∂d, which the paper does not
-/// need, is the analytic one.
+/// The derivatives by central differences, Eq. (7), with [`DIFFERENCE_STEP`]; ∂r/∂d, which the paper does not need, is
+/// the analytic one.
 ///
-/// `None` if the outgoing ray or one of its neighbors does not meet the plane.
+/// `None` if the outgoing ray or one of its neighbors misses the plane.
 #[doc(alias = "H")]
 pub fn central(deflection: &Deflection, beam_azimuth: f64, board: &BoardPlane) -> Option<RangeGradient> {
     let at = |azimuth: f64, elevation: f64| {
@@ -147,10 +147,11 @@ pub fn central(deflection: &Deflection, beam_azimuth: f64, board: &BoardPlane) -
     })
 }
 
-/// Derivative of a range with respect to a small motion of the sensor: three shifts, three turns, about its own axes.
+/// Derivative of a range with respect to a small motion of the sensor about its own axes: three shifts, three
+/// rotations.
 ///
-/// Such a motion (t, ω) moves the board by −t − ω × q at the point q it is hit at, in the sensor frame, and the range
-/// by n·(that)/(n·v): the row is −(nᵀ, (q × n)ᵀ)/(n·v).
+/// Such a motion (t, ω) moves the board by −t − ω × q at the point q where it is hit, in the sensor frame, and the
+/// range by n·(that)/(n·v): the row is −(nᵀ, (q × n)ᵀ)/(n·v).
 pub fn of_mount(
     hit: &Point3<f64>,
     normal: &Unit<Vector3<f64>>,
@@ -162,7 +163,7 @@ pub fn of_mount(
     RowVector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
 }
 
-/// Sine and cosine that do not differ between machines, by way of the model's own direction.
+/// Sine and cosine, equal on all machines, from the model's own direction.
 fn libm_sincos(angle: f64) -> (f64, f64) {
     let u = beam::direction(angle);
     (u.y, u.x)
@@ -190,17 +191,18 @@ mod tests {
                     elevation,
                     distance: 0.07,
                 };
-                let exact = analytic(&given, 0.25, &board(tilt)).expect("it meets the board");
-                let near = central(&given, 0.25, &board(tilt)).expect("it meets the board");
+                let exact = analytic(&given, 0.25, &board(tilt)).expect("the beam hits the board");
+                let near = central(&given, 0.25, &board(tilt)).expect("the beam hits the board");
                 let scale = exact.angles().norm();
                 assert!((exact.angles() - near.angles()).norm() < 1e-5 * scale);
-                // A difference must differ: an error of the order δ² is there.
+                // The differences must differ from the derivatives, by an error of the order δ².
                 assert!(exact.angles() != near.angles());
                 let longer = Deflection {
                     distance: 0.07 + 1e-4,
                     ..given
                 };
-                let r = |d: &Deflection| range::predict(d, 0.25, &board(tilt)).expect("it meets the board");
+                let r =
+                    |d: &Deflection| range::predict(d, 0.25, &board(tilt)).expect("the beam hits the board");
                 assert!(((r(&longer) - r(&given)) / 1e-4 - exact.distance).abs() < 1e-10);
             }
         }
@@ -214,7 +216,7 @@ mod tests {
             distance: 0.07,
         };
         let (plane, v) = (board(0.3), given.exit_direction(0.25));
-        let r = range::predict(&given, 0.25, &plane).expect("it meets the board");
+        let r = range::predict(&given, 0.25, &plane).expect("the beam hits the board");
         let hit = given.deflection_point(0.25) + v.into_inner() * (r - given.distance);
         let row = of_mount(&hit, &plane.normal, &v);
         for axis in 0..6 {
@@ -228,7 +230,7 @@ mod tests {
                 old_from_new.inverse() * plane.point,
                 Unit::new_normalize(old_from_new.rotation.inverse() * plane.normal.into_inner()),
             );
-            let change = range::predict(&given, 0.25, &moved).expect("it meets the board") - r;
+            let change = range::predict(&given, 0.25, &moved).expect("the beam hits the board") - r;
             assert!((change / 1e-6 - row[axis]).abs() < 1e-4, "axis {axis}");
         }
     }

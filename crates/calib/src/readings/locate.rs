@@ -1,22 +1,22 @@
-//! Where a beam's readings of one stretch lie, when some of them are of something else.
+//! Locates a beam's readings in one stretch when some of them are outliers.
 //!
-//! Another scanner's pulses, dust or a passer-by throw single readings far off, and a mean goes with them. Readings that
-//! all lie where noise puts them are averaged as they are. Otherwise their main body is sought, from the median outward;
-//! it stands for the beam as long as no more readings lie outside than happens to other beams. A beam that reads two
-//! surfaces by turns has more, keeps its wide spread and is judged by that (step 4).
+//! Another scanner's pulses, dust or a passer-by throw single readings far off, and the mean with them. Readings that
+//! are all within noise are averaged as they are. Otherwise their main body is sought, from the median outward; it
+//! represents the beam as long as no more readings are outside than for other beams. A beam that reads two surfaces
+//! alternately has more outside, keeps its wide spread and is judged by that (step 4).
 
 use crate::readings::columns::{self, MOST_BYTES, Wanted};
 use crate::readings::spread;
 use catoptric_model::{BeamStatistics, Dataset, PoseRecord, Summary, Unreadable, Window};
 use rayon::prelude::*;
 
-/// One beam in so many, those with most readings outside, does not count when it is asked how often that happens.
+/// One beam in this many, those with the most readings outside, is ignored when the usual share is determined.
 const LEFT_OUT: usize = 4;
 
-/// Standard deviations by which a beam may have more readings outside than others.
-const CHANCE_SIGMAS: f64 = 5.0;
+/// Standard deviations by which the number of a beam's readings outside may exceed the usual one.
+const USUAL_SIGMAS: f64 = 5.0;
 
-/// Readings, and part of a beam's readings, that may be outside in any case.
+/// Number of readings, and fraction of a beam's readings, that may be outside in any case.
 const FREE: f64 = 3.0;
 const FREE_PART: f64 = 0.05;
 
@@ -40,7 +40,7 @@ pub fn summaries(dataset: &Dataset) -> Result<Vec<Vec<Summary>>, Unreadable> {
     let usual = usual_share(&plain, &robust);
     let choose = |(plain, robust): (Vec<Summary>, Vec<Option<Summary>>)| {
         let of_one = |(plain, robust): (Summary, Option<Summary>)| match robust {
-            Some(found) if is_chance(&found, usual) && !spread::is_abnormal(&found, noise) => found,
+            Some(found) if is_usual(&found, usual) && !spread::is_abnormal(&found, noise) => found,
             _ => plain,
         };
         plain.into_iter().zip(robust).map(of_one).collect()
@@ -71,7 +71,7 @@ fn strays(record: &PoseRecord, noise: f64) -> Vec<usize> {
         .collect()
 }
 
-/// How large a part of a beam's readings is usually outside.
+/// The usual fraction of a beam's readings outside.
 fn usual_share(plain: &[Vec<Summary>], robust: &[Vec<Option<Summary>>]) -> f64 {
     let pairs = plain.iter().flatten().zip(robust.iter().flatten());
     let mut shares: Vec<f64> = pairs
@@ -83,11 +83,11 @@ fn usual_share(plain: &[Vec<Summary>], robust: &[Vec<Option<Summary>>]) -> f64 {
     shares[..counted].iter().sum::<f64>() / counted.max(1) as f64
 }
 
-/// Whether a beam has no more readings outside than chance gives it, where others have a share of that size outside.
-fn is_chance(found: &Summary, usual: f64) -> bool {
+/// Whether the number of a beam's readings outside is within statistical fluctuation of the usual share.
+fn is_usual(found: &Summary, usual: f64) -> bool {
     let n = (found.count + found.outliers) as f64;
     let free = FREE.min(FREE_PART * n);
-    found.outliers as f64 <= n * usual + CHANCE_SIGMAS * (n * usual * (1.0 - usual)).sqrt() + free
+    found.outliers as f64 <= n * usual + USUAL_SIGMAS * (n * usual * (1.0 - usual)).sqrt() + free
 }
 
 #[cfg(test)]
@@ -111,7 +111,7 @@ mod tests {
         }
     }
 
-    /// A hundred readings of 2 m with 4 mm of something like noise, some of them off by 0.3 m either way.
+    /// A hundred readings of 2 m with 4 mm of noise-like scatter, some of them off by ±0.3 m.
     fn readings(outliers: usize) -> Vec<f64> {
         let noise = |i: usize| 0.004 * (((i * 37) % 100) as f64 / 50.0 - 0.99) * 3.0_f64.sqrt();
         let step = |i: usize| if i.is_multiple_of(2) { 0.3 } else { -0.3 };
@@ -125,7 +125,7 @@ mod tests {
         let of = |outliers: usize| Summary::of_main_body(readings(outliers).into_iter(), 0.004);
         let found = of(15).expect("most readings are together");
         assert_eq!((found.count, found.outliers, found.missing), (85, 15, 0));
-        // What is left is the mean of the same 85 readings without any outlier among them.
+        // The mean of the same 85 readings without any outlier among them.
         let exact: f64 = readings(0)[15..].iter().sum::<f64>() / 85.0;
         assert!((found.mean - exact).abs() < 1e-12);
         assert_eq!(kept(&readings(15), &found, 0.004), readings(0)[15..].to_vec());
@@ -135,18 +135,18 @@ mod tests {
     }
 
     #[test]
-    fn more_outliers_than_others_have_are_no_chance() {
+    fn more_outliers_than_usual_are_detected() {
         let with = |outliers: usize| Summary {
             count: 100 - outliers,
             outliers,
             ..Summary::default()
         };
-        assert!(is_chance(&with(3), 0.0) && !is_chance(&with(4), 0.0));
-        assert!(is_chance(&with(30), 0.15) && !is_chance(&with(40), 0.15));
+        assert!(is_usual(&with(3), 0.0) && !is_usual(&with(4), 0.0));
+        assert!(is_usual(&with(30), 0.15) && !is_usual(&with(40), 0.15));
     }
 
     #[test]
-    fn how_often_readings_stray_is_asked_of_most_beams() {
+    fn the_usual_share_is_that_of_most_beams() {
         let plain = vec![
             Summary {
                 count: 100,

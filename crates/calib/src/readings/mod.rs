@@ -1,8 +1,8 @@
 //! What beams read, and what they should have read.
 //!
-//! Readings are averaged without those that are of something else ([`locate`]); step 3's distances are held against the
-//! plane that they are of. Boards stand in the sensor frame ([`observations`], step 6), and a ray's range to them is
-//! differentiated ([`jacobian`], Eq. 7).
+//! Readings are averaged without outliers ([`locate`]); step 3's distances are compared with the plane of their facet.
+//! Boards are placed in the sensor frame ([`observations`], step 6), and a ray's range to them is differentiated
+//! ([`jacobian`], Eq. (7)).
 
 pub(crate) mod ahead;
 pub(crate) mod bare;

@@ -1,11 +1,11 @@
-//! Boards as the sensor sees them (step 6), and what an element read of them.
+//! Boards in the sensor frame (step 6), and an element's readings of them.
 
 use catoptric_model::{BoardPlane, Pose, PoseRecord, RawRange, Rectangle, Session, Summary};
 use nalgebra::{Point3, Unit, Vector3};
 
-/// How many spot radii (1/e²) have to lie on a board for a reading to be of that board alone.
+/// Number of spot radii (1/e²) that have to be on a board for a reading to be of that board alone.
 ///
-/// One and a half: 0.13 % of a Gaussian beam is left outside an edge, a millimetre against a wall one metre behind.
+/// One and a half: beyond an edge 0.13 % of a Gaussian beam is outside, a millimeter against a wall one meter behind.
 pub const SPOT_RADII: f64 = 1.5;
 
 /// The board of one pose, in the sensor frame.
@@ -17,16 +17,16 @@ pub struct BoardInSensor {
     pub plane: BoardPlane,
     /// Its outline.
     pub outline: Rectangle,
-    /// Its markers by the template, in the sensor frame, in metres.
+    /// Its markers from the template, in the sensor frame, in meters.
     pub markers: Vec<Point3<f64>>,
     /// Its color.
     pub color: String,
 }
 
-/// Where a ray meets the plane of a board.
+/// Where a ray hits the plane of a board.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// Distance along the ray, in metres.
+    /// Distance along the ray, in meters.
     pub distance: f64,
     /// The point in the sensor frame.
     pub point: Point3<f64>,
@@ -42,17 +42,17 @@ pub struct Hit {
 pub struct BoardView<'a> {
     /// Plane (c, n) of the board in the sensor frame.
     pub plane: BoardPlane,
-    /// The board's markers by the template, in the sensor frame, in metres.
+    /// The board's markers from the template, in the sensor frame, in meters.
     pub markers: &'a [Point3<f64>],
     /// Color of the board.
     pub color: &'a str,
-    /// White noise of one reading, 1σ, in metres.
+    /// White noise of one reading, 1σ, in meters.
     pub noise_sd: f64,
-    /// Readings of it.
+    /// Number of readings of it.
     pub count: usize,
 }
 
-/// What one element read of one board.
+/// The readings of one board by one element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation<'a> {
     /// The board.
@@ -80,7 +80,7 @@ impl BoardInSensor {
         })
     }
 
-    /// Where a ray meets the board's plane; `None` if it does not.
+    /// Where a ray hits the board's plane; `None` if it misses.
     pub fn hit(&self, origin: &Point3<f64>, direction: &Unit<Vector3<f64>>) -> Option<Hit> {
         let distance = self.plane.distance_along(origin, direction)?;
         let point = origin + direction.into_inner() * distance;
@@ -96,9 +96,9 @@ impl BoardInSensor {
         })
     }
 
-    /// Whether the board holds a spot of the given radius (measured across the beam, in metres) and `margin` more.
+    /// Whether the board holds a spot of the given radius (measured across the beam, in meters) plus `margin`.
     ///
-    /// On a board met at a slope the round spot is an ellipse; its half extent along x is radius·√(1 + slope_x²).
+    /// On a board at a slope the round spot is an ellipse; its half extent along x is radius·√(1 + slope_x²).
     pub fn holds(&self, hit: &Hit, spot_radius: f64, margin: f64) -> bool {
         let half = [0.5 * self.outline.width, 0.5 * self.outline.height];
         (0..2).all(|axis| {
@@ -107,7 +107,7 @@ impl BoardInSensor {
         })
     }
 
-    /// The board as an element that read it `summary.count` times sees it.
+    /// The board for an element that read it `summary.count` times.
     pub fn view(&self, noise_sd: f64, count: usize) -> BoardView<'_> {
         BoardView {
             plane: self.plane,
@@ -132,7 +132,7 @@ pub fn azimuth(session: &Session, beam: usize) -> f64 {
     session.scanner.scan.azimuth(beam)
 }
 
-/// Half angle of the cone that has to fall on one surface, in radians: [`SPOT_RADII`] times half the divergence.
+/// Half angle of the cone that has to be on one surface, in radians: [`SPOT_RADII`] times half the divergence.
 pub fn cone_half_angle(session: &Session) -> f64 {
     SPOT_RADII * 0.5e-3 * session.scanner.divergence_full_mrad
 }
@@ -159,13 +159,13 @@ mod tests {
         };
         let straight = board
             .hit(&Point3::origin(), &Vector3::x_axis())
-            .expect("it meets the board");
+            .expect("the beam hits the board");
         assert!((straight.distance - 2.0).abs() < 1e-15 && straight.in_board.coords.norm() < 1e-12);
         assert!(board.holds(&straight, 0.09, 0.0) && !board.holds(&straight, 0.09, 0.02));
         // From the side, at 60° against the normal and along the board's y: the spot is twice as long there.
         let from = Point3::new(1.0, -3.0_f64.sqrt(), 0.0);
         let direction = Unit::new_normalize(Point3::new(2.0, 0.0, 0.0) - from);
-        let sloped = board.hit(&from, &direction).expect("it meets the board");
+        let sloped = board.hit(&from, &direction).expect("the beam hits the board");
         assert!((sloped.slope[1].abs() - 3.0_f64.sqrt()).abs() < 1e-12);
         assert!(board.holds(&sloped, 0.049, 0.0) && !board.holds(&sloped, 0.051, 0.0));
     }

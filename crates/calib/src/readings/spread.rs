@@ -2,16 +2,16 @@
 
 use catoptric_model::Summary;
 
-/// Spread that whole-millimetre readings and unstated color may add to any noise, in metres.
+/// Spread that whole-millimeter readings and an unstated color may add to any noise, in meters.
 const SPREAD_FLOOR: f64 = 2e-3;
 
-/// How much noisier than believed a good surface may be: black paper against white is a factor 1.5 in Table 4.
+/// How much noisier than believed a good surface may be: black paper against white is a factor of 1.5 in Table 4.
 const SURFACE_FACTOR: f64 = 2.0;
 
-/// Standard errors that a sample standard deviation may lie off its mean before it counts as different.
+/// Standard errors by which a sample standard deviation may be off before it counts as different.
 const SPREAD_SIGMAS: f64 = 5.0;
 
-/// Largest sample standard deviation that is still believed to be noise, in metres.
+/// Largest sample standard deviation that still counts as noise, in meters.
 ///
 /// The standard error of a sample standard deviation is σ/√(2(N − 1)).
 pub(crate) fn largest_spread(believed_sd: f64, count: usize) -> f64 {
@@ -23,11 +23,11 @@ pub(crate) fn is_abnormal(summary: &Summary, believed_sd: f64) -> bool {
     summary.count > 1 && summary.sd > largest_spread(believed_sd, summary.count)
 }
 
-/// Noise of one reading, in metres: the believed one, or the observed one where it is plainly larger.
+/// Noise of one reading, in meters: the believed one, or the observed one if it is clearly larger.
 pub(crate) fn noise_sd(summary: &Summary, believed_sd: f64) -> f64 {
-    // Always taking the larger of two would call noise larger than it is whenever the sample happens to be so.
-    let chance = believed_sd * (1.0 + 3.0 * relative_error(summary.count));
-    if summary.sd > chance {
+    // Always taking the larger of the two would overestimate the noise whenever the sample happens to be larger.
+    let limit = believed_sd * (1.0 + 3.0 * relative_error(summary.count));
+    if summary.sd > limit {
         summary.sd
     } else {
         believed_sd
@@ -61,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn plainly_larger_noise_is_believed() {
+    fn clearly_larger_noise_is_believed() {
         assert_eq!(noise_sd(&of(0.0042), 0.0041), 0.0041);
         assert_eq!(noise_sd(&of(0.0061), 0.0041), 0.0061);
     }

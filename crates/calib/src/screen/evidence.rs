@@ -1,4 +1,4 @@
-//! The stretches of a dataset that say what an element reads, with everything that is known of what it should read.
+//! The stretches of a dataset that show what an element reads, with everything known about what it should read.
 
 use crate::judge::common::CommonErrors;
 use crate::mount::pose::Mount;

@@ -1,5 +1,5 @@
-//! Which elements a mirror deflects (step 4): what each beam read in the known room and elsewhere, against what a beam
-//! that no mirror touches would have read.
+//! Which elements a mirror deflects (step 4): compares what each beam read in the known room and elsewhere with what an
+//! undeflected beam would have read.
 
 mod abnormal;
 mod evidence;
@@ -13,14 +13,14 @@ use evidence::Screen;
 use near::facets_near;
 use rayon::prelude::*;
 
-/// What screening makes of an element.
+/// The class of an element by screening.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Candidate {
-    /// It reads what a beam without a mirror reads; the text says how often.
+pub(crate) enum ScreenClass {
+    /// It reads what an undeflected beam reads; the text states how often.
     Direct(String),
-    /// A mirror may deflect it: indices of facets, the likeliest first.
+    /// A mirror may deflect it: indices of facets, the most probable first.
     Deflected(Vec<usize>),
-    /// Its readings are of no use, and why.
+    /// Its readings are unusable, with the reason.
     Rejected(String),
 }
 
@@ -30,7 +30,7 @@ pub(crate) fn candidates(
     summaries: &[Vec<Summary>],
     mount: &Mount,
     boards: &[Option<BoardInSensor>],
-) -> Vec<Candidate> {
+) -> Vec<ScreenClass> {
     let screen = Screen::new(dataset, summaries, mount, boards);
     let beams = (0..dataset.session.scanner.scan.beams()).into_par_iter();
     beams.map(|b| screen.classify(b)).collect()
@@ -38,23 +38,23 @@ pub(crate) fn candidates(
 
 impl Screen<'_> {
     /// The class of one element, from statistics alone.
-    fn classify(&self, beam: usize) -> Candidate {
+    fn classify(&self, beam: usize) -> ScreenClass {
         let session = &self.dataset.session;
         let facets = facets_near(&session.scanner.scan, &session.facets, beam);
         let tally = self.tally(beam, &facets);
         if let Some(reason) = self.abnormal(beam, &facets) {
-            return Candidate::Rejected(reason);
+            return ScreenClass::Rejected(reason);
         }
         if tally.is_direct() {
-            return Candidate::Direct(format!(
+            return ScreenClass::Direct(format!(
                 "reads what is straight ahead in {} of {} stretches",
                 tally.agreeing, tally.usable
             ));
         }
         if !facets.is_empty() {
-            return Candidate::Deflected(facets);
+            return ScreenClass::Deflected(facets);
         }
-        Candidate::Rejected(match tally.worst {
+        ScreenClass::Rejected(match tally.worst {
             Some((expected, found, stretch)) => format!(
                 "no mirror is drawn for it, yet it reads what is straight ahead in only {} of {} stretches: \
                  expected {expected:.3} m in stretch {stretch}, found {found:.3} m",

@@ -1,9 +1,9 @@
-//! Which facets a beam may belong to, as drawn and give or take what building them adds.
+//! Which facets a beam may belong to: as drawn, to within the errors of manufacturing.
 
 use catoptric_model::ScanGeometry;
 use catoptric_model::session::NominalFacet;
 
-/// How far beyond the drawn beams a facet as built may serve some, in degrees.
+/// Number of beams beyond the drawn ones that a facet as built may serve.
 ///
 /// At 65 mm a millimetre is 0.9°: an optical center a millimetre off in its housing, a facet half a millimetre and
 /// 1° off in its frame, and posts that hide an edge on the drawing add up to several. Being generous costs nothing:

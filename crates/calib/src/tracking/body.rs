@@ -1,21 +1,21 @@
-//! A tracked body: what the session knows of it, the pose that its markers solve to, and how far off chance leaves them.
+//! A tracked body: its data from the session, the pose solved from its markers, and the limits of random marker errors.
 
 use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::session::Marker;
 use catoptric_model::{Pose, PoseRecord, Session, tracking};
 use nalgebra::Point3;
 
-/// Standard normal deviate of the limits: exceeded by chance once in 10⁹.
+/// Standard normal deviate of the limits: exceeded at random once in 10⁹.
 const SIGMAS: f64 = 6.0;
 
-/// A tracked body as the session knows it.
+/// A tracked body, by the session.
 pub(super) struct Body<'a> {
     pub(super) subject: &'a str,
     pub(super) markers: &'a [Marker],
     pub(super) template: Vec<Point3<f64>>,
 }
 
-/// The rig, or the board that was set up; other bodies are of no use here.
+/// The rig, or the board that was set up; other bodies are not used here.
 pub(super) fn body<'a>(session: &'a Session, record: &PoseRecord, subject: &str) -> Option<Body<'a>> {
     let (subject, markers) = if subject == RIG_SUBJECT {
         (RIG_SUBJECT, &session.rig_markers)
@@ -32,7 +32,7 @@ pub(super) fn body<'a>(session: &'a Session, record: &PoseRecord, subject: &str)
     })
 }
 
-/// What a person calls a body.
+/// Name of a body in messages.
 pub(super) fn name_of(subject: &str) -> String {
     if subject == RIG_SUBJECT {
         "the rig".to_owned()
@@ -41,7 +41,7 @@ pub(super) fn name_of(subject: &str) -> String {
     }
 }
 
-/// The pose of a body, and the squared distance of each marker from where it then should be.
+/// The pose of a body, and the squared distance of each marker from its place at that pose.
 pub(super) fn solved(template: &[Point3<f64>], seen: &[Option<Point3<f64>>]) -> Option<(Pose, Vec<f64>)> {
     let pose = tracking::solve_pose(template, seen)?;
     let off = template.iter().zip(seen);
@@ -49,7 +49,7 @@ pub(super) fn solved(template: &[Point3<f64>], seen: &[Option<Point3<f64>>]) -> 
     Some((pose, squares.collect()))
 }
 
-/// χ² that is exceeded by chance once in 10⁹ (Wilson and Hilferty 1931).
+/// χ² that is exceeded at random once in 10⁹ (Wilson and Hilferty 1931).
 pub(super) fn limit(degrees_of_freedom: usize) -> f64 {
     let n = degrees_of_freedom as f64;
     let root = 1.0 - 2.0 / (9.0 * n) + SIGMAS * (2.0 / (9.0 * n)).sqrt();

@@ -1,9 +1,9 @@
-//! What went wrong while a pose was recorded, from the recording alone: exchanged labels, a stray label, a body that
-//! moved, readings that changed their level.
+//! What went wrong while a pose was recorded, from the recording alone: exchanged labels, a misplaced label, a body
+//! that moved, readings that changed their level.
 //!
-//! A body at rest shows its markers where its template has them, give or take what is believed of their errors, and
-//! shows them there from the first frame to the last. What is off is said in words, pose by pose; where it is certain
-//! what happened, the pose is put right, else it is left out.
+//! A body at rest shows its markers where its template has them, to within the believed errors, and shows them there
+//! from the first frame to the last. Every deviation is reported in plain language, pose by pose. If it is certain what
+//! happened, the pose is corrected, else it is left out.
 
 mod body;
 mod constellation;
@@ -31,11 +31,11 @@ enum What {
     Misfit(Misfit),
 }
 
-/// The dataset with poses put right or left out, and a sentence for each; the dataset itself if nothing went wrong.
+/// The dataset with poses corrected or left out, and a sentence for each; the dataset itself if nothing went wrong.
 ///
-/// A pose that is left out keeps its place: its readings are none. Where a body's markers do not fit in most of the poses
-/// it was seen in, its template or what is believed of its markers is wrong rather than each of those poses; that is said,
-/// and the poses stay.
+/// A pose that is left out keeps its index: its readings become invalid. If a body's markers do not fit in most of the
+/// poses in which it was seen, its template or the belief about its markers is wrong rather than each of those poses;
+/// that is reported, and the poses are kept.
 pub fn put_right(dataset: &Dataset) -> (Cow<'_, Dataset>, Vec<String>) {
     let session = &dataset.session;
     // Of readings in memory they are gathered now, side by side.
@@ -61,7 +61,7 @@ pub fn put_right(dataset: &Dataset) -> (Cow<'_, Dataset>, Vec<String>) {
                 what,
             }));
         }
-        // What moved has changed the readings as well; it is said once.
+        // A motion has changed the readings as well; it is reported once.
         if findings.len() == before
             && let Some(change) = movement::of_readings(record, session)
         {
@@ -81,25 +81,25 @@ pub fn put_right(dataset: &Dataset) -> (Cow<'_, Dataset>, Vec<String>) {
     for finding in findings {
         let record = &mut repaired.poses[finding.pose];
         let name = name_of(&finding.subject);
-        let (said, corrected) = match finding.what {
+        let (message, corrected) = match finding.what {
             What::Moved(how) => (how, None),
             What::Misfit(misfit) => (misfit.words(&name), misfit.corrected()),
         };
         let remedy = match corrected {
             Some(pose) if finding.subject == RIG_SUBJECT => {
                 record.room_from_rig = pose;
-                "its pose was solved anew with the labels put right"
+                "its pose was solved anew with the labels corrected"
             }
             Some(pose) => {
                 record.room_from_board = Some(pose);
-                "its pose was solved anew with the labels put right"
+                "its pose was solved anew with the labels corrected"
             }
             None => {
                 record.readings = record.readings.left_out();
                 "the pose is left out"
             }
         };
-        warnings.push(format!("pose {}: {said}; {remedy}", record.label.pose));
+        warnings.push(format!("pose {}: {message}; {remedy}", record.label.pose));
     }
     (Cow::Owned(repaired), warnings)
 }
@@ -117,7 +117,7 @@ fn examine(record: &PoseRecord, body: &Body<'_>, watched: &Watched, marker_sd: f
     constellation::misfit(body, watched, marker_sd, faces.as_ref()).map(What::Misfit)
 }
 
-/// Takes out the misfits of bodies that fit hardly ever, and says so.
+/// Removes the misfits of bodies that hardly ever fit, and reports these bodies.
 fn without_templates_that_never_fit(
     findings: Vec<Finding>,
     seen: &BTreeMap<&str, usize>,
@@ -131,7 +131,7 @@ fn without_templates_that_never_fit(
         let of = seen.get(subject.as_str()).copied().unwrap_or_default();
         of > 1 && 2 * *count > of
     });
-    let said = |(subject, count): (&String, &usize)| {
+    let message = |(subject, count): (&String, &usize)| {
         format!(
             "the markers of {} do not fit its template in {count} of {} poses: the template in the session, or what it \
              believes of marker errors, is wrong; the poses are used as they were tracked",
@@ -139,7 +139,7 @@ fn without_templates_that_never_fit(
             seen.get(subject.as_str()).copied().unwrap_or_default()
         )
     };
-    let warnings = odd.iter().map(said).collect();
+    let warnings = odd.iter().map(message).collect();
     let kept = |f: &Finding| !(unexplained(f) && odd.contains_key(&f.subject));
     (warnings, findings.into_iter().filter(kept).collect())
 }

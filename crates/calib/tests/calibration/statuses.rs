@@ -1,4 +1,4 @@
-//! No element disappears: what is wrong with each is said.
+//! No element disappears: every fault is reported.
 
 use crate::synthetic::World;
 use catoptric_calib::{CalibError, Method, Options, calibrate, pose};
@@ -22,8 +22,8 @@ fn rewrite(dataset: &mut Dataset, beam: usize, with: impl Fn(PoseKind, usize, f6
 
 fn assert_rejected(estimate: &BeamEstimate, word: &str) {
     assert_eq!(estimate.status, Status::Rejected, "{:?}", estimate.reason);
-    let reason = estimate.reason.as_deref().expect("a rejection says why");
-    assert!(reason.contains(word), "{reason:?} does not say {word:?}");
+    let reason = estimate.reason.as_deref().expect("a rejection has a reason");
+    assert!(reason.contains(word), "{reason:?} does not contain {word:?}");
 }
 
 #[test]
@@ -96,11 +96,13 @@ fn good_elements_survive_honest_noise() {
 }
 
 #[test]
-fn without_boards_for_it_the_mounting_is_the_drawing_s_and_says_so() {
+fn without_boards_for_it_the_mounting_and_its_covariance_are_the_drawing_s() {
     let mut made = World::noisy(13).make();
     made.dataset.poses.retain(|p| p.label.kind != PoseKind::Direct);
-    let mount = solve(&made.dataset).rig_from_sensor.expect("it is always given");
-    let covariance = Matrix6::from(mount.covariance.expect("it is always given"));
+    let mount = solve(&made.dataset)
+        .rig_from_sensor
+        .expect("the mounting is always estimated");
+    let covariance = Matrix6::from(mount.covariance.expect("its covariance is always given"));
     let nominal = catoptric_model::Pose::from(&made.dataset.session.nominal_rig_from_sensor);
     assert!(pose::motion_between(&nominal, &mount.pose()).norm() < 1e-14);
     assert!((covariance[(5, 5)].sqrt().to_degrees() - 1.0).abs() < 1e-9);
@@ -108,7 +110,7 @@ fn without_boards_for_it_the_mounting_is_the_drawing_s_and_says_so() {
 }
 
 #[test]
-fn one_board_determines_some_motions_and_the_tolerance_stands_in_for_the_rest() {
+fn one_board_determines_some_motions_and_the_tolerance_covers_the_rest() {
     let mut made = World::noisy(15).make();
     made.dataset.session.mount_tolerance.rotation_sd_deg = [3.0; 3];
     let mut boards = 0;
@@ -117,8 +119,10 @@ fn one_board_determines_some_motions_and_the_tolerance_stands_in_for_the_rest() 
         p.label.kind != PoseKind::Direct || boards == 1
     });
     let calibration = solve(&made.dataset);
-    let mount = calibration.rig_from_sensor.expect("it is always given");
-    let covariance = Matrix6::from(mount.covariance.expect("it is always given"));
+    let mount = calibration
+        .rig_from_sensor
+        .expect("the mounting is always estimated");
+    let covariance = Matrix6::from(mount.covariance.expect("its covariance is always given"));
     let scale = Matrix6::from_diagonal(
         &[
             5e-3,
@@ -138,17 +142,17 @@ fn one_board_determines_some_motions_and_the_tolerance_stands_in_for_the_rest() 
     );
     assert!(
         values.min() > 0.0 && values.min() < 0.1,
-        "one board says something: {values}"
+        "one board determines something: {values}"
     );
-    // A poorly known mounting is not the boards' fault: elements are solved, with a covariance to match.
+    // A poorly known mounting is not the boards' fault: elements are solved, with a matching covariance.
     let estimate = &calibration.beams[66];
     assert_eq!(estimate.status, Status::Solved, "{:?}", estimate.reason);
-    let variance = estimate.covariance_rad2.expect("it is solved")[1][1];
+    let variance = estimate.covariance_rad2.expect("the element is solved")[1][1];
     assert!(variance.sqrt().to_degrees() > 0.3);
 }
 
 #[test]
-fn a_dataset_that_cannot_be_is_refused() {
+fn an_impossible_dataset_is_refused() {
     let mut made = World::noisy(14).make();
     made.dataset.session.facets[0].corners_mm.truncate(2);
     let refused = calibrate(&made.dataset, Method::Beam, &Options::default());
@@ -185,7 +189,7 @@ fn a_wide_beam_and_edges_off_the_drawing_lose_only_edge_beams() {
                     "seed {seed}, beam {index}, {inside} inside: {:?}",
                     estimate.reason
                 );
-                // Half a beam's width is 1.03 steps: two steps inside an edge all its light is mirrored.
+                // Half a beam's width is 1.03 steps: two steps inside an edge all of its light is reflected.
                 if inside >= 2 {
                     assert_eq!(estimate.status, Status::Solved, "{context}");
                 }

@@ -1,4 +1,4 @@
-//! A grouped problem as a plain one, which shows what elimination has to come to.
+//! A grouped problem as a plain one: the result that elimination has to reproduce.
 
 use catoptric_calib::lsq::{GroupedProblem, Point, Problem, State};
 use nalgebra::{DMatrix, DVector};

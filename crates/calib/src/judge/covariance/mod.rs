@@ -1,10 +1,11 @@
-//! The error budget of one element: how far its direction can be off under every error the experimenter believes in.
+//! The error budget of one element: how far its direction can be off under all errors that the experimenter believes
+//! in.
 //!
 //! Per board: white noise σ²/N, a drift constant, the board's markers (one offset and two tilts of its plane). Common
-//! to all boards: the nodes of E_r, A_a, E_c of each color, the distance d, and the mounting of the sensor. A d that the
-//! scanner ranged has errors of E_r and A_a in it, which partly cancel those of the readings. They make Σ (K × K); the
-//! estimate x̂ = (HᵀWH)⁻¹HᵀW·(z − r) then has the sandwich covariance, and no unbiased estimate can have less than the
-//! bound (HᵀΣ⁻¹H)⁻¹.
+//! to all boards: the nodes of E_r, A_a, E_c of each color, the distance d, and the mounting of the sensor. A d that
+//! the scanner ranged contains errors of E_r and A_a, which partly cancel those of the readings. Together they make Σ
+//! (K × K); the estimate x̂ = (HᵀWH)⁻¹HᵀW·(z − r) then has the sandwich covariance, and no unbiased estimate can be
+//! better than the bound (HᵀΣ⁻¹H)⁻¹.
 
 mod plane;
 
@@ -17,14 +18,14 @@ use nalgebra::{DMatrix, DVector, Dyn, Matrix2, Matrix6, OMatrix, RowDVector, Row
 pub(crate) use plane::PlaneFit;
 use plane::plane_variance;
 
-/// Error that keeps Σ invertible where none is believed in, in metres.
-const LEAST_ERROR: f64 = 1e-6;
+/// Error that keeps Σ invertible where no error is believed in, in meters.
+const MIN_ERROR: f64 = 1e-6;
 
-/// How well the mounting of the sensor is known: small motions of the sensor about its own axes, three shifts in
-/// metres, three turns in radians.
+/// Uncertainty of the mounting of the sensor, as small motions of the sensor about its own axes: three shifts in
+/// meters, three rotations in radians.
 ///
-/// The mounting was found with the same range biases that the elements are found with. The two errors are therefore
-/// correlated, and partly cancel; `common` carries that.
+/// The mounting was estimated with the same range biases as the elements. The two errors are therefore correlated, and
+/// partly cancel; `common` holds that part.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MountUncertainty {
     /// Covariance from errors that no element shares.
@@ -36,10 +37,10 @@ pub struct MountUncertainty {
 /// The linearized measurement of one element and its error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Budget {
-    /// H: one row (∂r/∂θ_a, ∂r/∂φ) per board, in metres per radian.
+    /// H: one row (∂r/∂θ_a, ∂r/∂φ) per board, in meters per radian.
     #[doc(alias = "H")]
     pub jacobian: DMatrix<f64>,
-    /// Σ: covariance of z − r over the boards, in square metres.
+    /// Σ: covariance of z − r over the boards, in square meters.
     #[doc(alias = "Sigma")]
     pub covariance: DMatrix<f64>,
     /// Readings of each board, the weights of the paper's unweighted sum over readings.
@@ -47,7 +48,7 @@ pub struct Budget {
 }
 
 impl From<Matrix6<f64>> for MountUncertainty {
-    /// A covariance whose relation to the range biases is not known.
+    /// A covariance with an unknown relation to the range biases.
     fn from(independent: Matrix6<f64>) -> Self {
         Self {
             independent,
@@ -68,9 +69,9 @@ impl MountUncertainty {
     }
 }
 
-/// The error budget of an element that leaves as `deflection` says and reads the given boards.
+/// The error budget of an element with the given deflection that reads the given boards.
 ///
-/// `session` says what is believed, `mount` how well the sensor's place is known. `None` if the ray misses a plane.
+/// `session` holds the beliefs, `mount` the uncertainty of the mounting. `None` if the ray misses a plane.
 ///
 /// ```
 /// use catoptric_calib::covariance::{self, MountUncertainty};
@@ -113,13 +114,13 @@ pub fn budget(
     })
 }
 
-/// What one board tells of one element, and what can be off about it.
+/// One board's range of one element linearized, with its errors.
 pub(crate) struct Sighting {
-    /// (∂r/∂θ_a, ∂r/∂φ), in metres per radian.
+    /// (∂r/∂θ_a, ∂r/∂φ), in meters per radian.
     pub(crate) angles: Vector2<f64>,
-    /// Variance of what is this board's alone: noise of the mean, drift, markers, in square metres.
+    /// Variance of the errors of this board alone: noise of the mean, drift, markers, in square meters.
     pub(crate) own: f64,
-    /// Error by one standard deviation of each of the [`CommonErrors`], and last of d, in metres.
+    /// Error per standard deviation of each of the [`CommonErrors`], and last of d, in meters.
     pub(crate) shared: RowDVector<f64>,
     /// ∂r/∂(motion of the sensor).
     pub(crate) mount: RowVector6<f64>,
@@ -151,7 +152,7 @@ impl Sighting {
         if mount.common.ncols() == biases.len() {
             biases += mount_row * &mount.common;
         }
-        // What a bare distance is off by is taken for a part of the way.
+        // An error of the bare distance counts as part of the path.
         let bare_cos = (0.5 * (1.0 - beam::direction(beam_azimuth).dot(&v)))
             .max(0.0)
             .sqrt();
@@ -169,7 +170,7 @@ impl Sighting {
 }
 
 impl Budget {
-    /// Covariance of (θ_a, φ) as the paper's sum over readings estimates them: GΣGᵀ with G = (HᵀWH)⁻¹HᵀW, in rad².
+    /// Covariance of (θ_a, φ) for the paper's estimate, a sum over readings: GΣGᵀ with G = (HᵀWH)⁻¹HᵀW, in rad².
     ///
     /// `None` if the boards do not determine both angles.
     pub fn sandwich(&self) -> Option<Matrix2<f64>> {
@@ -177,13 +178,13 @@ impl Budget {
         Some(&gain * &self.covariance * gain.transpose())
     }
 
-    /// Covariance of the residuals that the estimate leaves, (I − HG)Σ(I − HG)ᵀ, in square metres.
+    /// Covariance of the residuals of that estimate, (I − HG)Σ(I − HG)ᵀ, in square meters.
     pub fn residual_covariance(&self) -> Option<DMatrix<f64>> {
         let left = DMatrix::identity(self.counts.len(), self.counts.len()) - &self.jacobian * self.gain()?;
         Some(&left * &self.covariance * left.transpose())
     }
 
-    /// The least covariance of (θ_a, φ) that any unbiased estimate can have: (HᵀΣ⁻¹H)⁻¹, in rad².
+    /// The minimum covariance of (θ_a, φ) of any unbiased estimate: (HᵀΣ⁻¹H)⁻¹, in rad².
     ///
     /// `None` if Σ is singular (errors believed to be absent) or the boards do not determine both angles.
     #[doc(alias = "CRLB")]
@@ -192,17 +193,17 @@ impl Budget {
         to_2(&(self.jacobian.transpose() * solved)).try_inverse()
     }
 
-    /// Covariance of the residuals that the estimate of least variance leaves, Σ − H(HᵀΣ⁻¹H)⁻¹Hᵀ, in square metres.
+    /// Covariance of the residuals of the minimum-variance estimate, Σ − H(HᵀΣ⁻¹H)⁻¹Hᵀ, in square meters.
     pub fn residual_covariance_at_bound(&self) -> Option<DMatrix<f64>> {
         Some(&self.covariance - &self.jacobian * self.bound()? * self.jacobian.transpose())
     }
 
-    /// HᵀΣ⁻¹H and HᵀΣ⁻¹e: what generalized least squares makes of residuals e, in metres.
+    /// HᵀΣ⁻¹H and HᵀΣ⁻¹e: the normal equations of generalized least squares for residuals e, in meters.
     ///
-    /// Where all errors are believed to be absent, Σ has a micrometre added: data without errors satisfy any weights.
+    /// If all errors are believed to be absent, a micrometer is added to Σ: error-free data satisfy any weights.
     pub fn weighted(&self, residuals: &DVector<f64>) -> Option<(Matrix2<f64>, Vector2<f64>)> {
         let k = residuals.len();
-        let floor = DMatrix::identity(k, k) * LEAST_ERROR.powi(2);
+        let floor = DMatrix::identity(k, k) * MIN_ERROR.powi(2);
         let factor = (&self.covariance + floor).cholesky()?;
         let weighted = factor.solve(&self.jacobian).transpose();
         let right = &weighted * residuals;

@@ -1,12 +1,12 @@
-//! How far a tracked plane can be off at a point of it: the fit of a plane through markers.
+//! How far a tracked plane can be off at a point on it: the fit of a plane through markers.
 
 use crate::readings::observations::BoardView;
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
-/// Part of the longest distance of a marker from the middle of all at which one gives a direction.
+/// Distance of a marker from the centroid, relative to the longest, at which it defines a direction.
 const LONG_ENOUGH: f64 = 0.3;
 
-/// Variance of a tracked plane's height at a point of it, in square metres: σ²·aᵀ(Σ a_i a_iᵀ)⁻¹a, a = (1, x, y).
+/// Variance of a tracked plane's height at a point of it, in square meters: σ²·aᵀ(Σ a_i a_iᵀ)⁻¹a, a = (1, x, y).
 pub(super) fn plane_variance(
     markers: &[Point3<f64>],
     at: &Point3<f64>,
@@ -29,12 +29,12 @@ pub(crate) struct PlaneFit {
 impl PlaneFit {
     /// The fit through some markers.
     ///
-    /// Fewer than three markers, or markers on a line, leave the plane's tilt to chance; then only their mean offset is
-    /// counted, since no honest number can be given for the rest.
+    /// With fewer than three markers, or markers on a line, the plane's tilt is undetermined. Then only their mean
+    /// offset is counted, because no honest number can be given for the rest.
     pub(crate) fn new(markers: &[Point3<f64>], normal: &Unit<Vector3<f64>>) -> Self {
         let count = markers.len().max(1) as f64;
         let centroid = markers.iter().map(|m| m.coords).sum::<Vector3<f64>>() / count;
-        // A direction that goes with the board: however the sensor is turned, an error of it stays the same error.
+        // A direction fixed to the board: however the sensor is turned, an error of the board stays the same error.
         let on_plane = |v: Vector3<f64>| v - normal.into_inner() * normal.dot(&v);
         let spokes = || markers.iter().map(|m| on_plane(m.coords - centroid));
         let longest = spokes().map(|s| s.norm()).fold(0.0, f64::max);
@@ -69,7 +69,7 @@ impl PlaneFit {
         fit
     }
 
-    /// Middle of the markers.
+    /// Centroid of the markers.
     pub(crate) fn centroid(&self) -> Vector3<f64> {
         self.centroid
     }
@@ -85,8 +85,8 @@ impl PlaneFit {
         Vector3::new(1.0, self.axes[0].dot(&p), self.axes[1].dot(&p))
     }
 
-    /// Three combinations of a's coefficients whose errors have unit variance for markers of unit variance: the symmetric
-    /// square root of the cofactor, the one that does not jump where eigenvectors do.
+    /// Three combinations of a's coefficients whose errors have unit variance for markers of unit variance: the
+    /// symmetric square root of the cofactor, which is continuous where eigenvectors are not.
     pub(crate) fn errors(&self) -> Matrix3<f64> {
         let root = self.cofactor.symmetric_eigen();
         let scale = root.eigenvalues.map(|v| v.max(0.0).sqrt());

@@ -81,7 +81,7 @@ fn even(count: usize, session: &Session) -> Budget {
             }
         })
         .collect();
-    budget(session, &MountUncertainty::none(), 0.0, &UP, &views).expect("it meets the boards")
+    budget(session, &MountUncertainty::none(), 0.0, &UP, &views).expect("the beam hits the boards")
 }
 
 /// Standard deviation per axis of the tangent plane, in degrees.
@@ -92,11 +92,11 @@ fn per_axis_deg(c: &Matrix2<f64>) -> f64 {
 
 #[test]
 fn noise_alone_is_the_closed_form() {
-    // σ_angle = σ/(s·tan α)·√(2/K) for an even spread of ψ; sandwich, bound and the paper's formula are then one.
+    // σ_angle = σ/(s·tan α)·√(2/K) for an even spread of ψ; sandwich, bound and the paper's formula are then equal.
     let budget = even(5, &session());
     let expected = (4e-4 / 2.0 * (2.0_f64 / 5.0).sqrt()).to_degrees();
     for c in [budget.bound(), budget.sandwich(), budget.noise_covariance(4e-3)] {
-        assert!((per_axis_deg(&c.expect("it is determined")) / expected - 1.0).abs() < 1e-12);
+        assert!((per_axis_deg(&c.expect("both angles are determined")) / expected - 1.0).abs() < 1e-12);
     }
 }
 
@@ -110,8 +110,8 @@ fn the_sandwich_is_never_below_the_bound() {
     let mut last = f64::INFINITY;
     for count in [3, 4, 6, 8] {
         let budget = even(count, &session);
-        let bound = budget.bound().expect("it is determined");
-        let excess = budget.sandwich().expect("it is determined") - bound;
+        let bound = budget.bound().expect("both angles are determined");
+        let excess = budget.sandwich().expect("both angles are determined") - bound;
         assert!(excess.symmetric_eigenvalues().min() > -1e-9 * bound.norm());
         assert!(bound.trace() < last, "another board must not lose information");
         last = bound.trace();
@@ -124,8 +124,8 @@ fn an_even_spread_cancels_a_common_error() {
     biased.believed.angle_gain_sd_mm = 20.0;
     let (without, with) = (even(4, &session()), even(4, &biased));
     assert!((with.covariance.clone() - without.covariance.clone()).norm() > 1e-5);
-    let difference =
-        with.sandwich().expect("it is determined") - without.sandwich().expect("it is determined");
+    let difference = with.sandwich().expect("both angles are determined")
+        - without.sandwich().expect("both angles are determined");
     assert!(difference.norm() < 1e-12);
 }
 
