@@ -201,7 +201,13 @@ fn contracted(graph: &Graph, to: impl Fn(&str) -> Option<String>) -> Graph {
             && a != b
         {
             for name in names {
-                contracted.add(&a, &b, &format!("{name} in {}", short(from)));
+                // A file stands for itself; of what it is in, it is worth naming.
+                let told = if a == from {
+                    name.clone()
+                } else {
+                    format!("{name} in {}", short(from))
+                };
+                contracted.add(&a, &b, &told);
             }
         }
     }

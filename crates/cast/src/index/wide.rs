@@ -9,7 +9,7 @@ use fearless_simd::{Simd, prelude::*};
 /// Children of a node and triangles of a leaf.
 pub(crate) const WIDTH: usize = 8;
 
-/// Levels of nodes at most: below [`SORTED`] parts are halved by number.
+/// Levels of nodes at most that the builder makes: below its `SORTED` parts are halved by number.
 pub(crate) const DEEPEST: usize = 20;
 
 /// Most entries that a walk through the index holds: seven siblings on each of the levels that the builder allows.

@@ -68,7 +68,7 @@ impl Rays {
         self.count = own.end;
     }
 
-    /// Adds some of others, moved into another frame: what [`placed`] makes of each of them, to the bit.
+    /// Adds some of others, moved into another frame: what [`placed`](crate::placed) makes of each of them, to the bit.
     pub fn extend_placed(&mut self, others: &Self, which: Range<usize>, other_from_ray: &Pose) {
         assert!(which.end <= others.count, "they are there");
         self.make_room(which.len());

@@ -14,7 +14,8 @@ pub(crate) const TWO_ROWS: usize = 2 * LANES;
 pub(crate) const FOUR_ROWS: usize = 4 * LANES;
 pub(crate) const MOST: usize = ROWS * LANES;
 
-/// Rays that [`World::cast_beam`] and [`Triangles::nearest_of_beam`] take at once.
+/// Rays that [`World::cast_beam`](crate::World::cast_beam) and
+/// [`Triangles::nearest_of_beam`](crate::Triangles::nearest_of_beam) take at once.
 pub const BUNDLE: usize = MOST;
 
 /// A number of every ray.
