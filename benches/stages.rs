@@ -1,4 +1,4 @@
-//! How long each stage of the main job takes: compiling a rig, looking at a layout, tracing, detecting, drawing, writing, fitting
+//! Duration of each stage of a run: compiling a rig, analyzing a layout, tracing, detecting, drawing noise, writing, fitting
 //! an element, calibrating.
 //!
 //! Compare two versions with criterion's `--save-baseline` and `--baseline`; absolute times depend on the machine.
@@ -26,7 +26,7 @@ fn prototype() -> Scene {
     toml::from_str(include_str!("../scenes/prototype.toml")).unwrap()
 }
 
-/// Number of the first stretch with a board before a facet.
+/// Number of the first stretch with a board in front of a facet.
 const FACET_STRETCH: usize = 11;
 
 fn simulate(c: &mut Criterion) {
@@ -45,7 +45,7 @@ fn simulate(c: &mut Criterion) {
     group.finish();
 }
 
-/// The structure's part in all ways, once for a laboratory.
+/// The part of all paths that is on the structure, computed once per laboratory.
 fn compile(c: &mut Criterion) {
     let scene = prototype();
     let sensor = Sensor::new(&scene).unwrap();
@@ -59,7 +59,7 @@ fn compile(c: &mut Criterion) {
     group.finish();
 }
 
-/// A layout as a whole, and after one facet was moved a little.
+/// A layout as a whole, and after one facet was moved slightly.
 fn layout(c: &mut Criterion) {
     let scene = prototype();
     let mut moved = scene.clone();
@@ -80,17 +80,14 @@ fn layout(c: &mut Criterion) {
         group.bench_function(format!("{name}, one facet edited"), |b| {
             b.iter(|| known.edited(&moved).unwrap().analysis().unwrap());
         });
-        group.bench_function(
-            format!("{name}, one facet edited, without what is said of it"),
-            |b| {
-                b.iter(|| known.edited(&moved).unwrap());
-            },
-        );
+        group.bench_function(format!("{name}, one facet edited, without its results"), |b| {
+            b.iter(|| known.edited(&moved).unwrap());
+        });
     }
     group.finish();
 }
 
-/// A scan in flight: every beam from another place, nothing kept but the rig.
+/// A scan in flight: every beam from a different pose, with nothing reused but the rig.
 fn fly(c: &mut Criterion) {
     let mut scene = prototype();
     scene.flight.push(toml::from_str(FLIGHT).unwrap());
@@ -112,7 +109,7 @@ waypoint = [
 ]
 "#;
 
-/// A beam on one slanted plane, and one that an edge cuts.
+/// A beam on one slanted plane, and beams cut by an edge.
 fn detection(c: &mut Criterion) {
     let beam = |apart: f64| -> Vec<Pulse> {
         let range = |i: u32| 2.0 + 0.001 * f64::from(i) + if i > 9 { apart } else { 0.0 };
@@ -166,7 +163,7 @@ fn noise(c: &mut Criterion) {
     group.finish();
 }
 
-/// Into memory: encoding on one thread, chunks compressed on all.
+/// To memory: encoding on one thread, compression of chunks on all.
 fn write(c: &mut Criterion) {
     let laboratory = Laboratory::new(&prototype(), 1).unwrap();
     let session = laboratory.session().unwrap();
@@ -197,7 +194,7 @@ fn calibrate(c: &mut Criterion) {
     group.finish();
 }
 
-/// Two angles by the paper's method, from a start 0.05 rad away, with the believed biases.
+/// Both angles by the paper's method, from a start 0.05 rad away, with the believed biases.
 fn fit(c: &mut Criterion) {
     let bias = Laboratory::new(&prototype(), 1)
         .unwrap()
@@ -238,7 +235,7 @@ fn fit(c: &mut Criterion) {
     group.finish();
 }
 
-/// The i-th of ten boards around a ray, 0.5 m to 4 m away and tilted by up to 30°, read some millimetres too near or far.
+/// The i-th of ten boards around a ray, 0.5 m to 4 m away and tilted by up to 30°, with a range error of a few millimeters.
 fn board(truth: &Deflection, v: &Vector3<f64>, i: u8) -> Observation<'static> {
     let turn = f64::from(i) * 2.4;
     let tilt = Vector3::new(turn.cos(), turn.sin(), (0.7 * turn).cos()) * 0.35;

@@ -6,7 +6,7 @@ use catoptric::sim::Scene;
 use catoptric::testing::{self, Anees, Coverage, Significance};
 use proptest::prelude::*;
 
-/// Yours; here it asks one of ours.
+/// Yours; here it calls one of ours.
 struct Mine;
 
 impl Calibrator for Mine {
@@ -39,7 +39,7 @@ proptest! {
 }
 
 #[test]
-fn states_what_it_errs() {
+fn states_its_errors() {
     let trials = testing::trials(&scene(), 1..=40, &Mine).unwrap();
     let significance = Significance::PER_MILLE.among(2);
     Anees::over(&trials).assert(significance);
