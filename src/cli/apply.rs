@@ -1,4 +1,4 @@
-//! `catoptric apply`: from a stretch of scans and a calibration to a point cloud.
+//! `catoptric apply`: turns a stretch of scans into a point cloud, given a calibration.
 
 use super::Context;
 use super::error::CliError;
@@ -17,13 +17,13 @@ pub(crate) struct Arguments {
     dataset: PathBuf,
     /// The calibration.
     calibration: PathBuf,
-    /// The cloud to write; the name's end says how.
+    /// The cloud to write; the extension selects the format.
     #[arg(long, value_name = "cloud.ply|cloud.pcd")]
     out: PathBuf,
-    /// Frame of the points; Eqs. 9 and 10 are in the sensor's.
+    /// Frame of the points; Eqs. (9) and (10) use the sensor frame.
     #[arg(long, value_enum, default_value_t = FrameName::Sensor)]
     frame: FrameName,
-    /// The pose whose scans are taken; those of the empty room by default.
+    /// The pose whose scans are used; by default those of the empty room.
     #[arg(long, value_name = "N")]
     pose: Option<usize>,
 }
@@ -34,7 +34,7 @@ enum FrameName {
     Sensor,
     /// The marker body on the superstructure
     Rig,
-    /// The frame of motion capture
+    /// The motion-capture frame of the room
     Room,
 }
 
@@ -52,7 +52,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let bytes = cloud_bytes(format, &cloud).map_err(|e| IoError::write(path, e))?;
     files::write_file(path, &bytes)?;
     if cloud.mount_is_nominal {
-        context.say("the calibration has no mounting: the drawing's was taken");
+        context.say("the calibration has no mounting: using the one of the drawing");
     }
     print(&format!(
         "wrote {}: {} in the {} frame, pose {}; left out: {} without a range, {} of {} without a direction\n\

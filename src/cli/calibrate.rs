@@ -1,4 +1,4 @@
-//! `catoptric calibrate`: from a dataset to a calibration. The truth is not looked at.
+//! `catoptric calibrate`: estimates a calibration from a dataset. The truth is never read.
 
 use super::Context;
 use super::error::CliError;
@@ -21,32 +21,32 @@ pub(crate) struct Arguments {
     /// The calibration to write.
     #[arg(long, value_name = "calibration.json")]
     out: PathBuf,
-    /// What step 1 found out about the sensor, instead of what the session believes; as `characterize` writes it.
+    /// Sensor errors found in step 1, as written by `characterize`, instead of the session's beliefs.
     #[arg(long, value_name = "characterization.json")]
     characterization: Option<PathBuf>,
-    /// Predict every board from the others as well, five times over, and say how well that goes (`joint`).
+    /// Also predict each board from the others (five-fold cross-validation) and report the errors (`joint` only).
     #[arg(long)]
     cross_validate: bool,
-    /// How derivatives are formed; both end at the same answer.
+    /// How derivatives are computed; both give the same result.
     #[arg(long, value_enum, default_value_t = JacobianName::Analytic)]
     jacobian: JacobianName,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum MethodName {
-    /// Facets, mounting, boards, drifts and biases at once, beams free to depart from their facet's plane
+    /// Facets, mounting, boards, drifts and biases together; beams may deviate from their facet's plane
     Joint,
-    /// One plane per facet, each facet by itself
+    /// One plane per facet, each facet separately
     Facet,
-    /// Each element by itself, weighted by the covariance of all errors
+    /// Each element separately, weighted by the covariance of all errors
     BeamGls,
-    /// Each element by itself, all readings alike, Eqs. 7 and 8
+    /// Each element separately, all readings weighted equally, Eqs. (7)–(8)
     Beam,
-    /// The same, one reading after the other: recursive least squares
+    /// The same, reading by reading: recursive least squares
     Recursive,
-    /// Each element by itself, without iteration
+    /// Each element separately, without iteration
     ClosedForm,
-    /// The drawing
+    /// The drawing, without estimation
     Prior,
 }
 
@@ -66,9 +66,9 @@ impl From<MethodName> for Method {
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum JacobianName {
-    /// By differentiating Eq. 6
+    /// Analytic derivatives of Eq. (6)
     Analytic,
-    /// By the central differences of Eq. 7
+    /// Central differences, Eq. (7)
     Central,
 }
 
@@ -82,7 +82,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let method = Method::from(arguments.method);
     if arguments.cross_validate && method != Method::Joint {
         let message = format!(
-            "--cross-validate goes with --method joint, not with {}",
+            "--cross-validate works with --method joint only, not with {}",
             method.name()
         );
         return Err(CliError::invalid(message, None));
@@ -112,7 +112,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     ))
 }
 
-/// How well boards are predicted by the others, where that was asked.
+/// How well the boards are predicted by the others; empty unless requested.
 fn cross_validation(calibration: &Calibration) -> String {
     let held_out = calibration.assessment.as_ref().and_then(|a| a.held_out.as_ref());
     held_out.map_or_else(String::new, |h| {

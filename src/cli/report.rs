@@ -1,4 +1,4 @@
-//! `catoptric report`: one page to read about calibrations and their scores.
+//! `catoptric report`: writes one HTML page about calibrations and their scores.
 
 use super::Context;
 use super::error::CliError;
@@ -12,7 +12,7 @@ use std::path::PathBuf;
 pub(crate) struct Arguments {
     /// The dataset.
     dataset: PathBuf,
-    /// The calibrations; the fans of the first are drawn.
+    /// The calibrations; the fans of the first one are drawn.
     #[arg(required = true)]
     calibrations: Vec<PathBuf>,
     /// The page to write.
@@ -36,7 +36,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let cloud = match cloud {
         Some(Ok(cloud)) => Some(cloud),
         Some(Err(error)) => {
-            context.say(&format!("without a cloud: {error}"));
+            context.say(&format!("no cloud: {error}"));
             None
         }
         None => None,

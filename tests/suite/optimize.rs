@@ -253,7 +253,7 @@ fn what_makes_no_search_is_said() {
     refuse(
         &["--goal", "size", "--require", "size.diameter_mm<=10"],
         1,
-        &["keeps every requirement", "diameter_mm is"],
+        &["meets every requirement", "diameter_mm is"],
     );
     let output = run(folder.path(), &["optimize", "scene.toml"]);
     assert_eq!(output.status.code(), Some(2));

@@ -205,7 +205,7 @@ fn ctrl_c_leaves_nothing_behind() {
     assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
     assert_eq!(
         stderr(&output),
-        "interrupted; nothing half-written was left behind\n"
+        "interrupted; no incomplete files were left behind\n"
     );
     let left: Vec<_> = std::fs::read_dir(folder.path())
         .unwrap()
