@@ -307,7 +307,7 @@ fn the_verb_writes_every_format_and_refuses_what_it_cannot() {
                 "--set",
                 "superstructure.facet=[]",
             ],
-            "nothing of that kind",
+            "no such solids",
         ),
     ] {
         let arguments = [&["export", "--out", "x"], arguments.as_slice()].concat();
