@@ -160,7 +160,7 @@ fn foreign_folders_and_shards_are_refused() {
     let other = study(at, "a", &["--shard", "2/2"]);
     assert_eq!(other.status.code(), Some(2));
     assert!(
-        stderr(&other).contains("shard 1/2, 2/2 asked for"),
+        stderr(&other).contains("shard 1/2, 2/2 requested"),
         "{}",
         stderr(&other)
     );
@@ -188,7 +188,7 @@ fn foreign_folders_and_shards_are_refused() {
     let foreign = run(at, &["study", "merge", "a", "b", "--out", "m"]);
     assert_eq!(foreign.status.code(), Some(2));
     assert!(
-        stderr(&foreign).contains("another study") && stderr(&foreign).contains("18 seeds, 17 there"),
+        stderr(&foreign).contains("not parts of the same study") && stderr(&foreign).contains("18 seeds, 17 there"),
         "{}",
         stderr(&foreign)
     );
@@ -197,11 +197,11 @@ fn foreign_folders_and_shards_are_refused() {
         (["--methods", "jont"], "jont"),
         (["--axis", "errors.drift_sd_mm"], "--axis"),
         (["--axis", "errors.drift_sd=1,2"], "drift_sd_mm"),
-        (["--axis", "errors.drift_sd_mm=1,2,1"], "1 is there twice"),
+        (["--axis", "errors.drift_sd_mm=1,2,1"], "1 is given twice"),
         (["--axis", "errors.drift_sd_mm=1:2"], "from:to:steps"),
         (
             ["--axis=errors.drift_sd_mm=1,2", "--axis=errors.drift_sd_mm=3"],
-            "is an axis already",
+            "already has an axis",
         ),
         (
             ["--axis=errors.drift_sd_mm=1,2", "--set=errors.drift_sd_mm=3"],

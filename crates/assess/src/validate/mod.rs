@@ -1,4 +1,4 @@
-//! Whether a `calibration.json` is well formed and physically sane, whoever wrote it.
+//! Validation of a `calibration.json` from any source: whether it is well formed and physically plausible.
 
 mod element;
 mod problem;
@@ -15,14 +15,14 @@ use std::f64::consts::PI;
 
 pub use problem::{Problem, Severity};
 
-/// Distances from the scanner at which a mirror can be, in metres: beyond, millimetres were meant.
+/// Maximum distance of a mirror from the scanner, in meters; larger values are probably millimeters.
 pub const MIRROR_DISTANCE_M: f64 = 10.0;
 
-/// Standard deviations an angle can have, in radians: a millionth of the least that was ever measured, and a turn
-/// that says nothing.
+/// Minimum and maximum plausible standard deviation of an angle, in radians: a millionth of the smallest ever measured, and
+/// half a turn, which is no information at all.
 pub const ANGLE_SD_RAD: [f64; 2] = [1e-10, PI];
 
-/// Everything wrong with a calibration, in the order of the file; nothing if it is sound.
+/// Returns all problems of a calibration, in the order of the file; none if it is valid.
 ///
 /// ```
 /// use catoptric_model::Calibration;
@@ -46,7 +46,7 @@ pub fn validate(calibration: &Calibration) -> Vec<Problem> {
         problems.error(
             "schema_version",
             format!(
-                "is {}, this program reads {}",
+                "is {}, but this program reads {}",
                 calibration.schema_version,
                 calibration::SCHEMA_VERSION
             ),
@@ -58,7 +58,7 @@ pub fn validate(calibration: &Calibration) -> Vec<Problem> {
     if calibration.frame != "sensor" {
         problems.error(
             "frame",
-            format!("is {:?}; angles are given in \"sensor\"", calibration.frame),
+            format!("is {:?}, but angles are given in \"sensor\"", calibration.frame),
         );
     }
     if calibration.beams.is_empty() {

@@ -178,8 +178,8 @@ impl<'a> Stream<'a> {
                 return_rows.add(number, seen, &scan, &mut returns_text);
             }
             if wanted(Table::Readings) {
-                let random = laboratory.scan_chances(drawn, scan);
-                let rows = rows_of_readings(laboratory, (number, scan), seen, &random, readings);
+                let chances = laboratory.scan_chances(drawn, scan);
+                let rows = rows_of_readings(laboratory, (number, scan), seen, &chances, readings);
                 readings_text.push_str(&rows);
             }
             clock.add(&mut encode);

@@ -126,7 +126,7 @@ pub(crate) fn rows_of_readings(
     laboratory: &Laboratory,
     (pose, scan): (usize, usize),
     returns: &Returns,
-    random: &[Chance],
+    chances: &[Chance],
     readings: &[f64],
 ) -> String {
     let errors = &laboratory.scene().errors;
@@ -135,7 +135,7 @@ pub(crate) fn rows_of_readings(
         _ => errors.dropout,
     };
     let mut text = String::new();
-    let beams = returns.iter().zip(random).zip(readings).enumerate();
+    let beams = returns.iter().zip(chances).zip(readings).enumerate();
     for (beam, ((found, chance), reading)) in beams {
         let mut echoes = found.iter().flat_map(Return::echoes).zip(chance.detection);
         let detected = echoes.position(|(echo, chance)| chance < echo.probability);
