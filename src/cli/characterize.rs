@@ -14,7 +14,8 @@ pub(crate) struct Arguments {
     /// A dataset, recorded or simulated, or a scene to simulate first.
     #[arg(value_name = "DATASET|SCENE")]
     input: PathBuf,
-    /// The characterization to write; a page with its tables and pictures is written next to it, with the extension .html.
+    /// The characterization to write; a page with its tables and pictures is written next to it, with the extension
+    /// .html.
     #[arg(long, value_name = "characterization.json")]
     out: PathBuf,
     /// Seed of all random effects, instead of the scene's.

@@ -46,7 +46,8 @@ enum FormatName {
     Stl,
     /// Mirrors, housing and beams for viewing (binary glTF), in meters
     Glb,
-    /// Of a scene: corners, angles and tolerances of every mirror; of a dataset: the readings of every beam on every board
+    /// Of a scene: corners, angles and tolerances of every mirror; of a dataset: the readings of every beam on every
+    /// board
     Csv,
     /// Frames of the laser and the mirrors in the rig
     Urdf,

@@ -31,12 +31,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_enum, default_value_t = CriterionName::D)]
     criterion: CriterionName,
     /// Minimum and maximum distance from mirror to board, in meters.
-    #[arg(
-        long,
-        value_name = "MIN,MAX",
-        value_delimiter = ',',
-        default_value = "0.5,4"
-    )]
+    #[arg(long, value_name = "MIN,MAX", value_delimiter = ',', default_value = "0.5,4")]
     range_m: Vec<f64>,
     /// Maximum incidence of a beam on a board, in degrees.
     #[arg(long, value_name = "DEG", default_value_t = 60.0)]

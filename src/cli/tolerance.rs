@@ -30,8 +30,8 @@ pub(crate) struct Arguments {
     /// Change a value of the scene first: superstructure.as_built.tilt_sd_deg=0.1.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// A limit to meet, otherwise the exit code is 1: "direction_deg.p95<=2", "facets.*.point_at_4m_mm.max<500". May be given
-    /// more than once.
+    /// A limit to meet, otherwise the exit code is 1: "direction_deg.p95<=2", "facets.*.point_at_4m_mm.max<500". May be
+    /// given more than once.
     #[arg(long, value_name = "FIGURE<=NUMBER")]
     require: Vec<String>,
     /// Write tolerance.json, the plot and a page, report.html, to this folder.

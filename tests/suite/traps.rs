@@ -1,7 +1,8 @@
-//! The hard scenes of `scenes/traps/`: each file says in its first comment what it must give, and gives it here.
+//! The hard scenes of `scenes/traps/`: each file states the expected result in its first comment, and is tested for it
+//! here.
 //!
-//! Proven is that none of these mistakes is made in its own scene; that they are made nowhere is for the properties and
-//! the physics to prove.
+//! Proven is that none of these mistakes is made in its own scene; that they are made nowhere else is covered by the
+//! properties and the physics.
 
 use crate::common::{run, stderr};
 use catoptric::cast::Ray;
@@ -33,7 +34,7 @@ pub(crate) fn ray(origin: [f64; 3], direction: [f64; 3]) -> Ray {
     }
 }
 
-/// The way of a ray, the names of what it meets, and how it ends.
+/// The path of a ray, the names of what it hits, and how it ends.
 pub(crate) fn way(scene: &Scene, ray: &Ray) -> (Vec<Vertex>, Vec<String>, Fate) {
     let scenery = Scenery::new(scene).unwrap();
     let tracer = scenery.tracer(1000).unwrap();
@@ -55,7 +56,7 @@ pub(crate) fn forward(scene: &Scene) -> Return {
 }
 
 #[test]
-fn every_trap_says_what_it_shows_and_is_a_valid_scene() {
+fn every_trap_states_what_it_shows_and_is_a_valid_scene() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/traps");
     let mut count = 0;
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -90,7 +91,7 @@ fn ridge() {
     assert_eq!(truth.beams[beam::FORWARD].status, BeamClass::Split);
     let found = forward(&scene);
     assert_eq!(found.role, Role::Wall);
-    // Rays that meet the ridge itself may go either way.
+    // Rays that hit the ridge itself may be reflected to either side.
     let on_ridge = |r: &&SubRay| r.wide.abs() < 1e-9;
     let undecided: f64 = sub_rays(256).iter().filter(on_ridge).map(|r| r.weight).sum();
     assert!(
@@ -156,7 +157,7 @@ fn label() {
         (Role::Wall, [0].as_slice())
     );
     assert!((found.range() - 3.0).abs() < 1e-12, "{found:?}");
-    // The mirror stands at 45° and turns the light straight up.
+    // The mirror is at 45° and deflects the light straight up.
     let [on_mirror] = found.facet_cos_incidence[..] else {
         panic!("{found:?}")
     };
@@ -210,7 +211,8 @@ fn tied_distances() {
         distances.len()
     );
     assert!(ends.iter().all(|e| matches!(e.stop, Stop::Hit { .. })));
-    // Eq. 1 with τ_o = 0.9, D_R = 20 mm, ρ_t = 0.9, P_t = 10 W, θ_R = π; face on the cosine is 5 m over the path.
+    // Eq. (1) with τ_o = 0.9, D_R = 20 mm, ρ_t = 0.9, P_t = 10 W, θ_R = π; face on, the cosine is 5 m over the path
+    // length.
     let term =
         |w: f64, r: f64| 0.9 * 0.02 * 0.02 * 0.9 * 10.0 * w * (5.0 / r) / (r * r * std::f64::consts::PI);
     let expected: f64 = ends.iter().map(|e| term(e.sub_ray.weight, e.path)).sum();
@@ -223,7 +225,7 @@ fn tied_distances() {
 fn full_angle() {
     let found = forward(&trap("full-angle"));
     assert_eq!(found.role, Role::Object);
-    // An edge is decided to 0.3 % with 4096 rays, and there are two.
+    // An edge is located to 0.3 % with 4096 rays, and there are two.
     let expected = libm::erf(std::f64::consts::SQRT_2);
     assert!((found.share - expected).abs() < 0.006, "{}", found.share);
 }
@@ -246,7 +248,7 @@ fn equal_noise() {
     let n = first.len();
     assert_eq!((n, second.len()), (200 * beam::COUNT, 200 * beam::COUNT));
     let all: BTreeSet<u64> = first.iter().chain(&second).map(|z| z.to_bits()).collect();
-    assert_eq!(all.len(), 2 * n, "no noise comes twice");
+    assert_eq!(all.len(), 2 * n, "no noise value repeats");
     let correlation = |a: &[f64], b: &[f64]| {
         let sum: f64 = a.iter().zip(b).map(|(x, y)| x * y).sum();
         sum / a.len().min(b.len()) as f64
@@ -274,7 +276,7 @@ fn no_return() {
         assert!(scan[ahead.clone()].iter().all(|r| *r == f64::INFINITY));
         aside.push(scan[beam::FORWARD + 360]);
     }
-    // The noise is there: mean and spread over 200 scans, at 99.9 %.
+    // Noise is present: mean and spread over 200 scans, at 99.9 %.
     let n = aside.len() as f64;
     let mean = aside.iter().sum::<f64>() / n;
     let variance = aside.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>() / (n - 1.0);

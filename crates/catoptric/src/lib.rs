@@ -48,9 +48,9 @@
 //!
 //! # The crates
 //!
-//! [`model`] is the vocabulary, [`cast`] intersects rays with surfaces, [`sim`] is the simulator, [`calib`] the estimator,
-//! [`files`] every file format; [`testing`] (feature `testing`) has property tests and gates for CI. The [`guide`] explains
-//! everything chapter by chapter.
+//! [`model`] is the vocabulary, [`cast`] intersects rays with surfaces, [`sim`] is the simulator, [`calib`] the
+//! estimator, [`files`] every file format; [`testing`] (feature `testing`) has property tests and gates for CI. The
+//! [`guide`] explains everything chapter by chapter.
 #![cfg_attr(not(feature = "testing"), doc = "\n[`testing`]: https://docs.rs/catoptric")]
 
 mod control;

@@ -1,9 +1,9 @@
-//! Flights: the sensor moves while it scans, and every beam is cast from where it is at its own time.
+//! Flights: the sensor moves while it scans, and every beam is cast from the pose at its own time.
 //!
-//! Proven against closed forms and mirror images that know nothing of the tracer's frames: the range of each step's own
-//! time, with walls, mirrors and meshes; that a rig which hovers reads what one at rest does, to the bit; that the way
-//! through waypoints is smooth; that apply undoes the motion. Not proven is that a real rig's motion between two frames of
-//! motion capture is as smooth as these.
+//! Proven with closed forms and mirror images that are independent of the tracer's frames: each range is that of its
+//! step's own time, with walls, mirrors and meshes; a rig that hovers reads bit for bit what a rig at rest reads; the
+//! trajectory through waypoints is smooth; apply undoes the motion. Not proven is that the motion of a real rig between
+//! two motion-capture frames is as smooth as these.
 
 mod recorded;
 mod way;
@@ -60,7 +60,7 @@ fn flight_number(laboratory: &Laboratory) -> usize {
     laboratory.stretches() - 1
 }
 
-/// What every beam of every scan of the only flight meets.
+/// What every beam of every scan of the only flight hits.
 fn flown(laboratory: &Laboratory) -> Vec<Returns> {
     let number = flight_number(laboratory);
     let sight = laboratory.sight(number).unwrap();
@@ -95,7 +95,7 @@ fn walls(size_m: [f64; 3]) -> Vec<(Vector3<f64>, f64)> {
     ]
 }
 
-/// Planes of the room in the frame of a sensor at a place with an attitude.
+/// Planes of the room in the frame of a sensor at a position with an attitude.
 fn seen(
     planes: &[(Vector3<f64>, f64)],
     place: &Vector3<f64>,
@@ -107,7 +107,7 @@ fn seen(
         .collect()
 }
 
-/// Planes behind a mirror m·x = c, as the mirror shows them.
+/// Planes behind a mirror m·x = c, as seen in the mirror.
 fn mirrored(planes: &[(Vector3<f64>, f64)], (m, c): (&Vector3<f64>, f64)) -> Vec<(Vector3<f64>, f64)> {
     let planes = planes.iter();
     planes
@@ -115,7 +115,7 @@ fn mirrored(planes: &[(Vector3<f64>, f64)], (m, c): (&Vector3<f64>, f64)) -> Vec
         .collect()
 }
 
-/// Where a ray from the origin leaves a convex body.
+/// Distance at which a ray from the origin leaves a convex body.
 fn leaves(planes: &[(Vector3<f64>, f64)], direction: &Vector3<f64>) -> f64 {
     let ahead = planes.iter().filter(|(n, _)| n.dot(direction) > 0.0);
     ahead
@@ -123,7 +123,7 @@ fn leaves(planes: &[(Vector3<f64>, f64)], direction: &Vector3<f64>) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Compares every beam of every scan with the box of [`BARE`] seen from a closed form of the sensor's way.
+/// Compares every beam of every scan with the box of [`BARE`], given the sensor's trajectory in closed form.
 fn compare_with_room(laboratory: &Laboratory, way: impl Fn(f64) -> (Vector3<f64>, Matrix3<f64>)) {
     let room = walls(laboratory.scene().room.size_m);
     let mut compared = 0;
@@ -145,7 +145,7 @@ fn compare_with_room(laboratory: &Laboratory, way: impl Fn(f64) -> (Vector3<f64>
     assert!(compared >= 8 * beam::COUNT, "{compared}");
 }
 
-/// [`BARE`] with one thin ray for a beam, flying.
+/// [`BARE`] in flight, with one thin ray per beam.
 fn bare_flight(attitude: Attitude, waypoint: Vec<Waypoint>) -> Laboratory {
     let mut scene = scene(BARE);
     scene.scanner.sub_rays = 1;
@@ -170,7 +170,7 @@ fn past_oblique_walls_every_range_is_that_of_its_own_time() {
 }
 
 #[test]
-fn a_pure_turn_at_a_constant_rate_reads_its_closed_form() {
+fn a_pure_rotation_at_a_constant_rate_reads_its_closed_form() {
     let place = [0.7, -1.1, 1.2];
     for attitude in [Attitude::Slerp, Attitude::Squad] {
         // 300°/s about the vertical, at intervals of different lengths.
@@ -187,10 +187,10 @@ fn a_pure_turn_at_a_constant_rate_reads_its_closed_form() {
 }
 
 #[test]
-fn the_scene_past_a_wall_gives_what_its_first_comment_says() {
+fn the_scene_past_a_wall_gives_the_results_stated_in_its_first_comment() {
     let scene = load(&file("flight-past-a-wall"), &[]).unwrap();
     let laboratory = Laboratory::new(&scene, scene.seed).unwrap();
-    // Nothing but the flight: no structure to measure, no room to know.
+    // Only the flight: no structure to measure, no known room.
     assert_eq!((laboratory.stretches(), laboratory.scans()), (1, 40));
     let mut near = 0;
     for (scan, returns) in flown(&laboratory).iter().enumerate() {
@@ -220,7 +220,7 @@ fn the_scene_past_a_wall_gives_what_its_first_comment_says() {
 }
 
 #[test]
-fn the_scene_through_a_duct_gives_what_its_first_comment_says() {
+fn the_scene_through_a_duct_gives_the_results_stated_in_its_first_comment() {
     let scene = load(&file("flight-through-a-duct"), &[]).unwrap();
     let laboratory = Laboratory::new(&scene, scene.seed).unwrap();
     let mut near = 0;
@@ -252,8 +252,8 @@ fn the_scene_through_a_duct_gives_what_its_first_comment_says() {
     assert!(near > 24 * 900, "{near}");
 }
 
-/// A scene with everything around and before the sensor: mirrors with glass that scatter a little themselves, posts, and
-/// in the room mirrors, a box and a cylinder. All echoes are told, since a mirror's own comes first.
+/// A scene with everything around and in front of the sensor: glass mirrors that scatter a little, posts, and in the room
+/// mirrors, a box and a cylinder. All echoes are reported, since the mirror's own echo comes first.
 fn crowded() -> Scene {
     let mut scene = scene(PROTOTYPE);
     scene.superstructure.mirror.glass = Some(catoptric::sim::scene::Glass {
@@ -283,7 +283,7 @@ fn crowded() -> Scene {
 }
 
 #[test]
-fn a_rig_that_hovers_reads_what_one_at_rest_does_to_the_bit() {
+fn a_hovering_rig_reads_bit_for_bit_what_one_at_rest_does() {
     let mut scene = crowded();
     let [position, yaw] = [scene.room.rig_position_m, [scene.room.rig_yaw_deg, 0.0, 0.0]];
     for attitude in [Attitude::Slerp, Attitude::Squad] {
@@ -298,7 +298,7 @@ fn a_rig_that_hovers_reads_what_one_at_rest_does_to_the_bit() {
         let scans = flown(&laboratory);
         assert_eq!(scans.len(), 4);
         assert!(scans.iter().all(|returns| *returns == rest));
-        // What is compared holds structure, its mirrors, mirrors of the room behind them, walls and objects.
+        // The comparison covers the structure, its mirrors, room mirrors seen by them, walls and objects.
         let met = |role: Role| rest.iter().flatten().filter(|r| r.role == role).count();
         assert!(met(Role::Wall) > 100 && met(Role::Object) > 20 && met(Role::Structure) > 20);
         let own = scene.superstructure.facet.len();
@@ -320,7 +320,7 @@ fn a_rig_that_hovers_reads_what_one_at_rest_does_to_the_bit() {
     }
 }
 
-/// The two-mirror layout, as built, moving and turning about the vertical; the way of the rig in closed form.
+/// The two-mirror layout, as built, moving and rotating about the vertical; the trajectory of the rig in closed form.
 fn moving_mirrors() -> (Scene, impl Fn(f64) -> (Vector3<f64>, f64)) {
     let mut scene = without_errors(scene(TWO_MIRROR));
     let (start, velocity) = (Vector3::new(-0.9, -0.6, 1.7), Vector3::new(1.7, 1.0, 0.2));
@@ -331,7 +331,7 @@ fn moving_mirrors() -> (Scene, impl Fn(f64) -> (Vector3<f64>, f64)) {
     (scene, way)
 }
 
-/// Compares beams that go by given mirrors with the walls as those mirrors show them; how many there are.
+/// Compares beams via given mirrors with the mirror images of the walls; returns their number.
 fn compare_with_images(
     laboratory: &Laboratory,
     way: impl Fn(f64) -> (Vector3<f64>, f64),
@@ -379,7 +379,7 @@ fn compare_with_images(
 }
 
 #[test]
-fn mirrors_move_along() {
+fn mirrors_move_with_the_rig() {
     let (scene, way) = moving_mirrors();
     let laboratory = Laboratory::new(&scene, 3).unwrap();
     let compared = compare_with_images(&laboratory, way, &walls(scene.room.size_m), None);
@@ -387,9 +387,9 @@ fn mirrors_move_along() {
 }
 
 #[test]
-fn a_moving_mirror_and_one_that_stands_still_take_turns() {
+fn a_moving_and_a_fixed_mirror_reflect_alternately() {
     let (mut scene, way) = moving_mirrors();
-    // All over the floor, tilted by some degrees, and clear of it.
+    // All over the floor, tilted by a few degrees, and not touching it.
     let mirror = "{ name = \"floor\", position_m = [0, 0, 0.5], yaw_deg = 25, pitch_deg = 6, roll_deg = -4,
                     shape.rectangle = { width_m = 3.0, height_m = 2.6 } }";
     scene.room.mirror = toml::from_str::<catoptric::sim::scene::Room>(&format!("mirror = [{mirror}]"))
@@ -480,7 +480,7 @@ proptest! {
         let there = flown(&Laboratory::new(&other, 2).unwrap());
         let (mut compared, mut torn) = (0, 0);
         for (a, b) in here.iter().flatten().zip(there.iter().flatten()) {
-            // A ray that grazes an edge may fall to either side.
+            // A ray that grazes an edge may hit either side.
             match (a, b) {
                 (Some(a), Some(b)) if (a.role, &a.facets) == (b.role, &b.facets) && (a.range() - b.range()).abs() < 1e-9 => compared += 1,
                 (None, None) => {}

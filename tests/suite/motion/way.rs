@@ -1,8 +1,8 @@
-//! The way of the rig itself: through its waypoints, uniform, smooth.
+//! The trajectory of the rig: through its waypoints, uniform, smooth.
 
 use super::*;
 
-/// The way through waypoints that agree on no axis, at unequal intervals.
+/// The trajectory through waypoints with no common axis, at unequal intervals.
 fn winding(attitude: Attitude) -> (Vec<(f64, Pose)>, Trajectory) {
     let pose = |x: f64, y: f64, z: f64, turn: [f64; 3]| {
         let [yaw, pitch, roll] = turn.map(f64::to_radians);
@@ -19,7 +19,7 @@ fn winding(attitude: Attitude) -> (Vec<(f64, Pose)>, Trajectory) {
 }
 
 #[test]
-fn a_way_passes_through_its_waypoints_and_rests_beyond_them() {
+fn a_trajectory_passes_through_its_waypoints_and_rests_beyond_them() {
     for attitude in [Attitude::Slerp, Attitude::Squad] {
         let (waypoints, way) = winding(attitude);
         for (t, pose) in &waypoints {
@@ -62,8 +62,8 @@ fn uniform_motion_is_reproduced() {
 }
 
 #[test]
-fn velocity_is_continuous_and_with_squad_the_rate_of_turning_too() {
-    // The derivative of a cubic at one end, exact, from four values.
+fn velocity_is_continuous_and_with_squad_the_rotation_rate_too() {
+    // The exact derivative of a cubic at one end, from four values.
     let slope =
         |f: [Vector3<f64>; 4], h: f64| (f[0] * -11.0 + f[1] * 18.0 - f[2] * 9.0 + f[3] * 2.0) / (6.0 * h);
     let jump = |way: &Trajectory, t: f64| {
@@ -82,7 +82,7 @@ fn velocity_is_continuous_and_with_squad_the_rate_of_turning_too() {
         let (_, squad) = winding(Attitude::Squad);
         let (velocity, rate, speed) = jump(&squad, t);
         assert!(speed > 0.5 && velocity < 1e-10, "{t}: {velocity}");
-        // The turns are no cubics: what is left is of third order in the step of a millisecond.
+        // Rotations are not cubics: the remainder is of third order in the step of one millisecond.
         assert!(rate < 1e-6, "{t}: {rate}");
         let (_, slerp) = winding(Attitude::Slerp);
         let (velocity, rate, _) = jump(&slerp, t);

@@ -24,7 +24,8 @@ pub enum ApplyError {
     NoRoom,
 }
 
-/// Lifts every range of a stretch into space: of pose number `pose`, or by default of the first stretch of the empty room.
+/// Lifts every range of a stretch into space: of pose number `pose`, or by default of the first stretch of the empty
+/// room.
 ///
 /// Solved elements follow Eq. (9), direct ones stay in the scan plane, the others are omitted and counted. Ranges are
 /// corrected by E_r and by E_c of the room's color (of the board's, in a stretch with a board), as calibrated or

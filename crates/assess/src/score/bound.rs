@@ -38,8 +38,8 @@ pub fn true_directions(truth: &Truth) -> Vec<TrueDirection> {
     directions.collect()
 }
 
-/// Lower bound on the covariance of (θ_a, φ), in rad², of any estimate from this dataset, for every beam that is deflected
-/// once and unsplit: facets, boards, mounting and biases are common to all of them.
+/// Lower bound on the covariance of (θ_a, φ), in rad², of any estimate from this dataset, for every beam that is
+/// deflected once and unsplit: facets, boards, mounting and biases are common to all of them.
 fn of_experiment(dataset: &Dataset, truth: &Truth) -> BTreeMap<usize, Matrix2<f64>> {
     let believed = &dataset.session.believed;
     if believed.range_noise_sd_mm == 0.0 {

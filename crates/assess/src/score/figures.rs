@@ -172,8 +172,8 @@ pub struct Score {
 impl Score {
     /// Sets a limit for the per-axis error, in degrees: a score whose error exceeds it or does not exist fails.
     ///
-    /// A blind score stays blind, and one that correctly solves nothing, because the boards leave every element open, keeps
-    /// its verdict.
+    /// A blind score stays blind, and one that correctly solves nothing, because the boards leave every element open,
+    /// keeps its verdict.
     #[must_use]
     pub fn with_limit(mut self, max_rms_deg: f64) -> Self {
         let error = self.per_axis_rms_deg;

@@ -14,10 +14,10 @@
 //! efficiency        mean(C_θθ·cos²φ + C_φφ) / mean((cos φ·δθ)² + δφ²)
 //! ```
 //!
-//! Every element that is deflected and unsplit in truth is either solved, abstained or missed. Those that their own boards
-//! leave open are also counted separately: for them abstaining is correct, and a direction is wrong if the truth is outside
-//! its stated 99.9 % ellipse (a method may know more than the boards, from a facet or the drawing). Figures that do not
-//! exist are NaN here and `null` in JSON, with the reason in `nulls`.
+//! Every element that is deflected and unsplit in truth is either solved, abstained or missed. Those that their own
+//! boards leave open are also counted separately: for them abstaining is correct, and a direction is wrong if the truth
+//! is outside its stated 99.9 % ellipse (a method may know more than the boards, from a facet or the drawing). Figures
+//! that do not exist are NaN here and `null` in JSON, with the reason in `nulls`.
 
 mod bound;
 pub mod counts;

@@ -41,9 +41,9 @@ struct Visit {
 
 /// Point-to-board residuals of the readings of the solved elements on the boards of their facets.
 ///
-/// An element is on a board if its outgoing ray, as calibrated, hits the board's face farther from the edge than its spot.
-/// A reading there is corrected by all terms of Eq. (3), since board and incidence are known, and its residual is the
-/// distance of the lifted point from the board's plane, cos θ_N·(r − d − s).
+/// An element is on a board if its outgoing ray, as calibrated, hits the board's face farther from the edge than its
+/// spot. A reading there is corrected by all terms of Eq. (3), since board and incidence are known, and its residual is
+/// the distance of the lifted point from the board's plane, cos θ_N·(r − d − s).
 pub fn boards(dataset: &Dataset, calibration: &Calibration) -> SurfaceResidual {
     // A label on the wrong marker would misplace a board.
     let (dataset, _) = tracking::put_right(dataset);

@@ -38,8 +38,8 @@ impl StudyError {
         }
     }
 
-    /// Exit code of a program that ends with this error: 2 for invalid input, 3 if reading or writing failed, 130 if it was
-    /// stopped.
+    /// Exit code of a program that ends with this error: 2 for invalid input, 3 if reading or writing failed, 130 if it
+    /// was stopped.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Invalid { .. } | Self::Setup(_) | Self::Scene(SceneErrors::Invalid(_)) => 2,

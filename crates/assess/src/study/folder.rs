@@ -182,8 +182,8 @@ fn times_from_csv(text: &str) -> Result<Vec<Time>, String> {
 
 /// Runs a part of a study in a folder that is new or contains the same part; existing runs are not repeated.
 ///
-/// `done` is called with the number of experiments newly finished and their total number. With `with_elements`, or if they
-/// were listed before, the angles of every element are listed as well.
+/// `done` is called with the number of experiments newly finished and their total number. With `with_elements`, or if
+/// they were listed before, the angles of every element are listed as well.
 ///
 /// # Errors
 /// [`StudyError`]; after [`Stopped`](StudyError::Stopped) the folder keeps the finished experiments.

@@ -21,8 +21,8 @@ const POLL: Duration = Duration::from_millis(20);
 pub struct Program {
     /// Its name in tables.
     pub name: String,
-    /// Words of the command; `{dataset}` and `{out}` are replaced by the folder and by the file to write, and appended if no
-    /// word contains them.
+    /// Words of the command; `{dataset}` and `{out}` are replaced by the folder and by the file to write, and appended
+    /// if no word contains them.
     pub command: Vec<String>,
     /// Time limit, in seconds. The program is killed then, on Unix along with its child processes.
     pub timeout_s: u64,
@@ -44,8 +44,8 @@ impl Program {
     /// requested, the program is killed.
     ///
     /// # Errors
-    /// As text independent of the path of the folder: the program cannot be started, fails, exceeds its time limit, or does
-    /// not write a valid calibration.
+    /// As text independent of the path of the folder: the program cannot be started, fails, exceeds its time limit, or
+    /// does not write a valid calibration.
     pub fn calibrate(&self, laboratory: &Laboratory, stop: &Stop) -> Result<Calibration, String> {
         let folder = tempfile::tempdir().map_err(|e| format!("no folder can be created for it: {e}"))?;
         self.calibrate_in(folder.path(), laboratory, stop)

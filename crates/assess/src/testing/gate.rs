@@ -145,8 +145,8 @@ impl<'t> Coverage<'t> {
     /// Returns the observed share if it is consistent with an honest covariance.
     ///
     /// # Errors
-    /// Same as [`Anees::gate`]; the bounds of the failure are the confidence interval of the share inside the ellipses, and
-    /// `found` is the nominal share.
+    /// Same as [`Anees::gate`]; the bounds of the failure are the confidence interval of the share inside the ellipses,
+    /// and `found` is the nominal share.
     pub fn gate(self, significance: Significance) -> Result<f64, Failure> {
         let sample = Sample::stated(self.trials)?;
         // The quantile of χ² with two degrees of freedom is −2·ln(1 − p).

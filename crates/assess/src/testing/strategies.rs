@@ -26,8 +26,8 @@ fn base() -> Scene {
     parsed.expect("the built-in scene is valid")
 }
 
-/// Turns off all errors of the sensor, the room and the recording, as [`closure`](super::closure) requires; the mirrors stay
-/// as built.
+/// Turns off all errors of the sensor, the room and the recording, as [`closure`](super::closure) requires; the mirrors
+/// stay as built.
 #[must_use]
 pub fn without_errors(mut scene: Scene) -> Scene {
     scene.scanner.sub_rays = 1;
@@ -152,9 +152,9 @@ fn slots(count: RangeInclusive<usize>) -> impl Strategy<Value = Vec<Slot>> {
     vec(slot, count)
 }
 
-/// Layouts that are valid in a room of [`rooms`] and for a scanner of [`scanners`]: one to eight facets on both sides of a
-/// scanner whose forward sector is free, none of which occludes another. The simplest is one facet on the left; everything
-/// else is without errors, so that [`closure`](super::closure) holds.
+/// Layouts that are valid in a room of [`rooms`] and for a scanner of [`scanners`]: one to eight facets on both sides
+/// of a scanner whose forward sector is free, none of which occludes another. The simplest is one facet on the left;
+/// everything else is without errors, so that [`closure`](super::closure) holds.
 pub fn layouts() -> impl Strategy<Value = Scene> {
     (slots(1..=4), slots(0..=4), select(vec![1.0, -1.0])).prop_map(|(near, far, side)| {
         let mut scene = without_errors(base());
@@ -197,8 +197,8 @@ fn facet(side: &str, index: usize, sign: f64, &(width, distance_mm, turn, elevat
     }
 }
 
-/// Complete experiments, with all errors of the prototype: a layout, a scanner, a room, a board design, motion capture and a
-/// seed. Each passes `catoptric check`, and its boards can be placed.
+/// Complete experiments, with all errors of the prototype: a layout, a scanner, a room, a board design, motion capture
+/// and a seed. Each passes `catoptric check`, and its boards can be placed.
 pub fn scenes() -> impl Strategy<Value = Scene> {
     let mocap = select(vec![
         MocapProfile::Modern,

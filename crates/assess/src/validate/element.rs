@@ -86,7 +86,10 @@ fn check_angles(at: &mut OfBeam, b: &BeamEstimate) {
     }
     match b.distance_m {
         Some(d) if !d.is_finite() => at.error("distance_m", format!("is {d}, not a number")),
-        Some(d) if d <= 0.0 => at.error("distance_m", format!("is {d}, but a mirror has a positive distance")),
+        Some(d) if d <= 0.0 => at.error(
+            "distance_m",
+            format!("is {d}, but a mirror has a positive distance"),
+        ),
         Some(d) if d > MIRROR_DISTANCE_M => at.error(
             "distance_m",
             format!("is {d}, but a mirror is closer than {MIRROR_DISTANCE_M} m; it looks like millimeters"),

@@ -18,8 +18,8 @@ pub use problem::{Problem, Severity};
 /// Maximum distance of a mirror from the scanner, in meters; larger values are probably millimeters.
 pub const MIRROR_DISTANCE_M: f64 = 10.0;
 
-/// Minimum and maximum plausible standard deviation of an angle, in radians: a millionth of the smallest ever measured, and
-/// half a turn, which is no information at all.
+/// Minimum and maximum plausible standard deviation of an angle, in radians: a millionth of the smallest ever measured,
+/// and half a turn, which is no information at all.
 pub const ANGLE_SD_RAD: [f64; 2] = [1e-10, PI];
 
 /// Returns all problems of a calibration, in the order of the file; none if it is valid.

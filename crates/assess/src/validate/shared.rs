@@ -12,7 +12,10 @@ pub(super) fn check_facet(problems: &mut Problems, key: &str, facet: &FacetEstim
     if !is_unit(length) {
         problems.error(
             &format!("{key}.normal"),
-            format!("of {:?} has length {length}, a unit normal has length 1", facet.facet),
+            format!(
+                "of {:?} has length {length}, a unit normal has length 1",
+                facet.facet
+            ),
         );
     }
     if !is_near(facet.offset_m) {

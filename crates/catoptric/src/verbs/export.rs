@@ -45,8 +45,8 @@ pub struct Exported {
 /// ```
 ///
 /// # Errors
-/// [`Error::Setup`] if the scene cannot be set up, [`Error::Invalid`] if the scene has no such solids or the reach is not a
-/// positive number.
+/// [`Error::Setup`] if the scene cannot be set up, [`Error::Invalid`] if the scene has no such solids or the reach is
+/// not a positive number.
 pub fn export(scene: &Scene, format: Format, seed: Option<u64>) -> Result<Exported, Error> {
     let scene = scene.resolved();
     if let Format::Glb { reach_m } = format

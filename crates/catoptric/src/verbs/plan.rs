@@ -73,7 +73,10 @@ impl PlanStart {
         if let Some(unknown) = asked.iter().find(|f| !names.contains(&f.as_str())) {
             let near = nearest(unknown, names.iter().copied());
             return Err(Error::Invalid {
-                message: format!("there is no facet {unknown:?}; the facets are {}", names.join(", ")),
+                message: format!(
+                    "there is no facet {unknown:?}; the facets are {}",
+                    names.join(", ")
+                ),
                 help: near.map(|near| format!("did you mean {near}?")),
             });
         }

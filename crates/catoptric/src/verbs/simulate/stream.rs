@@ -1,7 +1,8 @@
 //! A recording as a stream: excerpts of its stretches, just enough at a time to keep every thread busy.
 //!
-//! A stretch is opened once, and what its sensor sees while nothing moves is traced then. Random numbers of its excerpts are
-//! drawn in parallel, linked in order, and then the excerpts are recorded in parallel and encoded on the same thread.
+//! A stretch is opened once, and what its sensor sees while nothing moves is traced then. Random numbers of its
+//! excerpts are drawn in parallel, linked in order, and then the excerpts are recorded in parallel and encoded on the
+//! same thread.
 
 use super::tables::{ReturnRows, rows_of_readings};
 use crate::Error;

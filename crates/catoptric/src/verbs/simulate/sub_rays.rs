@@ -10,8 +10,9 @@ use catoptric_sim::receive::{Stop, SubRayEnd, SubRayLight};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Header of the table. `scan` is empty where a row holds for every scan of its pose; `weight` is the share of the sub-ray,
-/// which sums to one over the rows with `light` "beam"; the power is received from `name`, the point is in the sensor frame.
+/// Header of the table. `scan` is empty where a row holds for every scan of its pose; `weight` is the share of the
+/// sub-ray, which sums to one over the rows with `light` "beam"; the power is received from `name`, the point is in the
+/// sensor frame.
 pub(crate) const HEADER: &str = "pose,scan,beam,sub_ray,wide,narrow,weight,light,facets,end,surface,name,path_m,\
                                  cos_incidence,power_w,x_m,y_m,z_m\n";
 

@@ -13,8 +13,8 @@ use std::fmt::Write as _;
 pub(crate) type EmitRows<'a> = &'a mut dyn FnMut(&str) -> Result<(), Error>;
 
 /// Header of truth/returns.csv. A reading is geometric + mixed + detection + the three biases, plus the errors listed in
-/// truth/readings.csv, rounded. A beam has one row per echo, and none without an echo. `scan` is empty where nothing moves
-/// and the row holds for every scan; the incidences on the facets are joined in the same way as their names.
+/// truth/readings.csv, rounded. A beam has one row per echo, and none without an echo. `scan` is empty where nothing
+/// moves and the row holds for every scan; the incidences on the facets are joined in the same way as their names.
 pub(crate) const RETURNS_HEADER: &str = "pose,beam,surface,facets,geometric_m,cos_incidence,power_w,share,mixed_m,detection_m,\
                               distance_bias_m,angle_bias_m,color_bias_m,noise_sd_m,echo,detection_probability,\
                               facet_cos_incidence,scan\n";
@@ -116,8 +116,8 @@ impl<'a> ReturnRows<'a> {
     }
 }
 
-/// Header of truth/readings.csv. `echo` is the reported echo of truth/returns.csv, empty if none was detected; a reading is
-/// the range of that echo plus the six errors, rounded, unless `lost` is 1.
+/// Header of truth/readings.csv. `echo` is the reported echo of truth/returns.csv, empty if none was detected; a
+/// reading is the range of that echo plus the six errors, rounded, unless `lost` is 1.
 pub(crate) const READINGS_HEADER: &str =
     "pose,scan,beam,echo,lost,drift_m,warm_up_m,noise_m,correlated_m,interference_m,reading_m,element_m\n";
 

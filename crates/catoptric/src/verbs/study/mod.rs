@@ -52,11 +52,12 @@ pub fn study(study: &Study, control: &Control) -> Result<(Summary, Vec<Run>), Er
 
 /// Runs a part of a study in a folder; called again, it resumes where it was stopped.
 ///
-/// With `elements`, the angles of every element are listed as well. The folder contains the tables, `study.json` and a page.
+/// With `elements`, the angles of every element are listed as well. The folder contains the tables, `study.json` and a
+/// page.
 ///
 /// # Errors
-/// [`Error::Study`] if the folder contains another study, [`Error::Setup`] if a scene cannot be set up, [`Error::File`] if
-/// writing fails, [`Error::Stopped`]; finished experiments are kept.
+/// [`Error::Study`] if the folder contains another study, [`Error::Setup`] if a scene cannot be set up, [`Error::File`]
+/// if writing fails, [`Error::Stopped`]; finished experiments are kept.
 pub fn study_into(
     study: &Study,
     part: Part,
