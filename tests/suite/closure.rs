@@ -38,7 +38,7 @@ fn close(scene: &Scene, seed: u64) -> Result<(), TestCaseError> {
 }
 
 #[test]
-fn the_repositorys_scenes_close() {
+fn scenes_of_the_repository_close() {
     for text in [PROTOTYPE, TWO_MIRROR] {
         let scene = without_errors(scene(text));
         close(&scene, scene.seed).expect("the scene closes");
@@ -47,7 +47,7 @@ fn the_repositorys_scenes_close() {
 
 /// Files hold ranges as 32-bit floats: 1.2e-7 m at 2 m, up to twenty times that in an angle of a short lever.
 #[test]
-fn the_repositorys_scenes_close_through_the_files() {
+fn scenes_of_the_repository_close_through_the_files() {
     for text in [PROTOTYPE, TWO_MIRROR] {
         let scene = without_errors(scene(text));
         let laboratory = Laboratory::new(&scene, scene.seed).expect("the scene is valid");

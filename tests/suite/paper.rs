@@ -121,7 +121,7 @@ fn no_straight_beam_has_all_of_table_1() {
         (width - slack, width + slack)
     };
     let (at_1, at_2, at_3) = (allowed(1), allowed(2), allowed(3));
-    // Half-way between two distances a straight edge has the mean of both; even the smallest allowed values are too
+    // Halfway between two distances a straight edge has the mean of both; even the smallest allowed values are too
     // large.
     assert!(
         0.5 * (at_1.0 + at_3.0) > at_2.1 + 4.0,

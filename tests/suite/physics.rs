@@ -38,7 +38,7 @@ fn random_quad(draws: &mut Draws, center: Point3<f64>, size: f64) -> Vec<Point3<
 /// The intersection of a straight line from the origin with a polygon, by fans of triangles, and its clearance.
 ///
 /// The clearance is the smallest distance of the point from the line of an edge, negative outside.
-fn meet(corners: &[Point3<f64>], direction: &Vector3<f64>) -> Option<(f64, f64)> {
+fn intersect(corners: &[Point3<f64>], direction: &Vector3<f64>) -> Option<(f64, f64)> {
     let normal = (corners[1] - corners[0])
         .cross(&(corners[2] - corners[0]))
         .normalize();
@@ -90,7 +90,7 @@ fn unfold(
             if met.last() == Some(&index) {
                 continue;
             }
-            let Some((t, clearance)) = meet(&place(corners), direction) else {
+            let Some((t, clearance)) = intersect(&place(corners), direction) else {
                 continue;
             };
             if t <= before {

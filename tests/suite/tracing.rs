@@ -3,7 +3,7 @@
 //! Proven are the paths of light and its remaining power; the readings of detectors are covered elsewhere.
 
 use crate::common::{catoptric, run, stderr, stdout};
-use crate::traps::{file, forward, path, ray, trap, way};
+use crate::traps::{file, forward, path, ray, traced_path, trap};
 use catoptric::cast::Ray;
 use catoptric::files::{mesh, npy, scene};
 use catoptric::model::beam;
@@ -77,7 +77,7 @@ fn chains_of_tilted_mirrors_agree_with_their_images() {
                 origin: knees[0],
                 direction: Unit::new_normalize(aim - knees[0]),
             };
-            let (vertices, met, fate) = way(&scene, &start);
+            let (vertices, met, fate) = traced_path(&scene, &start);
             assert_eq!(fate, Fate::Escaped);
             assert_eq!(met, (0..length).map(|i| format!("m{i}")).collect::<Vec<_>>());
             for (i, vertex) in vertices.iter().enumerate() {
@@ -162,7 +162,7 @@ fn chains_of_rectangles_turned_by_yaw_pitch_and_roll_agree_with_matrices() {
             });
             expected.push((at, along, total));
         }
-        let (vertices, met, fate) = way(&scene, &ray(origin.into(), first.into()));
+        let (vertices, met, fate) = traced_path(&scene, &ray(origin.into(), first.into()));
         if met.iter().enumerate().any(|(i, name)| *name != format!("m{i}")) || met.len() < length {
             // Another mirror of the chain is in between.
             continue;
@@ -200,7 +200,7 @@ fn a_glass_mirror_lengthens_and_shifts_but_does_not_rotate() {
             thickness_mm,
             ghost: false,
         });
-        let (vertices, met, _) = way(&scene, &ray([0.0; 3], [1.0, 0.0, 0.0]));
+        let (vertices, met, _) = traced_path(&scene, &ray([0.0; 3], [1.0, 0.0, 0.0]));
         assert_eq!(met, ["fold", "fold", "fold", "wall"]);
         let (walk, longer) = plate(std::f64::consts::FRAC_PI_4, 1.51, thickness_mm * 1e-3);
         assert!(((vertices[2].point - vertices[0].point).norm() - walk).abs() < 1e-15);
@@ -265,21 +265,21 @@ fn a_ghost_and_dust_take_their_energy_from_the_beam() {
 fn two_sided_mirrors_reflect_with_their_backs_too_at_their_thickness() {
     let mut scene = trap("facet-edge");
     let back = ray([2.5, 0.02, 0.0], [-1.0, 0.0, 0.0]);
-    let (vertices, met, _) = way(&scene, &back);
+    let (vertices, met, _) = traced_path(&scene, &back);
     assert_eq!((met, path(&vertices)), (vec!["plate".to_owned()], 1.5));
     assert_eq!(vertices[0].direction, None, "an opaque back");
     for thickness_mm in [0.0, 4.0] {
         scene.room.mirror[0].two_sided = true;
         scene.room.mirror[0].thickness_mm = thickness_mm;
-        let (vertices, met, _) = way(&scene, &back);
+        let (vertices, met, _) = traced_path(&scene, &back);
         assert_eq!(met, ["plate", "ahead"]);
         let to_back = 1.5 - thickness_mm * 1e-3;
         assert!((path(&vertices) - (to_back + to_back + 0.5)).abs() < 1e-14);
-        let (_, met, _) = way(&scene, &ray([0.0; 3], [1.0, 0.0, 0.0]));
+        let (_, met, _) = traced_path(&scene, &ray([0.0; 3], [1.0, 0.0, 0.0]));
         assert_eq!(met, ["plate", "behind"]);
     }
     // The rim of the body is opaque.
-    let (vertices, met, _) = way(&scene, &ray([1.002, 1.0, 0.0], [0.0, -1.0, 0.0]));
+    let (vertices, met, _) = traced_path(&scene, &ray([1.002, 1.0, 0.0], [0.0, -1.0, 0.0]));
     assert_eq!((met, vertices[0].direction), (vec!["plate".to_owned()], None));
     assert!((path(&vertices) - 0.9).abs() < 1e-14);
 }

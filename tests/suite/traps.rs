@@ -35,7 +35,7 @@ pub(crate) fn ray(origin: [f64; 3], direction: [f64; 3]) -> Ray {
 }
 
 /// The path of a ray, the names of what it hits, and how it ends.
-pub(crate) fn way(scene: &Scene, ray: &Ray) -> (Vec<Vertex>, Vec<String>, Fate) {
+pub(crate) fn traced_path(scene: &Scene, ray: &Ray) -> (Vec<Vertex>, Vec<String>, Fate) {
     let scenery = Scenery::new(scene).unwrap();
     let tracer = scenery.tracer(1000).unwrap();
     let mut vertices = Vec::new();
@@ -75,7 +75,7 @@ fn every_trap_states_what_it_shows_and_is_a_valid_scene() {
 
 #[test]
 fn mirror_and_wall() {
-    let (vertices, met, fate) = way(&trap("mirror-and-wall"), &ray([0.0; 3], [1.0, 0.0, 0.0]));
+    let (vertices, met, fate) = traced_path(&trap("mirror-and-wall"), &ray([0.0; 3], [1.0, 0.0, 0.0]));
     assert_eq!(
         (met, fate),
         (vec!["fold".to_owned(), "wall".to_owned()], Fate::Hit)
@@ -100,7 +100,7 @@ fn ridge() {
     );
     for y in [-0.04, -1e-9, 1e-9, 0.03] {
         // In the room the rig is 2 m up.
-        let (vertices, met, _) = way(&scene, &ray([0.0, y, 2.0], [1.0, 0.0, 0.0]));
+        let (vertices, met, _) = traced_path(&scene, &ray([0.0, y, 2.0], [1.0, 0.0, 0.0]));
         let expected = if y > 0.0 {
             ["left", "+y wall"]
         } else {
@@ -120,7 +120,7 @@ fn facet_edge() {
         (-0.1 + 1e-9, "behind", 3.0),
         (-0.1 - 1e-9, "ahead", 3.0),
     ] {
-        let (vertices, met, _) = way(&scene, &ray([0.0, y, 0.0], [1.0, 0.0, 0.0]));
+        let (vertices, met, _) = traced_path(&scene, &ray([0.0, y, 0.0], [1.0, 0.0, 0.0]));
         assert_eq!(met.last().unwrap(), end);
         assert!((path(&vertices) - length).abs() < 1e-15);
     }
@@ -133,7 +133,7 @@ fn nearest_first() {
     for order in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
         let listed = trap("nearest-first").room.mirror;
         scene.room.mirror = order.map(|i: usize| listed[i].clone()).to_vec();
-        let (vertices, met, _) = way(&scene, &ahead);
+        let (vertices, met, _) = traced_path(&scene, &ahead);
         assert_eq!(met, ["first", "left"]);
         assert!((path(&vertices) - 2.0).abs() < 1e-15);
     }
@@ -141,7 +141,8 @@ fn nearest_first() {
 
 #[test]
 fn no_offset() {
-    let (vertices, met, fate) = way(&trap("no-offset"), &ray([-0.0005, -0.0005, 0.0], [1.0, 1.0, 0.0]));
+    let (vertices, met, fate) =
+        traced_path(&trap("no-offset"), &ray([-0.0005, -0.0005, 0.0], [1.0, 1.0, 0.0]));
     assert_eq!((met.len(), fate), (201, Fate::Hit));
     assert!(met[..200].chunks(2).all(|pair| pair == ["upper", "lower"]));
     assert_eq!(met[200], "wall");
@@ -162,7 +163,7 @@ fn label() {
         panic!("{found:?}")
     };
     assert!((on_mirror - 0.5_f64.sqrt()).abs() < 1e-12, "{on_mirror}");
-    let (_, met, _) = way(&scene, &ray([0.0, 0.0, 2.0], [1.0, 0.0, 0.0]));
+    let (_, met, _) = traced_path(&scene, &ray([0.0, 0.0, 2.0], [1.0, 0.0, 0.0]));
     assert_eq!(met, ["lift", "ceiling"]);
 }
 
@@ -185,11 +186,11 @@ fn board_edge() {
 #[test]
 fn grazing() {
     let scene = trap("grazing");
-    let (vertices, met, _) = way(&scene, &ray([0.0, 0.0, 0.00005], [1.0, 0.0, -0.0001]));
+    let (vertices, met, _) = traced_path(&scene, &ray([0.0, 0.0, 0.00005], [1.0, 0.0, -0.0001]));
     assert_eq!(met, ["floor", "wall"]);
     assert!((vertices[1].point.z - 0.00015).abs() < 1e-15);
     assert!((path(&vertices) - 2.0 * (1.0 + 1e-8_f64).sqrt()).abs() < 1e-12);
-    let (_, met, _) = way(&scene, &ray([0.0, 0.0, 1e-9], [1.0, 0.0, 1e-9]));
+    let (_, met, _) = traced_path(&scene, &ray([0.0, 0.0, 1e-9], [1.0, 0.0, 1e-9]));
     assert_eq!(met, ["wall"]);
 }
 

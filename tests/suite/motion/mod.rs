@@ -6,7 +6,7 @@
 //! two motion-capture frames is as smooth as these.
 
 mod recorded;
-mod way;
+mod trajectory;
 
 use crate::common::{folder_with, run, stderr, stdout};
 use crate::scenes::{BARE, PROTOTYPE, TWO_MIRROR, scene, without_errors};
@@ -124,12 +124,12 @@ fn leaves(planes: &[(Vector3<f64>, f64)], direction: &Vector3<f64>) -> f64 {
 }
 
 /// Compares every beam of every scan with the box of [`BARE`], given the sensor's trajectory in closed form.
-fn compare_with_room(laboratory: &Laboratory, way: impl Fn(f64) -> (Vector3<f64>, Matrix3<f64>)) {
+fn compare_with_room(laboratory: &Laboratory, trajectory: impl Fn(f64) -> (Vector3<f64>, Matrix3<f64>)) {
     let room = walls(laboratory.scene().room.size_m);
     let mut compared = 0;
     for (scan, returns) in flown(laboratory).iter().enumerate() {
         for (b, found) in returns.iter().enumerate() {
-            let (place, attitude) = way(time(scan, b));
+            let (place, attitude) = trajectory(time(scan, b));
             let direction = beam::direction(beam::azimuth(b)).into_inner();
             let expected = leaves(&seen(&room, &place, &attitude), &direction);
             let found = found.as_ref().expect("the room is white and near");
@@ -327,14 +327,14 @@ fn moving_mirrors() -> (Scene, impl Fn(f64) -> (Vector3<f64>, f64)) {
     let (yaw, rate) = (-20.0, 120.0);
     let at = |t: f64| waypoint(t, (start + velocity * t).into(), [yaw + rate * t, 0.0, 0.0]);
     scene.flight = vec![flight(Attitude::Slerp, vec![at(0.0), at(0.11), at(0.2)])];
-    let way = move |t: f64| (start + velocity * t, (yaw + rate * t).to_radians());
-    (scene, way)
+    let trajectory = move |t: f64| (start + velocity * t, (yaw + rate * t).to_radians());
+    (scene, trajectory)
 }
 
 /// Compares beams via given mirrors with the mirror images of the walls; returns their number.
 fn compare_with_images(
     laboratory: &Laboratory,
-    way: impl Fn(f64) -> (Vector3<f64>, f64),
+    trajectory: impl Fn(f64) -> (Vector3<f64>, f64),
     room: &[(Vector3<f64>, f64)],
     in_room: Option<(Vector3<f64>, f64)>,
 ) -> usize {
@@ -354,7 +354,7 @@ fn compare_with_images(
             if rest != expected_way {
                 continue;
             }
-            let (place, yaw) = way(time(scan, b));
+            let (place, yaw) = trajectory(time(scan, b));
             let rig = matrix(yaw, 0.0, 0.0);
             let place = place + rig * mount.translation.vector;
             let attitude = rig * turn;
@@ -380,15 +380,15 @@ fn compare_with_images(
 
 #[test]
 fn mirrors_move_with_the_rig() {
-    let (scene, way) = moving_mirrors();
+    let (scene, trajectory) = moving_mirrors();
     let laboratory = Laboratory::new(&scene, 3).unwrap();
-    let compared = compare_with_images(&laboratory, way, &walls(scene.room.size_m), None);
+    let compared = compare_with_images(&laboratory, trajectory, &walls(scene.room.size_m), None);
     assert!(compared > 8 * 200, "{compared}");
 }
 
 #[test]
 fn a_moving_and_a_fixed_mirror_reflect_alternately() {
-    let (mut scene, way) = moving_mirrors();
+    let (mut scene, trajectory) = moving_mirrors();
     // All over the floor, tilted by a few degrees, and not touching it.
     let mirror = "{ name = \"floor\", position_m = [0, 0, 0.5], yaw_deg = 25, pitch_deg = 6, roll_deg = -4,
                     shape.rectangle = { width_m = 3.0, height_m = 2.6 } }";
@@ -398,7 +398,7 @@ fn a_moving_and_a_fixed_mirror_reflect_alternately() {
     let normal = matrix(25.0_f64.to_radians(), 6.0_f64.to_radians(), -4.0_f64.to_radians()) * Vector3::z();
     let plane = (normal, 0.5 * normal.z);
     let laboratory = Laboratory::new(&scene, 3).unwrap();
-    let compared = compare_with_images(&laboratory, way, &walls(scene.room.size_m), Some(plane));
+    let compared = compare_with_images(&laboratory, trajectory, &walls(scene.room.size_m), Some(plane));
     assert!(compared > 400, "{compared}");
 }
 

@@ -44,7 +44,7 @@ fn threads_and_order_change_nothing() {
 
 #[test]
 fn truth_and_motion_capture_report_where_the_rig_was() {
-    let (scene, way) = moving_mirrors();
+    let (scene, trajectory) = moving_mirrors();
     let laboratory = Laboratory::new(&scene, 3).unwrap();
     let number = flight_number(&laboratory);
     let truth = laboratory.truth().unwrap();
@@ -57,7 +57,7 @@ fn truth_and_motion_capture_report_where_the_rig_was() {
             .all(|p| p.room_from_sensor.is_empty())
     );
     let rig = |t: f64| {
-        let (place, yaw) = way(t);
+        let (place, yaw) = trajectory(t);
         Pose::from_parts(Translation3::from(place), yaw_pitch_roll(yaw, 0.0, 0.0))
     };
     let off = |a: &Pose, b: &Pose| {

@@ -110,7 +110,7 @@ proptest! {
     fn two_equal_pulses_are_separated_depending_on_their_width(sd in 0.05..0.5_f64, power in 1.5..200.0_f64, widths in 0.1..6.0_f64) {
         let distance = widths * sd;
         let pair = [Pulse { range: 2.0, power }, Pulse { range: 2.0 + distance, power }];
-        // Half-way between the two the waveform is 2A·exp(−d²/8σ²); from a separation of 2.4σ on, its peaks are those
+        // Halfway between the two the waveform is 2A·exp(−d²/8σ²); from a separation of 2.4σ on, its peaks are those
         // of the pulses to within 0.1σ, and a full width at half maximum is 2.355σ.
         let valley = 2.0 * power * libm::exp(-widths * widths / 8.0);
         prop_assume!(!(2.3..2.6).contains(&widths));

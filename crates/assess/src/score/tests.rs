@@ -200,7 +200,7 @@ fn honesty_is_reported_with_its_size() {
         .split("errors are ")
         .nth(1)
         .and_then(|rest| rest.split(' ').next()?.parse().ok())
-        .expect("it says how many times");
+        .expect("the warning states a factor");
     assert!((times - 8.0).abs() < 0.5, "{}", over.warnings[0]);
     assert_eq!(
         over.warnings
