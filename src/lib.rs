@@ -1,4 +1,4 @@
-//! The program `catoptric` as a library: its arguments in, its exit code out.
+//! The program `catoptric` as a library function: arguments in, exit code out.
 
 mod cli;
 

@@ -1,4 +1,4 @@
-//! `catoptric apply`: from a stretch of scans and a calibration to a point cloud.
+//! `catoptric apply`: turns a stretch of scans into a point cloud, given a calibration.
 
 use super::Context;
 use super::error::CliError;
@@ -16,7 +16,7 @@ pub(crate) struct Arguments {
     dataset: PathBuf,
     /// The calibration.
     calibration: PathBuf,
-    /// The cloud to write; the name's end says how.
+    /// The cloud to write; the extension selects the format.
     #[arg(long, value_name = "cloud.ply|cloud.pcd")]
     out: PathBuf,
     /// Frame of the points; Eqs. 9 and 10 are in the sensor's.
@@ -39,7 +39,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let calibration = read_calibration_for(&arguments.calibration, &dataset.session)?;
     let cloud = apply_into(&dataset, &calibration, arguments.pose, arguments.frame, path)?;
     if cloud.mount_is_nominal {
-        context.say("the calibration has no mounting: the drawing's was taken");
+        context.say("the calibration has no mounting: using the one of the drawing");
     }
     print(&format!(
         "wrote {}: {} in the {} frame, pose {}; left out: {} without a range, {} of {} without a direction\n\

@@ -1,4 +1,4 @@
-//! `catoptric calibrate`: from a dataset to a calibration. The truth is not looked at.
+//! `catoptric calibrate`: estimates a calibration from a dataset. The truth is never read.
 
 use super::Context;
 use super::error::CliError;
@@ -26,10 +26,10 @@ pub(crate) struct Arguments {
     /// The calibration to write.
     #[arg(long, value_name = "calibration.json")]
     out: PathBuf,
-    /// What step 1 found out about the sensor, instead of what the session believes; as `characterize` writes it.
+    /// Sensor errors found in step 1, as written by `characterize`, instead of the session's beliefs.
     #[arg(long, value_name = "characterization.json")]
     characterization: Option<PathBuf>,
-    /// Predict every board from the others as well, five times over, and say how well that goes (`joint`).
+    /// Also predict each board from the others (five-fold cross-validation) and report the errors (`joint` only).
     #[arg(long)]
     cross_validate: bool,
     /// How derivatives are formed; both end at the same answer.
@@ -51,7 +51,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let method = arguments.method;
     if arguments.cross_validate && !method.cross_validates() {
         let message = format!(
-            "--cross-validate goes with --method joint, not with {}",
+            "--cross-validate works with --method joint only, not with {}",
             method.name()
         );
         return Err(CliError::invalid(message, None));
@@ -78,7 +78,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     ))
 }
 
-/// How well boards are predicted by the others, where that was asked.
+/// How well the boards are predicted by the others; empty unless requested.
 fn cross_validation(calibration: &Calibration) -> String {
     let held_out = calibration.assessment.as_ref().and_then(|a| a.held_out.as_ref());
     held_out.map_or_else(String::new, |h| {

@@ -1,4 +1,4 @@
-//! `catoptric characterize`: what the bare sensor's ranges are off by (step 1), from a dataset or a scene.
+//! `catoptric characterize`: measures the range errors of the bare sensor (step 1), from a dataset or a scene.
 
 use super::Context;
 use super::error::CliError;
@@ -11,13 +11,14 @@ use std::path::{Path, PathBuf};
 /// Arguments of `characterize`.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// A dataset, recorded or simulated, or a scene to be simulated first.
+    /// A dataset, recorded or simulated, or a scene to simulate first.
     #[arg(value_name = "DATASET|SCENE")]
     input: PathBuf,
-    /// The characterization to write; a page with its tables and pictures is written beside it, with the ending .html.
+    /// The characterization to write; a page with its tables and pictures is written next to it, with the extension
+    /// .html.
     #[arg(long, value_name = "characterization.json")]
     out: PathBuf,
-    /// Seed of every random draw, instead of the scene's.
+    /// Seed of all random effects, instead of the scene's.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Change a value of the scene first: experiment.scans_per_pose=20.
@@ -32,7 +33,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let page = page_path(&arguments.out)?;
     let (dataset, truth) = if arguments.input.is_dir() {
         if arguments.seed.is_some() || !arguments.set.is_empty() {
-            let message = "--seed and --set change a scene; a dataset is what it is";
+            let message = "--seed and --set change a scene; a dataset cannot be changed";
             return Err(CliError::invalid(message, None));
         }
         let truth = read_truth(&arguments.input)?;
@@ -50,7 +51,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let found = characterize(&dataset).map_err(|error| match error {
         Error::Calibration(error) => CliError::invalid(
             error.to_string(),
-            "record boards before the bare sensor: [[experiment.test]] in a scene".to_owned(),
+            "record boards in front of the bare sensor: [[experiment.test]] in a scene".to_owned(),
         ),
         other => other.into(),
     })?;
@@ -66,13 +67,13 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     print(&text(&found, injected.as_ref(), &arguments.out, &page))
 }
 
-/// Where the page goes: beside the JSON file, which it must not be.
+/// Path of the page: next to the JSON file, which it must not overwrite.
 fn page_path(out: &Path) -> Result<PathBuf, CliError> {
     let page = out.with_extension("html");
     if page == out {
         return Err(CliError::invalid(
             format!(
-                "--out {}: the file is JSON, the page beside it ends in .html",
+                "--out {}: the file is JSON; the page next to it has the extension .html",
                 out.display()
             ),
             format!("--out {}", quoted(&out.with_extension("json"))),
@@ -81,7 +82,7 @@ fn page_path(out: &Path) -> Result<PathBuf, CliError> {
     Ok(page)
 }
 
-/// The biases of Eqs. 3 to 5 that a simulation put in; none where the errors came from the detector alone.
+/// The biases of Eqs. (3)–(5) that a simulation injected; `None` if all errors came from the detector.
 fn injected(bias: RangeBias) -> Option<RangeBias> {
     Some(bias).filter(|bias| *bias != RangeBias::default())
 }

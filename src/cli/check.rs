@@ -1,4 +1,4 @@
-//! `catoptric check`: whether a scene can be simulated, and how large the experiment will be.
+//! `catoptric check`: checks that a scene can be simulated, and reports the size of the experiment.
 
 use super::Context;
 use super::error::CliError;
@@ -27,7 +27,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         return open_stage(arguments, scene);
     }
     let outline = outline(scene);
-    // Setting the experiment up finds what no single value shows: a board that fits nowhere.
+    // Setting up the experiment finds problems that no single value shows, such as a board that fits nowhere.
     let laboratory = Laboratory::new(scene, scene.seed)?;
     let flights = match scene.flight.len() {
         0 => String::new(),
@@ -71,7 +71,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     print(&text)
 }
 
-/// A scene to trace rays in, and no more.
+/// Checks a scene that is only for tracing rays.
 fn open_stage(arguments: &Arguments, scene: &sim::Scene) -> Result<(), CliError> {
     Scenery::new(scene)?.tracer(1)?;
     print(&format!(
@@ -83,7 +83,7 @@ fn open_stage(arguments: &Arguments, scene: &sim::Scene) -> Result<(), CliError>
     ))
 }
 
-/// How many beams the drawing sends to each facet.
+/// The number of beams that each facet deflects according to the drawing.
 fn served(outline: &Outline) -> String {
     let beams = || outline.facets.iter().map(|f| f.beams);
     match (beams().min(), beams().max()) {

@@ -1,4 +1,4 @@
-//! `catoptric compare`: several calibrations of one dataset, whoever made them, in one table.
+//! `catoptric compare`: tabulates several calibrations of one dataset, ours and third-party ones.
 
 use super::error::CliError;
 use super::output::{counted, print};
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 pub(crate) struct Arguments {
     /// The dataset.
     dataset: PathBuf,
-    /// The calibrations, ours or anybody's.
+    /// The calibrations, ours or third-party.
     #[arg(required = true, num_args = 1.., value_name = "CALIBRATION")]
     calibrations: Vec<PathBuf>,
     /// Print the table as JSON.
@@ -22,7 +22,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Ends well whatever the verdicts are, `score` is what judges one of them, unless one is of another dataset.
+/// Succeeds whatever the verdicts are; judging a single calibration is up to `score`.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
     let dataset = read_dataset(&arguments.dataset)?;
     let truth = read_truth(&arguments.dataset)?;
@@ -52,12 +52,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
 /// A calibration as a row of a table.
 type Cells = fn(&Row) -> Vec<String>;
 
-/// The tables as a person reads them.
+/// The tables as text.
 fn words(found: &Comparison) -> String {
     let order = if found.blind {
-        "no truth: residuals on boards and walls only, the least on the walls first"
+        "no truth: residuals on boards and walls only, smallest wall residual first"
     } else {
-        "the least point error at 4 m first"
+        "smallest point error at 4 m first"
     };
     let mut text = format!("{}, {order}\n", counted(found.rows.len(), "calibration"));
     let (heads, cells): (&[&str], Cells) = if found.blind {
@@ -152,7 +152,7 @@ fn blind_cells(row: &Row) -> Vec<String> {
     ]
 }
 
-/// Columns as wide as their widest cell: names to the left, figures to the right.
+/// Formats columns as wide as their widest cell: names left-aligned, figures right-aligned.
 fn table(heads: &[&str], rows: Vec<Vec<String>>) -> String {
     let columns = heads.len();
     let head = heads.iter().map(|h| (*h).to_owned()).collect();

@@ -1,4 +1,4 @@
-//! `catoptric demo`: the whole story on the built-in scene.
+//! `catoptric demo`: simulates, calibrates, scores and reports on the built-in scene.
 
 use super::Context;
 use super::calibrate::summary;
@@ -17,7 +17,7 @@ use clap::Args;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// The methods it shows: the best one, the best that takes each element by itself, and the paper's.
+/// The methods shown: the best one, the best that treats each element separately, and the paper's.
 const SHOWN: [Method; 3] = [Method::Joint, Method::BeamGls, Method::Beam];
 
 /// Arguments of `demo`.
@@ -26,7 +26,7 @@ pub(crate) struct Arguments {
     /// The folder to write into.
     #[arg(long, value_name = "DIR", default_value = "catoptric-demo")]
     out: PathBuf,
-    /// Seed of every random draw, instead of the scene's.
+    /// Seed of all random effects, instead of the scene's.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 }
@@ -36,10 +36,10 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let folder = &arguments.out;
     if folder.join(files::dataset::SESSION).exists() {
         let message = format!(
-            "{} is itself a dataset; the demo writes one into a folder of its own",
+            "{} is a dataset; the demo creates its dataset inside the folder it is given",
             folder.display()
         );
-        return Err(CliError::invalid(message, "give another --out".to_owned()));
+        return Err(CliError::invalid(message, "choose another --out".to_owned()));
     }
     let mut scene = Scene::template(Template::Prototype);
     if let Some(seed) = arguments.seed {
@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     }
     let dataset_folder = folder.join("dataset");
     let recording = Recording {
-        // Only a dataset is ever replaced; a second demo makes the same one again.
+        // Only datasets are ever replaced, and a second demo creates the same one.
         replace: true,
         command_line: Some(format!("catoptric demo --seed {}", scene.resolved().seed)),
         ..Recording::default()
@@ -91,7 +91,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     print(&format!(
         "simulated   scene {:?}, seed {}: {}, {}, {}, {} readings\n\
          calibrated  {calibrated}\n\
-         limit       no method can be expected to do better than {}, none that takes each element by itself than {}\n\
+         limit       no method can be expected to do better than {}, none that treats each element separately better than {}\n\
          verdict     {verdict}: of {} deflected elements {} solved, {} abstained, {} missed, {} false\n\
          points      {} at 1 m, {} at 4 m\n\
          took        {:.1} s\n\

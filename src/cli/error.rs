@@ -1,4 +1,4 @@
-//! How a verb can end other than well, and what the shell is told.
+//! Why a verb can fail, the message it prints and the exit code the shell receives.
 
 use catoptric::Error;
 use catoptric::files::IoError;
@@ -9,17 +9,17 @@ use std::io::{IsTerminal, Write};
 /// Why a verb did not succeed.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum CliError {
-    /// The library has no result.
+    /// The library returned an error.
     #[error(transparent)]
     Library(#[from] Error),
-    /// The verdict is "not good enough"; what it is about has been printed.
+    /// The verdict is "not good enough"; the results have been printed already.
     #[error("{0}")]
     Verdict(String),
-    /// Standard output refused.
+    /// Writing to standard output failed.
     #[error("{0}")]
     Output(std::io::Error),
-    /// Nobody reads standard output any more: no error at all.
-    #[error("the reader of standard output has gone")]
+    /// The reader of standard output has closed it, which is not an error.
+    #[error("standard output was closed by its reader")]
     ClosedPipe,
 }
 
@@ -42,7 +42,7 @@ impl From<SimError> for CliError {
 }
 
 impl CliError {
-    /// An argument that makes no sense as it was given.
+    /// An invalid argument.
     pub(crate) fn invalid(message: impl Into<String>, help: impl Into<Option<String>>) -> Self {
         Self::Library(Error::Invalid {
             message: message.into(),
@@ -59,17 +59,17 @@ impl CliError {
         }
     }
 
-    /// Tells the person on stderr and the shell by the exit code.
+    /// Prints the error to stderr and returns the exit code.
     pub(crate) fn report(&self) -> u8 {
         let mut stderr = anstream::stderr();
-        // With stderr closed there is nobody left to read it.
+        // If stderr is closed, there is nowhere left to report to.
         let _ = match self {
             Self::ClosedPipe => Ok(()),
             Self::Library(Error::Scene(SceneErrors::Invalid(problems))) => {
                 writeln!(stderr, "{}", problems.render(std::io::stderr().is_terminal()))
             }
             Self::Library(Error::Stopped(_)) => {
-                writeln!(stderr, "interrupted; nothing half-written was left behind")
+                writeln!(stderr, "interrupted; no incomplete files were left behind")
             }
             Self::Verdict(_) => writeln!(stderr, "{self}"),
             Self::Library(error) => match help(error) {
@@ -82,13 +82,13 @@ impl CliError {
     }
 }
 
-/// What to do about an error, in the words of the command line.
+/// What to do about an error, in terms of command-line options.
 fn help(error: &Error) -> Option<String> {
     match error {
         Error::Setup(SimError::Placement { .. }) => {
-            Some("make the room larger, the board smaller, or experiment.range_m shorter".to_owned())
+            Some("use a larger room, a smaller board, or a shorter experiment.range_m".to_owned())
         }
-        Error::File(IoError::Exists { .. }) => Some("give --replace, or another --out".to_owned()),
+        Error::File(IoError::Exists { .. }) => Some("use --replace or another --out".to_owned()),
         other => other.help(),
     }
 }

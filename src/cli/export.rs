@@ -1,4 +1,4 @@
-//! `catoptric export`: a layout as files for making and using it, a dataset's boards as a table.
+//! `catoptric export`: writes a layout as files for manufacturing and use, or a dataset's boards as a table.
 
 use super::Context;
 use super::error::CliError;
@@ -8,25 +8,25 @@ use catoptric::{Error, ExportFormat, Scene, export, export_boards, files, read_d
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
-/// How far beams of a GLB go after their last mirror unless something else is asked for, in meters.
+/// Default length of the beams of a GLB after their last mirror, in meters.
 const REACH_M: f64 = 1.0;
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// The scene, TOML or JSON; for csv a dataset's folder too.
+    /// The scene, TOML or JSON; for csv also a dataset folder.
     #[arg(value_name = "SCENE|DATASET")]
     input: PathBuf,
-    /// What to write.
+    /// The format to write.
     #[arg(long, value_enum)]
     format: FormatName,
-    /// The file.
+    /// The file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Which solids an STL holds; all by default.
+    /// The solids in an STL; all by default.
     #[arg(long, value_enum)]
     part: Option<Solids>,
-    /// How far beams of a GLB go after their last mirror, in metres; 1 by default.
+    /// Length of the beams of a GLB after their last mirror, in meters; 1 by default.
     #[arg(long, value_name = "M")]
     reach_m: Option<f64>,
     /// Export the structure as built under the seed instead of the drawing.
@@ -35,20 +35,21 @@ pub(crate) struct Arguments {
     /// Seed of the structure as built; the scene's own by default.
     #[arg(long, value_name = "N", requires = "as_built")]
     seed: Option<u64>,
-    /// Change a value first: superstructure.mirror.thickness_mm=2.
+    /// Change a value of the scene first: superstructure.mirror.thickness_mm=2.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum FormatName {
-    /// Mirrors and a printable frame as closed solids, in millimetres
+    /// Mirrors and a printable frame as closed solids, in millimeters
     Stl,
-    /// Mirrors, housing and beams to look at (binary glTF), in metres
+    /// Mirrors, housing and beams for viewing (binary glTF), in meters
     Glb,
-    /// Of a scene: corners, angles and tolerances of every mirror; of a dataset: what every beam read of every board
+    /// Of a scene: corners, angles and tolerances of every mirror; of a dataset: the readings of every beam on every
+    /// board
     Csv,
-    /// The laser's and the mirrors' frames in the rig
+    /// Frames of the laser and the mirrors in the rig
     Urdf,
 }
 
@@ -56,7 +57,7 @@ enum FormatName {
 enum Solids {
     /// The mirrors as plates
     Mirrors,
-    /// The posts, and a frame that holds the mirrors
+    /// The posts and a frame that holds the mirrors
     Frame,
     /// Both
     All,
@@ -68,7 +69,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     }
     let reach_m = arguments.reach_m.unwrap_or(REACH_M);
     if !(reach_m.is_finite() && reach_m > 0.0) {
-        let message = format!("--reach-m takes a positive number, it was given {reach_m}");
+        let message = format!("--reach-m must be a positive number, not {reach_m}");
         return Err(CliError::invalid(message, None));
     }
     let scene = Scene::load_with(&arguments.input, &arguments.set)?;
@@ -89,7 +90,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     if !exported.shaded.is_empty() {
         let names: Vec<String> = exported.shaded.iter().map(usize::to_string).collect();
         context.say(&format!(
-            "warning: the frame takes the sight of {}: {}",
+            "warning: the frame blocks {}: {}",
             counted(exported.shaded.len(), "element"),
             names.join(", ")
         ));
@@ -97,23 +98,23 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     files::write_file(&arguments.out, &exported.bytes)?;
     let parts = exported.parts;
     let what = match arguments.format {
-        FormatName::Stl => format!("{}, millimetres", counted(parts, "solid")),
-        FormatName::Glb => format!("{} and beams, metres", counted(parts, "mirror")),
+        FormatName::Stl => format!("{}, millimeters", counted(parts, "solid")),
+        FormatName::Glb => format!("{} and beams, meters", counted(parts, "mirror")),
         FormatName::Csv => counted(parts, "mirror"),
         FormatName::Urdf => format!("the laser and {}", counted(parts, "mirror")),
     };
     print(&format!("wrote {}: {what}\n", quoted(&arguments.out)))
 }
 
-/// The boards of a dataset.
+/// Exports the boards of a dataset.
 fn boards(arguments: &Arguments) -> Result<(), CliError> {
     let shown = quoted(&arguments.input);
     if arguments.format != FormatName::Csv {
         return Err(CliError::invalid(
             format!(
-                "{shown} is a folder; of a dataset there is csv, the other formats are made from a scene"
+                "{shown} is a folder; a dataset can be exported as csv only, the other formats need a scene"
             ),
-            "a dataset keeps its scene in truth/scene.toml".to_owned(),
+            "the scene of a dataset is in its truth/scene.toml".to_owned(),
         ));
     }
     let of_scenes = [
@@ -125,7 +126,7 @@ fn boards(arguments: &Arguments) -> Result<(), CliError> {
     if let Some((option, _)) = of_scenes.iter().find(|(_, given)| *given) {
         return Err(CliError::invalid(
             format!("{option} is for scenes, and {shown} is a folder"),
-            "a dataset is exported as it was recorded".to_owned(),
+            "a dataset is exported as recorded".to_owned(),
         ));
     }
     let dataset = read_dataset(&arguments.input)?;

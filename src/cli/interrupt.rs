@@ -1,15 +1,15 @@
-//! Ctrl-C: the first asks long work to stop and clean up, the second ends the program at once.
+//! Ctrl-C: the first one requests long work to stop and clean up, the second one ends the program immediately.
 
 use catoptric::Stop;
 use std::sync::{LazyLock, Mutex, Once, PoisonError};
 
-/// What the shell is told of a program ended by Ctrl-C: 128 + SIGINT.
+/// Exit code of a program ended by Ctrl-C: 128 + SIGINT.
 const EXIT_CODE: i32 = 130;
 
-/// The request to stop of the run that is under way.
+/// The stop request of the current run.
 static CURRENT: LazyLock<Mutex<Stop>> = LazyLock::new(Mutex::default);
 
-/// Begins to listen for a run. Where that cannot be, Ctrl-C ends the program at once, as without it.
+/// Starts listening for Ctrl-C on behalf of a run. If no handler can be installed, Ctrl-C ends the program immediately.
 pub(crate) fn listen() -> Stop {
     static INSTALLED: Once = Once::new();
     INSTALLED.call_once(|| {

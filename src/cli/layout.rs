@@ -1,4 +1,4 @@
-//! `catoptric layout`: what mirror layouts see, lose and allow; several side by side.
+//! `catoptric layout`: analyzes the coverage, losses and attainable accuracy of mirror layouts, several side by side.
 
 use super::Context;
 use super::error::CliError;
@@ -12,29 +12,29 @@ use std::time::Instant;
 /// Arguments of `layout`.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// The scene, TOML or JSON; several are put side by side.
+    /// The scene, TOML or JSON; several are compared side by side.
     #[arg(required = true, value_name = "SCENE")]
     scenes: Vec<PathBuf>,
-    /// Look at the structure as built under the seed instead of the drawing.
+    /// Analyze the structure as built under the seed instead of the drawing.
     #[arg(long)]
     as_built: bool,
     /// Seed of the structure as built and of the predicted accuracy; the scene's own by default.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// One ray per beam and no prediction of accuracy: an answer in milliseconds.
+    /// Use one ray per beam and predict no accuracy: takes milliseconds.
     #[arg(long)]
     coarse: bool,
     /// Change a value of every scene first: superstructure.mirror.reflectivity=0.95.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// A limit to keep, else the exit code is 1: "field_of_regard>=0.004", "facets.*.margin_mm>0.5". May be given more
-    /// than once.
+    /// A limit to meet, otherwise the exit code is 1: "field_of_regard>=0.004", "facets.*.margin_mm>0.5". May be given
+    /// more than once.
     #[arg(long, value_name = "FIGURE>=NUMBER")]
     require: Vec<String>,
-    /// Write layout.json, the pictures and a page, report.html, into this folder.
+    /// Write layout.json, the pictures and a page, report.html, to this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print every figure as JSON.
+    /// Print all figures as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -82,10 +82,10 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     }
 }
 
-/// A requirement as it is given.
+/// An example of a requirement.
 const EXAMPLE: &str = "field_of_regard>=0.004";
 
-/// Reads what was given with `--require`.
+/// Parses the values of `--require`.
 pub(super) fn requirements(texts: &[String], example: &str) -> Result<Vec<Requirement>, CliError> {
     texts
         .iter()
@@ -93,7 +93,7 @@ pub(super) fn requirements(texts: &[String], example: &str) -> Result<Vec<Requir
         .collect()
 }
 
-/// What is wrong with a requirement.
+/// The error for an invalid requirement.
 pub(super) fn refused(error: RequirementError, example: &str) -> CliError {
     let message = format!("--require: {error}");
     let help = match error {
@@ -126,7 +126,7 @@ fn next(arguments: &Arguments) -> String {
     }
 }
 
-/// A layout for people.
+/// An analysis as text.
 fn text(analysis: &Analysis) -> String {
     let counts: Vec<String> = Class::ALL
         .iter()
@@ -189,7 +189,7 @@ fn text(analysis: &Analysis) -> String {
     text
 }
 
-/// The polygons that were looked at.
+/// The polygons that were analyzed.
 fn corners(drawing: &layout::Drawing) -> String {
     let facets = drawing.facets.iter().map(|facet| {
         let corners = facet.face.corners.iter().map(|c| {

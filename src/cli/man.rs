@@ -1,4 +1,4 @@
-//! `catoptric man`: the manual pages.
+//! `catoptric man`: prints or writes the manual pages.
 
 use super::Cli;
 use super::error::CliError;
@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// Arguments of `man`.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// Write the pages of all verbs into this folder instead of printing the first one.
+    /// Write the pages of all verbs to this folder instead of printing the main one.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }

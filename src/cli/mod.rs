@@ -1,4 +1,4 @@
-//! The command line: its arguments, and one file for each verb.
+//! The command line: global options, dispatch, and one file per verb.
 
 mod apply;
 mod calibrate;
@@ -35,7 +35,7 @@ use std::ffi::OsString;
 use std::io::Write;
 use std::sync::Arc;
 
-/// Said at the end of every help.
+/// Printed at the end of every help text.
 const EXIT_CODES: &str = "Exit codes: 0 ok · 1 the verdict is \"not good enough\" · 2 usage or invalid input · \
                           3 input/output · 130 interrupted";
 
@@ -52,74 +52,74 @@ struct Cli {
 /// Options of every verb.
 #[derive(Debug, Clone, Args)]
 struct Global {
-    /// Threads to compute with; all of the machine's by default. Changes speed, never results.
+    /// Number of threads; all of the machine by default. Affects speed, never results.
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
-    /// Say more on stderr.
+    /// Print more on stderr.
     #[arg(short, long, global = true, action = ArgAction::Count)]
     verbose: u8,
-    /// Say nothing on stderr but errors.
+    /// Print nothing but errors on stderr.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
 }
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// The whole story on the built-in scene: simulate, calibrate, score, report
+    /// Simulate, calibrate, score and report on the built-in scene
     Demo(demo::Arguments),
     /// Write a commented scene to start from
     New(new::Arguments),
-    /// Read a scene and say everything that is wrong with it
+    /// Read a scene and report everything that is wrong with it
     Check(check::Arguments),
     /// Simulate an experiment and write what it would have recorded
     Simulate(simulate::Arguments),
-    /// Follow any rays through a scene's mirrors
+    /// Trace arbitrary rays through a scene's mirrors
     Trace(trace::Arguments),
-    /// Find out what the bare sensor's ranges are off by: Tables 1 to 4, Eqs. 3 to 5
+    /// Measure the range errors of the bare sensor: Tables 1 to 4, Eqs. (3)–(5)
     Characterize(characterize::Arguments),
     /// Estimate where every mirrored beam goes
     Calibrate(calibrate::Arguments),
-    /// Say whether a calibration is well formed and physically sane
+    /// Check that a calibration is well formed and physically plausible
     Validate(validate::Arguments),
-    /// Compare a calibration with the truth, or, without one, with boards and walls
+    /// Compare a calibration with the truth or, without one, with boards and walls
     Score(score::Arguments),
-    /// Put several calibrations of one dataset side by side, ours or anybody's
+    /// Compare several calibrations of one dataset, ours or third-party
     Compare(compare::Arguments),
-    /// Run many experiments and say what their errors have in common
+    /// Run many experiments and report the statistics of their errors
     Study(study::Arguments),
-    /// Say which board poses to record next, and what each gains
+    /// Plan which board poses to record next, and what each one gains
     Plan(plan::Arguments),
-    /// Say what a mirror layout sees, loses and allows; several side by side
+    /// Analyze the coverage, losses and attainable accuracy of mirror layouts
     Layout(layout::Arguments),
     /// Search a scene's parameters for better layouts
     Optimize(optimize::Arguments),
-    /// Say what manufacturing errors do to a layout, and what a calibration leaves of them
+    /// Analyze the effect of manufacturing errors on a layout, before and after calibration
     Tolerance(tolerance::Arguments),
     /// Write a layout as solids, a 3D scene, a drawing table or frames
     Export(export::Arguments),
     /// Turn a scan into a point cloud
     Apply(apply::Arguments),
-    /// Write a page to read about calibrations and their scores
+    /// Write an HTML page about calibrations and their scores
     Report(report::Arguments),
     /// Print the JSON Schema of scenes
     Schema,
-    /// Print completions for a shell
+    /// Print the completion script of a shell
     Completions(completions::Arguments),
     /// Print the manual page, or write all of them
     Man(man::Arguments),
 }
 
-/// What every verb is given beside its own arguments.
+/// What every verb receives in addition to its own arguments.
 pub(crate) struct Context {
     global: Global,
-    /// The command as it was given, without the program's name.
+    /// The command line as given, without the program's name.
     given: Vec<OsString>,
     stop: Stop,
     reporter: Arc<Reporter>,
 }
 
 impl Context {
-    /// How long verbs run: until Ctrl-C, with progress on stderr, on the threads of this run.
+    /// The control of a long verb: it stops on Ctrl-C and reports progress on stderr.
     fn control(&self) -> Control {
         let reporter = self.reporter.clone();
         Control {
@@ -129,20 +129,20 @@ impl Context {
         }
     }
 
-    /// An error once Ctrl-C was pressed.
+    /// Returns an error once Ctrl-C has been pressed.
     fn check(&self) -> Result<(), CliError> {
         Ok(self.stop.check().map_err(catoptric::Error::from)?)
     }
 
-    /// Says something on stderr, unless asked to be quiet.
+    /// Prints a line on stderr, unless `--quiet` is set.
     fn say(&self, text: &str) {
         if !self.global.quiet {
-            // With stderr closed there is nobody left to read it.
+            // If stderr is closed, there is nowhere left to report to.
             let _ = writeln!(anstream::stderr(), "{text}");
         }
     }
 
-    /// Says more, for those who asked for it.
+    /// Prints a line on stderr if `--verbose` is set.
     fn detail(&self, text: &str) {
         if self.global.verbose > 0 {
             self.say(text);
@@ -150,15 +150,15 @@ impl Context {
     }
 }
 
-/// Runs the program on its arguments, the first of which is its own name, and returns the code that it exits with.
+/// Runs the program on its arguments, the first of which is its name, and returns its exit code.
 ///
-/// Results go to standard output, all else to standard error. Ctrl-C stops the run that is under way.
+/// Results go to standard output, everything else to standard error. Ctrl-C stops the current run.
 pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
     let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(error) => {
-            // Help on a closed pipe has nobody to read it; there is nothing to add.
+            // If the help goes to a closed pipe, there is nothing left to do.
             let _ = error.print();
             return u8::try_from(error.exit_code()).unwrap_or(1);
         }
@@ -180,7 +180,7 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> u8 {
     }
 }
 
-/// Does some work on a pool of so many threads; on all of the machine's by default.
+/// Runs some work on a pool of the given number of threads; on all of the machine's by default.
 fn on_threads(
     threads: Option<u16>,
     work: impl FnOnce() -> Result<(), CliError> + Send,

@@ -1,4 +1,4 @@
-//! `catoptric new`: a commented scene to start from.
+//! `catoptric new`: writes a commented scene to start from.
 
 use super::error::CliError;
 use super::output::{print, quoted};
@@ -24,9 +24,9 @@ pub(crate) struct Arguments {
 enum LayoutName {
     /// Eight facets around the scanner
     Prototype,
-    /// Two mirrors beside a 270° scanner
+    /// Two mirrors on either side of a 270° scanner
     TwoMirror,
-    /// Half a hexagonal pyramid before the scanner
+    /// Half a hexagonal pyramid in front of the scanner
     Pyramid,
     /// A small mirror that folds eleven beams straight down
     Altimeter,
@@ -37,7 +37,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
     if path.extension().is_none_or(|e| e != "toml") {
         return Err(CliError::invalid(
             format!(
-                "{} does not end in .toml, which scenes are written in",
+                "{} does not end in .toml, the format of new scenes",
                 path.display()
             ),
             format!("catoptric new {}", quoted(&path.with_extension("toml"))),
@@ -49,11 +49,11 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
         LayoutName::Pyramid => Template::Pyramid,
         LayoutName::Altimeter => Template::Altimeter,
     };
-    // `create_new` leaves no moment in which another program's file could be overwritten.
+    // `create_new` is atomic: a file that another program creates meanwhile cannot be overwritten.
     let file = OpenOptions::new().write(true).create_new(true).open(path);
     let mut file = file.map_err(|source| match source.kind() {
         ErrorKind::AlreadyExists => CliError::invalid(
-            format!("{} exists already and is left as it is", path.display()),
+            format!("{} exists already and was not changed", path.display()),
             "choose another name, or remove the file first".to_owned(),
         ),
         _ => IoError::write(path, source).into(),
@@ -62,7 +62,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
         .write_all(template.text().as_bytes())
         .and_then(|()| file.sync_all());
     if let Err(source) = written {
-        // Half a scene is worse than none.
+        // An incomplete scene is worse than none.
         let _ = std::fs::remove_file(path);
         return Err(IoError::write(path, source).into());
     }

@@ -1,4 +1,4 @@
-//! `catoptric optimize`: a search of a scene's parameters for better layouts.
+//! `catoptric optimize`: searches the parameters of a scene for better layouts.
 
 use super::Context;
 use super::error::CliError;
@@ -18,33 +18,33 @@ pub(crate) struct Arguments {
     /// The scene, TOML or JSON, with parameters that have `low` and `high`.
     scene: PathBuf,
     /// What to improve: field_of_regard, split_beams, lost_beams, predicted_accuracy, size, directions, or a figure of
-    /// `layout --json` and its way: share_within_5_deg:up. May be given more than once.
+    /// `layout --json` with up or down: share_within_5_deg:up. May be given more than once.
     #[arg(long, required = true, value_name = "GOAL")]
     goal: Vec<String>,
-    /// A direction for the goal `directions`, in degrees, and how many elements should look there: 90,-60,4. May be given
+    /// A direction for the goal `directions`, in degrees, and the number of elements wanted there: 90,-60,4. May be given
     /// more than once.
     #[arg(long, value_name = "AZIMUTH,ELEVATION[,ELEMENTS]", allow_hyphen_values = true)]
     direction: Vec<String>,
-    /// A limit that every layout has to keep: "facets.*.margin_mm>=0.3", "stopped_by_facets<=0". May be given more than
+    /// A limit that every layout must meet: "facets.*.margin_mm>=0.3", "stopped_by_facets<=0". May be given more than
     /// once.
     #[arg(long, value_name = "FIGURE>=NUMBER")]
     require: Vec<String>,
-    /// How many layouts to look at.
+    /// Number of layouts to evaluate.
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(20..=10_000_000))]
     evaluations: u32,
     /// Seed of the search.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// One ray per beam: many times faster, and blind to beams that an edge cuts.
+    /// Use one ray per beam: many times faster, but split beams go unnoticed.
     #[arg(long)]
     coarse: bool,
-    /// Change a value first: superstructure.mirror.reflectivity=0.95, parameters.reach_mm=70.
+    /// Change a value of the scene first: superstructure.mirror.reflectivity=0.95, parameters.reach_mm=70.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Write optimum.json, front.csv, front.svg, a page, report.html, and the best layouts as scenes into this folder.
+    /// Write optimum.json, front.csv, front.svg, a page, report.html, and the best layouts as scenes to this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print what was found as JSON.
+    /// Print the result as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -59,7 +59,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     })?;
     context.reporter.finish();
     context.say(&format!(
-        "looked at {} in {:.1} s",
+        "evaluated {} in {:.1} s",
         counted(found.evaluations, "layout"),
         begin.elapsed().as_secs_f64()
     ));
@@ -84,7 +84,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     if found.best.is_none() {
         let nearest = found.start.unmet.join("\n");
         return Err(CliError::Verdict(format!(
-            "no layout that was looked at keeps every requirement; as drawn:\n{nearest}"
+            "no evaluated layout meets every requirement; as drawn:\n{nearest}"
         )));
     }
     Ok(())
@@ -150,9 +150,9 @@ fn refused(error: OptimizeError) -> CliError {
     CliError::invalid(error.to_string(), help)
 }
 
-/// What was found, for people.
+/// The result as text.
 fn text(found: &Optimum) -> String {
-    let way = |better: Better| match better {
+    let arrow = |better: Better| match better {
         Better::Up => "up",
         Better::Down => "down",
     };
@@ -164,12 +164,12 @@ fn text(found: &Optimum) -> String {
                 "{}{} {}",
                 g.name,
                 g.unit.map_or_else(String::new, |u| format!(" ({u})")),
-                way(g.better)
+                arrow(g.better)
             )
         })
         .collect();
     let mut text = format!(
-        "{}: {} on the front of {} that keep the requirements; goals: {}{}\n",
+        "{}: {} on the front of {} that meet the requirements; goals: {}{}\n",
         found.name,
         counted(found.front.len(), "layout"),
         grouped(found.tried.len()),
@@ -205,9 +205,9 @@ fn text(found: &Optimum) -> String {
     }
     if let Some(best) = &found.best {
         text += if found.beats_start_in_every_goal {
-            "  the best is better than the drawing in every goal\n"
+            "  the best layout beats the drawing in every goal\n"
         } else {
-            "  nothing is better than the drawing in every goal\n"
+            "  no layout beats the drawing in every goal\n"
         };
         for open in &found.parameters {
             let value = best.parameters.get(&open.name).copied().unwrap_or(open.start);

@@ -1,10 +1,10 @@
-//! Standard output: data and results, and a quiet end when nobody reads them.
+//! Standard output: data and results; a closed pipe ends the program quietly.
 
 use super::error::CliError;
 pub(crate) use catoptric::files::paths::quoted;
 use std::io::{ErrorKind, Write};
 
-/// Writes text to stdout as it is.
+/// Writes text to stdout unchanged.
 pub(crate) fn print(text: &str) -> Result<(), CliError> {
     let mut stdout = std::io::stdout().lock();
     let written = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush());
@@ -20,7 +20,7 @@ pub(crate) fn print_json(value: &impl serde::Serialize) -> Result<(), CliError> 
     print(&format!("{json}\n"))
 }
 
-/// Digits in groups of three, for people.
+/// Formats a number with its digits in groups of three.
 pub(crate) fn grouped(number: usize) -> String {
     let digits = number.to_string();
     let mut out = String::new();
@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn digits_stand_in_threes() {
+    fn digits_are_grouped_in_threes() {
         assert_eq!(grouped(0), "0");
         assert_eq!(grouped(999), "999");
         assert_eq!(grouped(1000), "1 000");

@@ -1,4 +1,4 @@
-//! `catoptric plan`: which board poses to record next, from the drawing or for what a dataset lacks.
+//! `catoptric plan`: plans which board poses to record next, from the drawing or for what a dataset lacks.
 
 use super::Context;
 use super::error::CliError;
@@ -13,46 +13,41 @@ use clap::Args;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Reasons printed for each facet before the rest is only counted.
+/// Number of reasons printed per facet; the rest is only counted.
 const REASONS: usize = 4;
 
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// A scene, before anything is recorded, or a dataset: what its boards tell is the start.
+    /// A scene, before anything is recorded, or a dataset, whose boards are the starting point.
     #[arg(value_name = "SCENE|DATASET")]
     input: PathBuf,
-    /// Board poses for each facet.
+    /// Number of board poses per facet.
     #[arg(long, value_name = "K", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=100))]
     poses: u16,
-    /// Plan for this facet alone; may be given more than once.
+    /// Plan for this facet only; may be given more than once.
     #[arg(long, value_name = "NAME")]
     facet: Vec<String>,
-    /// What is to be small over the elements of a facet.
+    /// What to minimize over the elements of a facet.
     #[arg(
         long,
         value_parser = one_of(&Criterion::ALL, Criterion::name, Criterion::about),
         default_value = Criterion::default().name()
     )]
     criterion: Criterion,
-    /// Least and greatest way from mirror to board, in metres.
-    #[arg(
-        long,
-        value_name = "LEAST,GREATEST",
-        value_delimiter = ',',
-        default_value = "0.5,4"
-    )]
+    /// Minimum and maximum distance from mirror to board, in meters.
+    #[arg(long, value_name = "MIN,MAX", value_delimiter = ',', default_value = "0.5,4")]
     range_m: Vec<f64>,
-    /// Largest incidence of a beam on a board, in degrees.
+    /// Maximum incidence of a beam on a board, in degrees.
     #[arg(long, value_name = "DEG", default_value_t = 60.0)]
     max_incidence_deg: f64,
-    /// Where the sequence of possible poses begins.
+    /// Seed of the sequence of candidate poses.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Change a value of the scene first: experiment.scans_per_pose=20.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Write the scene with these poses in it, ready to be simulated.
+    /// Write the scene with the planned poses, ready to simulate.
     #[arg(long, value_name = "scene.toml")]
     out: Option<PathBuf>,
     /// Write a page with pictures of the room.
@@ -95,7 +90,7 @@ fn source(arguments: &Arguments) -> Result<Source, CliError> {
         return Ok(Source::Drawing(Box::new(scene)));
     }
     if !arguments.set.is_empty() {
-        let message = "--set changes a scene; a dataset is what it is";
+        let message = "--set changes a scene; a dataset cannot be changed";
         return Err(CliError::invalid(message, None));
     }
     Ok(Source::Recording(Box::new(read_dataset(&arguments.input)?)))
@@ -105,7 +100,7 @@ fn request(arguments: &Arguments, readings: usize) -> Result<Request, CliError> 
     let &[least, greatest] = arguments.range_m.as_slice() else {
         let given = arguments.range_m.len();
         return Err(CliError::invalid(
-            format!("--range-m takes two numbers, it was given {given}"),
+            format!("--range-m takes two numbers, not {given}"),
             "--range-m 0.5,4".to_owned(),
         ));
     };
@@ -120,7 +115,7 @@ fn request(arguments: &Arguments, readings: usize) -> Result<Request, CliError> 
     })
 }
 
-/// Writes what was asked for, and says so.
+/// Writes the requested files and returns the lines that report them.
 fn write(
     arguments: &Arguments,
     context: &Context,
@@ -136,9 +131,9 @@ fn write(
     let Some(out) = &arguments.out else {
         let blind = matches!(source, Source::Recording(_)) && !arguments.input.join(dataset::SCENE).exists();
         let next = if blind {
-            "next: record these poses, and calibrate\n".to_owned()
+            "next: record these poses and calibrate\n".to_owned()
         } else {
-            // The same again, whatever was asked for.
+            // Repeats the command with all its options.
             let given: Vec<String> = context.given.iter().map(|a| quoted(a.as_ref())).collect();
             format!("next: catoptric {} --out planned.toml\n", given.join(" "))
         };
@@ -150,7 +145,7 @@ fn write(
             let path = arguments.input.join(dataset::SCENE);
             if !path.exists() {
                 let message = format!(
-                    "{} is blind: there is no scene to put the poses in",
+                    "{} is blind: there is no scene to add the poses to",
                     arguments.input.display()
                 );
                 return Err(CliError::invalid(message, "plan without --out".to_owned()));
@@ -205,7 +200,7 @@ fn line(number: usize, pose: &PlannedPose) -> String {
     let [x, y, z] = pose.center_m;
     let [yaw, pitch, roll] = pose.yaw_pitch_roll_deg;
     let served: Vec<String> = pose.beams.iter().map(|b| beams(*b)).collect();
-    // Beams that a pose opens up count from then on, so a bound without their number would not say which beams it is of.
+    // Beams that a pose determines are included from then on, so a bound is ambiguous without the number of open ones.
     let bound = |s: &Standing| match s.bound_deg {
         None => "all open".to_owned(),
         Some(deg) if s.open > 0 => format!("{deg:.4}° with {} open", s.open),

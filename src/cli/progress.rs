@@ -1,4 +1,4 @@
-//! Progress on stderr: a bar on a terminal, a plain line every few seconds elsewhere, nothing if quiet.
+//! Progress on stderr: a bar on a terminal, otherwise a plain line every few seconds; nothing with `--quiet`.
 
 use catoptric::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 /// Time between two plain lines.
 const LINE_INTERVAL: Duration = Duration::from_secs(3);
 
-/// Progress of the piece of work that is under way.
+/// Shows the progress of the current piece of work.
 pub(crate) struct Reporter {
     quiet: bool,
     current: Mutex<Option<Work>>,
@@ -24,7 +24,7 @@ struct Work {
 }
 
 impl Reporter {
-    /// Nothing is shown if quiet.
+    /// Creates a reporter, which shows nothing if quiet.
     pub(crate) fn new(quiet: bool) -> Self {
         Self {
             quiet,
@@ -32,7 +32,7 @@ impl Reporter {
         }
     }
 
-    /// So much more is done; a report of no progress begins a piece of work.
+    /// Adds some progress; a report of zero progress begins a new piece of work.
     pub(crate) fn report(&self, progress: Progress) {
         let mut current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
         if progress.more == 0 || current.as_ref().is_none_or(|work| work.doing != progress.doing) {
@@ -45,7 +45,7 @@ impl Reporter {
             bar.inc(progress.more as u64);
         } else if work.last_line.elapsed() >= LINE_INTERVAL && !self.quiet {
             work.last_line = Instant::now();
-            // With stderr closed there is nobody left to read it.
+            // If stderr is closed, there is nowhere left to report to.
             let _ = writeln!(
                 anstream::stderr(),
                 "{}: {} of {}",
@@ -56,7 +56,7 @@ impl Reporter {
         }
     }
 
-    /// Takes the bar away, so that what is printed next stands alone.
+    /// Removes the bar before anything else is printed.
     pub(crate) fn finish(&self) {
         clear(self.current.lock().unwrap_or_else(PoisonError::into_inner).take());
     }

@@ -1,4 +1,4 @@
-//! `catoptric report`: one page to read about calibrations and their scores.
+//! `catoptric report`: writes one HTML page about calibrations and their scores.
 
 use super::Context;
 use super::error::CliError;
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 pub(crate) struct Arguments {
     /// The dataset.
     dataset: PathBuf,
-    /// The calibrations; the fans of the first are drawn.
+    /// The calibrations; the fans of the first one are drawn.
     #[arg(required = true)]
     calibrations: Vec<PathBuf>,
     /// The page to write.
@@ -38,7 +38,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let cloud = match cloud {
         Some(Ok(lift)) => Some(CloudSketch::of(&lift, MAX_POINTS).map_err(Error::from)?),
         Some(Err(error)) => {
-            context.say(&format!("without a cloud: {error}"));
+            context.say(&format!("no cloud: {error}"));
             None
         }
         None => None,

@@ -1,4 +1,4 @@
-//! `catoptric schema`: the JSON Schema of scenes, for editors.
+//! `catoptric schema`: prints the JSON Schema of scenes, for editors.
 
 use super::error::CliError;
 use super::output::print;

@@ -1,4 +1,4 @@
-//! `catoptric simulate`: from a scene to a dataset.
+//! `catoptric simulate`: simulates the experiment of a scene and writes it as a dataset.
 
 use super::Context;
 use super::error::CliError;
@@ -15,28 +15,28 @@ pub(crate) struct Arguments {
     /// The folder to write.
     #[arg(long, value_name = "DATASET")]
     out: PathBuf,
-    /// Seed of every random draw, instead of the scene's.
+    /// Seed of all random effects, instead of the scene's.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// Change a value first: experiment.scans_per_pose=20, superstructure.facet.0.name=left.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Print figures of the run as JSON.
+    /// Print the figures of the run as JSON.
     #[arg(long)]
     json: bool,
-    /// Replace a dataset that is there already.
+    /// Replace an existing dataset.
     #[arg(long)]
     replace: bool,
-    /// Write no truth/, so that the dataset is blind; a second run without this, of the same scene and seed, has it.
+    /// Write no truth/: the dataset is blind. A run of the same scene and seed without this option has the truth.
     #[arg(long, conflicts_with_all = ["returns", "readings", "sub_rays"])]
     blind: bool,
-    /// Write also what every beam met, truth/returns.csv.
+    /// Also write what every beam hits, truth/returns.csv.
     #[arg(long)]
     returns: bool,
-    /// Write also every error of every reading, truth/readings.csv; large.
+    /// Also write every error of every reading, truth/readings.csv; large.
     #[arg(long)]
     readings: bool,
-    /// Write also the path of every sub-ray, truth/sub_rays.csv; large.
+    /// Also write the path of every sub-ray, truth/sub_rays.csv; large.
     #[arg(long)]
     sub_rays: bool,
 }

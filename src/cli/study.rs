@@ -1,4 +1,4 @@
-//! `catoptric study`: many experiments, and what their errors have in common.
+//! `catoptric study`: runs many experiments and reports the statistics of their errors.
 
 use super::Context;
 use super::error::CliError;
@@ -21,7 +21,7 @@ pub(crate) struct Arguments {
 
 #[derive(Debug, clap::Subcommand)]
 enum Verb {
-    /// Put the shards of a study together
+    /// Merge the shards of a study
     Merge(MergeArguments),
 }
 
@@ -43,37 +43,38 @@ struct StudyArguments {
     /// The scene.
     #[arg(required = true)]
     scene: Option<PathBuf>,
-    /// How many experiments of every kind: seeds 1 to N.
+    /// Number of experiments per cell of the grid: seeds 1 to N.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     seeds: u64,
-    /// Who calibrates: our methods, and "oracle", which knows the truth.
+    /// The methods to study, by name, and "oracle", which knows the truth.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', default_value = "joint")]
     methods: Vec<String>,
-    /// A program that calibrates too, any number of times: NAME=COMMAND. It is given the folder of a blind dataset and the
-    /// file to write: where the command says {dataset} and {out}, and at its end if it does not. What it says is split at
-    /// spaces and run without a shell.
+    /// A calibration program to study as well: NAME=COMMAND. May be given more than once. {dataset} and {out} in the
+    /// command are replaced by the folder of a blind dataset and the file to write; they are appended if missing. The
+    /// command is split at spaces and run without a shell.
     #[arg(long, value_name = "NAME=COMMAND")]
     program: Vec<String>,
-    /// After how long a program is taken to hang, in seconds.
+    /// Time limit of a program, in seconds.
     #[arg(long, value_name = "S", default_value_t = 600)]
     program_timeout_s: u64,
-    /// Adds to every method of ours one that corrects no bias, and believes that biases are as likely as those are large.
+    /// Also study a variant of every method that corrects no bias; its standard deviations of the biases are as large as
+    /// the biases themselves.
     #[arg(long)]
     uncorrected: bool,
-    /// A value of the scene to be varied, any number of times: key=a,b,c or key=from:to:steps.
+    /// A value of the scene to vary: key=a,b,c or key=from:to:steps. May be given more than once.
     #[arg(long, value_name = "KEY=VALUES")]
     axis: Vec<String>,
     /// Change a value of the scene first: experiment.scans_per_pose=20.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Do the i-th of N parts: 1/4. `study merge` puts them together.
+    /// Run only the i-th of N parts: 1/4. `study merge` merges them.
     #[arg(long, value_name = "i/N", default_value = "1/1")]
     shard: String,
     /// Also list θ_a and φ of every element of every run, and how they spread over the seeds.
     #[arg(long)]
     elements: bool,
-    /// The folder to write. An interrupted study goes on from there.
-    // Required of a study, absent where shards are merged; both hold of `scene` too.
+    /// The folder to write. An interrupted study resumes from it.
+    // Required for a study, absent when merging shards; the same holds for `scene`.
     #[arg(long, value_name = "DIR", required = true)]
     out: Option<PathBuf>,
     /// Print the result as JSON.
@@ -95,7 +96,7 @@ fn invalid(message: String, help: &str) -> CliError {
     CliError::invalid(message, help.to_owned())
 }
 
-/// What is wrong with the value of an option that the message begins with.
+/// The error for the value of an option, whose name the message begins with.
 fn option(error: StudyError) -> CliError {
     match error {
         StudyError::Invalid { message, help } => invalid(format!("--{message}"), &help),
@@ -107,7 +108,7 @@ fn study_scene(arguments: &StudyArguments, context: &Context) -> Result<(), CliE
     let part: Part = arguments.shard.parse().map_err(option)?;
     let (Some(scene), Some(out)) = (&arguments.scene, &arguments.out) else {
         return Err(invalid(
-            "a scene and --out are needed".to_owned(),
+            "a scene and --out are required".to_owned(),
             "catoptric study scene.toml --out study",
         ));
     };
@@ -134,7 +135,7 @@ fn study_scene(arguments: &StudyArguments, context: &Context) -> Result<(), CliE
     show(&summary, out, arguments.json)
 }
 
-/// Who calibrates, each under a name of its own.
+/// The contestants, each under a different name.
 fn contestants(arguments: &StudyArguments) -> Result<Vec<Contestant>, CliError> {
     let mut all: Vec<Contestant> = Vec::new();
     for name in &arguments.methods {
@@ -150,7 +151,7 @@ fn contestants(arguments: &StudyArguments) -> Result<Vec<Contestant>, CliError> 
     for text in &arguments.program {
         let program = Program::parse(text, arguments.program_timeout_s).ok_or_else(|| {
             invalid(
-                format!("--program {text}: it is not NAME=COMMAND"),
+                format!("--program {text}: expected NAME=COMMAND"),
                 "--program 'mine=python3 mine.py {dataset} {out}'",
             )
         })?;
@@ -208,7 +209,7 @@ fn show(summary: &Summary, out: &Path, json: bool) -> Result<(), CliError> {
         );
     }
     print(&format!(
-        "{text}wrote {} and, beside it, {STUDY_PAGE} and the tables\n",
+        "{text}wrote {} and, next to it, {STUDY_PAGE} and the tables\n",
         quoted(&out.join(RESULT))
     ))
 }

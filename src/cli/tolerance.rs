@@ -1,4 +1,4 @@
-//! `catoptric tolerance`: what manufacturing errors do to a layout, and what a calibration leaves of them.
+//! `catoptric tolerance`: analyzes the effect of manufacturing errors on a layout, before and after calibration.
 
 use super::Context;
 use super::error::CliError;
@@ -12,38 +12,37 @@ use std::path::PathBuf;
 /// Arguments of `tolerance`.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// The scene, TOML or JSON; its `superstructure.as_built` and `scanner.mount` say how large errors are.
+    /// The scene, TOML or JSON; its `superstructure.as_built` and `scanner.mount` specify the errors.
     scene: PathBuf,
-    /// Structures to build, one for each seed from --seed on.
+    /// Number of structures to build, with consecutive seeds from --seed on.
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     draws: u32,
     /// Seed of the first structure; the scene's own by default.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Structures, the first of them, for which the accuracy that a calibration can reach is predicted; 0 for none.
+    /// Predict the attainable calibration accuracy of the first N structures; 0 for none.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(0..=10_000))]
     bounds: u32,
-    /// Structures, the first of them, whose experiment is simulated, calibrated by `joint` and scored; 3 if no number is
-    /// given.
+    /// Simulate the experiment of the first N structures, calibrate it by `joint` and score it; 3 if no number is given.
     #[arg(long, value_name = "N", num_args = 0..=1, default_value_t = 0, default_missing_value = "3",
         value_parser = clap::value_parser!(u32).range(0..=10_000))]
     calibrate: u32,
     /// Change a value of the scene first: superstructure.as_built.tilt_sd_deg=0.1.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// A limit to keep, else the exit code is 1: "direction_deg.p95<=2", "facets.*.point_at_4m_mm.max<500". May be given
-    /// more than once.
+    /// A limit to meet, otherwise the exit code is 1: "direction_deg.p95<=2", "facets.*.point_at_4m_mm.max<500". May be
+    /// given more than once.
     #[arg(long, value_name = "FIGURE<=NUMBER")]
     require: Vec<String>,
-    /// Write tolerance.json, the plot and a page, report.html, into this folder.
+    /// Write tolerance.json, the plot and a page, report.html, to this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print every figure as JSON.
+    /// Print all figures as JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// A requirement as it is given.
+/// An example of a requirement.
 const EXAMPLE: &str = "direction_deg.p95<=2";
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
@@ -102,12 +101,12 @@ fn distribution(of: &Distribution, unit: &str, decimals: usize) -> String {
     )
 }
 
-/// An analysis for people.
+/// An analysis as text.
 fn text(found: &Tolerance) -> String {
     let errors = &found.errors;
     let last = found.seed.wrapping_add(found.draws.saturating_sub(1) as u64);
     let mut text = format!(
-        "{}: {} structures as built, seeds {} to {last}\n  facets turned by {}°, shifted by {} mm, thicker by {} mm (1σ), uneven by \
+        "{}: {} structures as built, seeds {} to {last}\n  facets turned by {}°, shifted by {} mm, thicker by {} mm (1σ), slope error \
          {} mrad; scanner within {}° of yaw, {}° of tilt, {} mm\n  before calibration:\n  directions {}\n  points at 4 m {}\n",
         found.name,
         found.draws,

@@ -1,4 +1,4 @@
-//! `catoptric trace`: any rays through a scene, and the paths they take.
+//! `catoptric trace`: traces arbitrary rays through a scene and writes their paths.
 
 use super::Context;
 use super::error::CliError;
@@ -12,22 +12,22 @@ use std::path::PathBuf;
 /// Arguments of `trace`.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// The scene, TOML or JSON. It needs neither scanner nor laboratory.
+    /// The scene, TOML or JSON. It needs neither a scanner nor a laboratory.
     scene: PathBuf,
     /// The rays, in the room frame: CSV with the columns x_m,y_m,z_m,dx,dy,dz, or a NumPy array of N × 6.
     #[arg(long, value_name = "IN")]
     rays: PathBuf,
-    /// Where to write the paths: CSV, a line for every vertex, or a NumPy array of N × 3 (distance to the first vertex
-    /// or inf, number of the surface at the end or -1, length of the whole path or inf).
+    /// The paths to write: CSV with one line per vertex, or a NumPy array of N × 3 (distance to the first vertex or inf,
+    /// number of the surface at the end or -1, total length of the path or inf).
     #[arg(long, value_name = "OUT")]
     out: PathBuf,
     /// Change a value first: room.mirror.0.yaw_deg=30.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Mirrors that a ray may meet.
+    /// Maximum number of reflections of a ray.
     #[arg(long, value_name = "N", default_value_t = MAX_BOUNCES)]
     max_bounces: u16,
-    /// Print figures of the run as JSON.
+    /// Print the figures of the run as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -58,7 +58,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     ))
 }
 
-/// A pipe that nobody reads any more is no error.
+/// A pipe closed by its reader is not an error.
 fn quiet(error: Error) -> CliError {
     match error {
         Error::File(IoError::Write { source, .. }) if source.kind() == ErrorKind::BrokenPipe => {

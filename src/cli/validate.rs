@@ -1,4 +1,4 @@
-//! `catoptric validate`: whether a calibration, whoever wrote it, is well formed and physically sane.
+//! `catoptric validate`: checks that a calibration, from any source, is well formed and physically plausible.
 
 use super::calibrate::summary;
 use super::error::CliError;

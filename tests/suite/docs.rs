@@ -1,7 +1,7 @@
-//! The documents say what is so: crates, files, commands, keys and printed figures are compared with the real ones.
+//! The documents are correct: crates, files, commands, keys and printed figures are compared with the real ones.
 //!
-//! These prove that what the documents name exists, and that what they have to name is there. They do not prove that
-//! the sentences around it are true; the examples of the guide are run as doc tests.
+//! These prove that everything the documents name exists, and that everything they must name is there. They do not prove
+//! that the sentences are true; the examples of the guide are run as doctests.
 
 use crate::common::{run, stdout};
 use catoptric::files::scene::{self, Template};
@@ -23,7 +23,7 @@ fn read(path: &str) -> String {
     fs::read_to_string(root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
 }
 
-/// Every file below a folder, with its path from the repository's root.
+/// All files below a folder, with their paths relative to the root of the repository.
 fn files_below(folder: &str) -> Vec<String> {
     let mut found = Vec::new();
     for entry in fs::read_dir(root().join(folder)).unwrap() {
@@ -48,7 +48,7 @@ fn documents() -> Vec<(String, String)> {
     paths.into_iter().map(|p| (p.clone(), read(&p))).collect()
 }
 
-/// What stands between single backquotes, outside of code blocks.
+/// The text between single backquotes, outside code blocks.
 fn code_words(text: &str) -> Vec<String> {
     let prose: Vec<&str> = text.split("```").step_by(2).collect();
     let prose = prose.concat();
@@ -110,7 +110,7 @@ fn dependencies(package: &str) -> BTreeSet<String> {
         .collect();
     assert!(
         names.contains(package),
-        "cargo tree says nothing of {package}:\n{text}"
+        "cargo tree does not list {package}:\n{text}"
     );
     names
 }
@@ -141,7 +141,7 @@ fn the_estimator_cannot_see_the_truth() {
         !sim.contains("catoptric-calib") && !sim.contains("catoptric"),
         "{sim:?}"
     );
-    // The names looked for are those that cargo prints.
+    // Names as printed by cargo.
     assert!(
         has(&sim, "parry") && has(&sim, "rand") && sim.contains("catoptric-model"),
         "{sim:?}"
@@ -151,7 +151,7 @@ fn the_estimator_cannot_see_the_truth() {
 #[test]
 fn every_scene_is_valid() {
     let mut scenes = files_below("scenes");
-    // Beside them are the meshes that they name.
+    // Meshes are stored next to the scenes that refer to them.
     scenes.retain(|p| p.ends_with(".toml"));
     assert!(scenes.len() >= 2, "{scenes:?}");
     for path in scenes {
@@ -162,7 +162,7 @@ fn every_scene_is_valid() {
 }
 
 #[test]
-fn links_lead_somewhere() {
+fn links_have_targets() {
     let mut links = 0;
     for (path, text) in documents() {
         let folder = root().join(&path).parent().unwrap().to_owned();
@@ -181,7 +181,7 @@ fn links_lead_somewhere() {
             } else if !target.starts_with("https://") {
                 assert!(
                     folder.join(target).exists(),
-                    "{path} links to {target}, which is not there"
+                    "{path} links to {target}, which does not exist"
                 );
             }
         }
@@ -190,7 +190,7 @@ fn links_lead_somewhere() {
 }
 
 #[test]
-fn files_that_documents_name_exist() {
+fn files_named_in_documents_exist() {
     let folders = [
         "crates/",
         "src/",
@@ -209,7 +209,7 @@ fn files_that_documents_name_exist() {
                 named += 1;
                 assert!(
                     root().join(&word).exists(),
-                    "{path} names {word}, which is not there"
+                    "{path} names {word}, which does not exist"
                 );
             }
         }
@@ -313,7 +313,7 @@ fn verbs() -> BTreeSet<String> {
     verbs
 }
 
-/// Every `catoptric …` command that a document shows, as words.
+/// Every `catoptric …` command shown in a document, as words.
 fn commands_of_the_program() -> Vec<(String, Vec<String>)> {
     let mut commands = Vec::new();
     for (path, text) in documents() {
@@ -394,7 +394,7 @@ fn the_demo_prints_what_the_readme_says() {
     }
 }
 
-/// Paths of all keys of a value; lists are `name[]`, maps with free keys end where they are named.
+/// Paths of all keys of a value; lists are written `name[]`, and maps with free keys are not descended into.
 fn keys(value: &Value, free: &[&str]) -> BTreeSet<String> {
     fn walk(value: &Value, path: &str, free: &[&str], found: &mut BTreeSet<String>) {
         match value {
@@ -661,7 +661,7 @@ fn documented_figures_of_a_tolerance_are_those_of_its_json() {
     );
 }
 
-/// The files that the picture of a dataset's folder lists.
+/// The files listed in the picture of a dataset folder.
 fn files_of_dataset(text: &str) -> Vec<String> {
     let picture = &code_blocks(text, "text")[0];
     let files: Vec<String> = picture

@@ -1,7 +1,7 @@
-//! The front door: what a user of the library writes compiles outside of this workspace, long verbs stop on request and
-//! leave nothing behind, and the program can be run as a function.
+//! The public API: a crate outside this workspace compiles against it, long verbs stop on request and leave no files
+//! behind, and the program can be called as a function.
 //!
-//! That the numbers are right is for `pipeline`, `closure` and `consistency`; how soon a verb stops is measured by
+//! The correctness of results is covered by `pipeline`, `closure` and `consistency`; how soon a verb stops is measured by
 //! `.ci/long`, not here.
 
 use catoptric::calib::plan::Request;
@@ -16,7 +16,7 @@ use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// The program that the library's documentation begins with, as a crate of somebody else.
+/// The example at the top of the library's documentation, as an external crate.
 const OUTSIDE: &str = r#"
 fn main() -> Result<(), catoptric::Error> {
     let scene = catoptric::Scene::load("mine.toml")?;
@@ -37,8 +37,8 @@ fn small() -> Scene {
         .unwrap()
 }
 
-/// A control that stops at the first report of progress that something is done.
-fn stops_at_once() -> Control {
+/// A control that requests a stop at the first progress report of finished work.
+fn stops_immediately() -> Control {
     let stop = Stop::default();
     let requested = stop.clone();
     Control {
@@ -53,7 +53,7 @@ fn stopped<T>(result: Result<T, Error>) -> bool {
 }
 
 #[test]
-fn a_crate_outside_of_the_workspace_scores_a_calibration() {
+fn a_crate_outside_the_workspace_scores_a_calibration() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let manifest = format!(
         "[package]\nname = \"outside\"\nversion = \"0.0.0\"\nedition = \"2024\"\n[workspace]\n[dependencies]\n\
@@ -65,7 +65,7 @@ fn a_crate_outside_of_the_workspace_scores_a_calibration() {
     std::fs::write(at.path().join("Cargo.toml"), manifest).unwrap();
     std::fs::write(at.path().join("mine.toml"), Template::TwoMirror.text()).unwrap();
     std::fs::write(at.path().join("src/main.rs"), OUTSIDE).unwrap();
-    // The same versions as here, so that nothing is fetched.
+    // The same versions as here, so that nothing is downloaded.
     std::fs::copy(root.join("Cargo.lock"), at.path().join("Cargo.lock")).unwrap();
     let output = Command::new(env!("CARGO"))
         .args(["run", "--quiet", "--offline", "--target-dir"])
@@ -87,7 +87,7 @@ fn a_crate_outside_of_the_workspace_scores_a_calibration() {
 
 #[test]
 fn long_verbs_stop_on_request_and_leave_nothing_behind() {
-    let (scene, control) = (small(), stops_at_once());
+    let (scene, control) = (small(), stops_immediately());
     let at = tempfile::tempdir().unwrap();
     assert!(stopped(simulate_with(&scene, &control)));
     let out = at.path().join("data");
@@ -95,7 +95,7 @@ fn long_verbs_stop_on_request_and_leave_nothing_behind() {
         &scene,
         &out,
         &Recording::default(),
-        &stops_at_once()
+        &stops_immediately()
     )));
     let left: Vec<_> = at.path().read_dir().unwrap().collect();
     assert!(left.is_empty(), "{left:?}");
@@ -112,14 +112,14 @@ fn long_verbs_stop_on_request_and_leave_nothing_behind() {
 
     let contestants = vec![Contestant::named("beam").unwrap()];
     let four = Study::of_scene(scene.resolved().clone(), 4, contestants);
-    assert!(stopped(study(&four, &stops_at_once())));
+    assert!(stopped(study(&four, &stops_immediately())));
     let folder = at.path().join("study");
     assert!(stopped(study_into(
         &four,
         Part::WHOLE,
         false,
         &folder,
-        &stops_at_once()
+        &stops_immediately()
     )));
     let whole = study_into(&four, Part::WHOLE, false, &folder, &Control::default()).unwrap();
     assert_eq!(whole.methods[0].runs, 4);
@@ -129,7 +129,7 @@ fn long_verbs_stop_on_request_and_leave_nothing_behind() {
         bounds: 0,
         ..ToleranceOptions::default()
     };
-    assert!(stopped(tolerance(&scene, &draws, &stops_at_once())));
+    assert!(stopped(tolerance(&scene, &draws, &stops_immediately())));
 
     let start = PlanStart::of_scene(&scene).unwrap();
     let request = Request {
@@ -137,7 +137,7 @@ fn long_verbs_stop_on_request_and_leave_nothing_behind() {
         ..Request::default()
     };
     let facets = start.facets(&[]).unwrap();
-    assert!(stopped(plan(&start, &facets, &request, &stops_at_once())));
+    assert!(stopped(plan(&start, &facets, &request, &stops_immediately())));
 
     let rays = at.path().join("rays.csv");
     std::fs::write(&rays, "x_m,y_m,z_m,dx,dy,dz\n0,0,0,1,0,0\n").unwrap();
@@ -166,7 +166,7 @@ fn threads_and_progress_change_no_result() {
 }
 
 #[test]
-fn the_program_runs_as_a_function_again_and_again() {
+fn the_program_runs_as_a_function_repeatedly() {
     let at = tempfile::tempdir().unwrap();
     let scene = at.path().join("mine.toml");
     let dataset = at.path().join("data");
@@ -183,7 +183,7 @@ fn the_program_runs_as_a_function_again_and_again() {
         "--set",
         "scanner.sub_rays=1",
     ];
-    // The number of threads holds for one run, not for those after it.
+    // The number of threads applies to one run, not to later ones.
     for threads in ["1", "2"] {
         let simulate = [
             "simulate",

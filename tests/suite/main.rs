@@ -1,4 +1,4 @@
-//! One binary for all integration tests; each module says what it proves and what it does not.
+//! One binary for all integration tests; each module documents what it proves and what it does not.
 #![allow(clippy::unwrap_used, clippy::print_stderr, missing_docs)]
 
 mod bad_geometry;

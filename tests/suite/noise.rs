@@ -1,6 +1,6 @@
-//! What is by chance in readings: its moments, its distribution, and what it shares with other readings.
+//! Random effects of readings: their moments, their distribution, and their correlation with other readings.
 //!
-//! Seeds are fixed and bounds are those of 99.9 %. None of this proves that a real scanner's noise is like that.
+//! Seeds are fixed and bounds are at 99.9 %. None of this proves that the noise of a real scanner is like that.
 
 use crate::scenes::{BARE, scene};
 use catoptric::sim::noise::{Draws, Purpose};
@@ -14,7 +14,7 @@ use rand_distr::{Distribution, StandardNormal, Uniform};
 /// A closed room, recorded without boards: stretch 1.
 const ROOM: usize = 1;
 
-/// A laboratory whose second stretch is so many scans of four walls with the noise of Table 2, and nothing else.
+/// A laboratory whose second stretch is a given number of scans of four walls with only the noise of Table 2.
 fn noisy_room(scans: u32, edit: impl FnOnce(&mut Scene)) -> Laboratory {
     let mut scene = scene(BARE);
     scene.scanner.sub_rays = 1;
@@ -24,10 +24,10 @@ fn noisy_room(scans: u32, edit: impl FnOnce(&mut Scene)) -> Laboratory {
     scene.experiment.room_scans = scans;
     scene.experiment.bare_scans = 1;
     edit(&mut scene);
-    Laboratory::new(&scene, 3).expect("the scene is good")
+    Laboratory::new(&scene, 3).expect("the scene is valid")
 }
 
-/// What each reading is off the noise-free range.
+/// The error of each reading against the noise-free range.
 fn errors(laboratory: &Laboratory) -> Vec<f64> {
     let returns = laboratory.returns(ROOM).expect("colors are built in");
     let ranges = laboratory.record(ROOM, &returns).ranges;
@@ -42,13 +42,13 @@ fn errors(laboratory: &Laboratory) -> Vec<f64> {
         .collect()
 }
 
-/// Mean of the products of numbers so many places apart, over n − lag terms.
+/// Mean of the products of numbers at a given lag, over n − lag terms.
 fn lagged(z: &[f64], lag: usize) -> f64 {
     let sum: f64 = z.iter().zip(&z[lag..]).map(|(a, b)| a * b).sum();
     sum / (z.len() - lag) as f64
 }
 
-/// All six statistics at 99.9 % each; their seed is fixed.
+/// All six statistics at 99.9 % each, with a fixed seed.
 #[test]
 fn a_million_readings_are_white_and_normal() {
     const Z: f64 = 3.2905;
@@ -68,12 +68,12 @@ fn a_million_readings_are_white_and_normal() {
     assert!((moment(1)).abs() < Z / n.sqrt(), "mean");
     assert!((moment(2) - 1.0).abs() < Z * (2.0 / n).sqrt(), "variance");
     assert!((moment(4) - 3.0).abs() < Z * (96.0 / n).sqrt(), "fourth moment");
-    assert!(lagged(&z, 1).abs() < Z / n.sqrt(), "neighbouring beams");
+    assert!(lagged(&z, 1).abs() < Z / n.sqrt(), "neighboring beams");
     assert!(
         lagged(&z, ust20lx::COUNT).abs() < Z / n.sqrt(),
         "successive scans"
     );
-    // Kolmogorov and Smirnov: 1.9495/√n is exceeded once in a thousand.
+    // Kolmogorov–Smirnov: 1.9495/√n is exceeded once in a thousand.
     z.sort_by(f64::total_cmp);
     let normal = |x: f64| 0.5 * libm::erfc(-x / std::f64::consts::SQRT_2);
     let distance = z
@@ -88,7 +88,7 @@ fn a_million_readings_are_white_and_normal() {
 }
 
 #[test]
-fn without_noise_a_thousand_scans_are_one() {
+fn without_noise_a_thousand_scans_are_identical() {
     for model in [ErrorModel::None, ErrorModel::Physical, ErrorModel::Both] {
         let laboratory = noisy_room(1000, |scene| {
             scene.errors.model = model;
@@ -105,7 +105,7 @@ fn without_noise_a_thousand_scans_are_one() {
 }
 
 #[test]
-fn correlated_noise_forgets_as_it_is_told_and_is_recomputed_alone() {
+fn correlated_noise_decays_as_specified_and_is_recomputed_alone() {
     const Z: f64 = 3.2905;
     let laboratory = noisy_room(400, |scene| {
         scene.errors.noise.sd_mm = vec![0.0; 3];
@@ -141,7 +141,7 @@ fn correlated_noise_forgets_as_it_is_told_and_is_recomputed_alone() {
 }
 
 #[test]
-fn interference_steps_are_rare_and_even() {
+fn interference_steps_are_rare_and_uniform() {
     let (scans, probability) = (200, 0.01);
     let laboratory = noisy_room(scans, |scene| {
         scene.errors.noise.sd_mm = vec![0.0; 3];

@@ -1,6 +1,6 @@
-//! Parameters, expressions and patterns of a scene: what they come to, and what is said of those that come to nothing.
+//! Parameters, expressions and patterns of a scene: their values, and the messages for invalid ones.
 //!
-//! Places of errors are computed here by searching the text. That a copy is where its original's mirror image is, is
+//! Expected error locations are found by searching the text. That a copy is at the mirror image of its original is
 //! proven in `crates/sim/src/build/pattern/tests.rs`.
 
 use crate::bad_input::{expect_one_in, place_of, problems_with};
@@ -51,7 +51,7 @@ fn the_parametric_prototype_is_the_prototype() {
             (&wanted.name, wanted.size_mm, wanted.yaw_deg)
         );
         for (found, written) in post.center_mm.iter().zip(wanted.center_mm) {
-            // The prototype's are written to a tenth of a millimetre.
+            // Those of the prototype are rounded to a tenth of a millimeter.
             assert!(
                 (found - written).abs() <= 0.05,
                 "{}: {found} {written}",
@@ -60,7 +60,7 @@ fn the_parametric_prototype_is_the_prototype() {
         }
     }
     assert_eq!(made.superstructure.post.len(), by_hand.superstructure.post.len());
-    // All else is the same word by word.
+    // Everything else is identical.
     let mut made = made;
     made.name = by_hand.name.clone();
     made.parameters.clear();
@@ -70,7 +70,7 @@ fn the_parametric_prototype_is_the_prototype() {
 }
 
 #[test]
-fn a_scene_worked_out_reads_back_as_itself() {
+fn an_evaluated_scene_is_read_back_unchanged() {
     let scene = parsed(PARAMETRIC, &["parameters.gap_deg=1.25"]);
     let text = scene::to_toml(&scene).unwrap();
     assert!(!text.contains("pattern") && !text.contains("\"="), "{text}");
@@ -92,7 +92,7 @@ fn a_parameter_is_set_by_its_name() {
     assert_eq!(distance(&parsed(&text, &[])), 70.0);
     let set = parsed(&text, &["parameters.far_mm=70"]);
     assert_eq!((distance(&set), set.parameters["more_mm"].value), (80.0, 75.0));
-    // Its limits stay, and are kept.
+    // Its limits remain and are enforced.
     assert_eq!(set.parameters["far_mm"].high, Some(80.0));
     let problems = problems_with(&text, &["parameters.far_mm=90"]);
     assert_eq!(
@@ -104,12 +104,12 @@ fn a_parameter_is_set_by_its_name() {
         problems.list[0].message,
         "the scene has no parameter `fra_mm`; did you mean parameters.far_mm?"
     );
-    // A set may be an expression itself.
+    // A setting may itself be an expression.
     let set = parsed(&text, &["parameters.far_mm= = 2 * 33"]);
     assert_eq!(distance(&set), 76.0);
 }
 
-/// The parametric prototype with one part replaced: one problem at `at`, saying all of `words`.
+/// The parametric prototype with one part replaced: one problem at `at`, with all of `words`.
 #[track_caller]
 fn expect_one(from: &str, to: &str, at: &str, words: &[&str]) {
     assert_eq!(PARAMETRIC.matches(from).count(), 1, "{from:?} must occur once");
@@ -117,7 +117,7 @@ fn expect_one(from: &str, to: &str, at: &str, words: &[&str]) {
 }
 
 #[test]
-fn a_wrong_expression_is_shown_where_it_is_wrong() {
+fn a_wrong_expression_is_reported_where_it_is() {
     let from = "\"= reach_2_mm\"";
     expect_one(
         from,
@@ -150,7 +150,7 @@ fn a_wrong_expression_is_shown_where_it_is_wrong() {
         "sine(90)",
         &["`sine`, which is no function", "did you mean `sin`?"],
     );
-    // A value that is out of range is one, however it came about.
+    // A value out of range is reported, however it was computed.
     expect_one(
         from,
         "\"= reach_2_mm - 90\"",
@@ -160,7 +160,7 @@ fn a_wrong_expression_is_shown_where_it_is_wrong() {
 }
 
 #[test]
-fn a_wrong_parameter_is_shown_where_it_is_wrong() {
+fn a_wrong_parameter_is_reported_where_it_is() {
     expect_one(
         "{ value = 12, low = 8",
         "{ value = 20, low = 8",
@@ -209,7 +209,7 @@ fn a_wrong_parameter_is_shown_where_it_is_wrong() {
 }
 
 #[test]
-fn a_wrong_pattern_is_shown_where_it_is_wrong() {
+fn a_wrong_pattern_is_reported_where_it_is() {
     expect_one(
         "of = [\"left-1\", \"left-2\"",
         "of = [\"left-1\", \"lfet-2\"",
@@ -237,7 +237,7 @@ fn a_wrong_pattern_is_shown_where_it_is_wrong() {
 }
 
 #[test]
-fn a_ring_is_simulated_like_any_facets() {
+fn a_ring_is_simulated_like_any_other_facets() {
     let petal = r#"
         schema_version = 1
         name = "ring"
@@ -252,7 +252,7 @@ fn a_ring_is_simulated_like_any_facets() {
     let found = layout::analyze(&scene, None, Detail::Coarse).unwrap();
     let names: Vec<&str> = found.facets.iter().map(|f| f.name.as_str()).collect();
     assert_eq!(names, ["petal", "petal-2", "petal-3", "petal-4", "petal-5"]);
-    // A step of 30° is 120 beams, so every petal serves the same number of them and looks as high.
+    // A step of 30° is 120 beams, so every petal serves the same number of them at the same elevation.
     for (k, facet) in found.facets.iter().enumerate() {
         let [first, last] = facet.beams.unwrap();
         let [own_first, own_last] = found.facets[0].beams.unwrap();
@@ -264,7 +264,7 @@ fn a_ring_is_simulated_like_any_facets() {
 }
 
 #[test]
-fn a_plate_says_what_it_lacks() {
+fn a_plate_reports_what_it_lacks() {
     let plate = "shape.plate = { azimuth_deg = 70, beam = 800, distance_mm = 60, exit_azimuth_deg = 60, width_mm = 20, height_mm = 20 }";
     let from = VALID.lines().find(|l| l.starts_with("shape.wedge")).unwrap();
     let problems = problems_with(&VALID.replace(from, plate), &[]);
@@ -290,7 +290,7 @@ fn a_plate_says_what_it_lacks() {
 }
 
 #[test]
-fn the_schema_for_editors_lets_numbers_be_expressions() {
+fn the_schema_for_editors_allows_expressions_for_numbers() {
     let schema = scene::file_schema();
     let wedge = &schema["$defs"]["Wedge"]["properties"];
     assert_eq!(
@@ -304,7 +304,7 @@ fn the_schema_for_editors_lets_numbers_be_expressions() {
         schema["$defs"]["Parameter"]["anyOf"][1]["required"],
         serde_json::json!(["value"])
     );
-    // Once worked out, they are numbers again.
+    // Once evaluated, they are numbers again.
     assert_eq!(
         scene::json_schema()["$defs"]["Wedge"]["properties"]["distance_mm"]["type"],
         "number"
@@ -312,13 +312,13 @@ fn the_schema_for_editors_lets_numbers_be_expressions() {
 }
 
 #[test]
-fn text_that_begins_with_an_equals_sign_is_text_where_text_belongs() {
+fn text_that_begins_with_an_equals_sign_is_text_where_text_is_expected() {
     let text = VALID.replacen("name = \"", "name = \"= ", 1);
     assert!(parsed(&text, &[]).name.starts_with("= "));
 }
 
 #[test]
-fn layout_shows_the_corners_it_works_with() {
+fn layout_shows_the_corners_it_uses() {
     let (folder, _) = folder_with(PARAMETRIC);
     let output = run(
         folder.path(),

@@ -1,15 +1,15 @@
-//! Several calibrations of one dataset side by side, and each pair of them against one another.
+//! Comparison of several calibrations of one dataset, side by side and in pairs.
 //!
-//! A pair is compared over the elements that both solved, with δ = (θ_a, φ) of one less the other and P the covariance
-//! each states:
+//! A pair is compared over the elements that both solved, with δ the difference of their (θ_a, φ) and P₁, P₂ the stated
+//! covariances:
 //!
 //! ```text
-//! direction difference   atan2(‖v̂₁×v̂₂‖, v̂₁·v̂₂): rms and largest
-//! normalised square      mean(δᵀ(P₁ + P₂)⁻¹δ) / 2      1 for independent errors as large as stated
+//! direction difference   atan2(‖v̂₁×v̂₂‖, v̂₁·v̂₂): rms and maximum
+//! normalized square      mean(δᵀ(P₁ + P₂)⁻¹δ) / 2      1 for independent errors as large as stated
 //! ```
 //!
-//! Two calibrations of one dataset share its errors, so honest ones differ by less than 1 says; one that is above it
-//! is over-confident on one side at least. This takes no truth.
+//! Two calibrations of one dataset share its errors, so the value of honest ones is below 1; if it is above 1, at least
+//! one of them is over-confident. This needs no truth.
 
 use crate::score::words::foreign;
 use crate::score::{Honesty, Score, Verdict, score};
@@ -22,53 +22,53 @@ use serde::Serialize;
 /// Version of what `compare --json` prints.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// Mean normalised square of the differences above which one of two calibrations is over-confident beyond bad luck: if all
-/// elements share one error, honest and independent calibrations exceed it with probability e⁻⁶.
+/// Mean normalized square of the differences above which one of two calibrations is over-confident beyond statistical
+/// fluctuation: if all elements share one error, honest and independent calibrations exceed it with probability e⁻⁶.
 pub const CONTRADICTION: f64 = crate::score::DISHONEST_NEES;
 
-/// A calibration and what it is called, usually its file.
+/// A calibration with a name, usually that of its file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contestant {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// The calibration.
     pub calibration: Calibration,
 }
 
-/// Several calibrations of one dataset. A figure that does not exist is NaN here and `null` in JSON.
+/// A comparison of several calibrations of one dataset. A figure that does not exist is NaN here and `null` in JSON.
 #[derive(Debug, Clone, Serialize)]
 pub struct Comparison {
     /// Version of this format.
     pub schema_version: u32,
-    /// Whether there is no truth, so that boards and walls are all there is.
+    /// Whether there is no truth, so that only boards and walls are available.
     pub blind: bool,
-    /// One row for each calibration: the least point error at 4 m first, on blind data the least residual on the walls.
+    /// One row per calibration, sorted by point error at 4 m or, on blind data, by the residual on the walls.
     pub rows: Vec<Row>,
-    /// Every pair of them, in the order of the rows.
+    /// All pairs, in the order of the rows.
     pub pairs: Vec<Pair>,
     /// A sentence for each calibration that says that it is of another dataset or scanner.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub failures: Vec<String>,
 }
 
-/// One calibration.
+/// The figures of one calibration.
 #[derive(Debug, Clone, Serialize)]
 pub struct Row {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// Name of its method.
     pub method: String,
-    /// What its score comes to.
+    /// Verdict of its score.
     pub verdict: Verdict,
     /// Whether its errors are as large as it states.
     pub honesty: Option<Honesty>,
     /// Elements with a direction; deflected and unsplit ones, unless the data are blind.
     pub solved: usize,
-    /// Elements without one that say why.
+    /// Elements without a direction but with a reason.
     pub abstained: usize,
-    /// Elements with neither. `None` on blind data, as is the next.
+    /// Elements with neither. `None` on blind data.
     pub missed: Option<usize>,
-    /// Elements solved that no mirror deflects.
+    /// Solved elements that no mirror deflects. `None` on blind data.
     #[serde(rename = "false")]
     pub wrong: Option<usize>,
     /// Per-axis error in the sensor frame.
@@ -79,7 +79,7 @@ pub struct Row {
     pub direction_p95_deg: f64,
     /// Error of a point 4 m behind the mirror, in the sensor frame.
     pub point_4m_mm: f64,
-    /// Mean normalised squared error.
+    /// Mean normalized squared error.
     pub nees_mean: f64,
     /// Share of errors inside their 95 % ellipses.
     pub coverage_95: f64,
@@ -87,16 +87,16 @@ pub struct Row {
     pub efficiency: f64,
     /// Root mean square distance of lifted points from the boards.
     pub boards_rms_mm: f64,
-    /// The same from the walls.
+    /// Root mean square distance of lifted points from the walls.
     pub walls_rms_mm: f64,
 }
 
-/// Two calibrations against one another.
+/// The differences of two calibrations.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Pair {
-    /// The first one's name.
+    /// Name of the first one.
     pub first: String,
-    /// The second one's name.
+    /// Name of the second one.
     pub second: String,
     /// Elements that both solved.
     pub beams: usize,
@@ -104,7 +104,7 @@ pub struct Pair {
     pub direction_rms_deg: f64,
     /// Largest angle between their directions.
     pub direction_max_deg: f64,
-    /// Mean square of the differences, normalised by the sum of both covariances.
+    /// Mean square of the differences, normalized by the sum of both covariances.
     pub normalized_square: f64,
 }
 
@@ -128,7 +128,7 @@ pub fn compare(
             s.walls_mm.rms
         }
     };
-    // NaN, which no figure is, comes last by this order; equal ones stay in the order given.
+    // NaN, a figure that does not exist, sorts last; ties keep their order.
     scored.sort_by(|(_, a), (_, b)| key(a).abs().total_cmp(&key(b).abs()));
     let pairs = scored
         .iter()
@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn pairs_differ_by_what_was_put_in() {
+    fn pairs_differ_by_the_injected_rotation() {
         let s = sample();
         let angle = 0.3_f64.to_radians();
         let found = compare(
@@ -276,7 +276,7 @@ mod tests {
         assert_eq!(pair.beams, found.rows[0].solved);
         assert!(pair.direction_max_deg <= 0.3 + 1e-12 && pair.direction_max_deg > 0.25);
         assert!(pair.direction_rms_deg < pair.direction_max_deg);
-        // Independent errors as stated by both: 1, within six standard deviations of a χ² of 2·beams over as many.
+        // Independent errors as stated by both: 1, within six standard deviations of χ²/2n with 2n = 2·beams.
         let of = |seed| noisy(&s.truth, 1e-3, seed);
         let found = compare(&s.dataset, &[named("a", of(1)), named("b", of(2))], None).expect("in memory");
         let pair = &found.pairs[0];
@@ -286,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn azimuths_a_turn_apart_are_the_same() {
+    fn azimuths_that_differ_by_a_full_turn_are_equal() {
         let s = sample();
         let mut around = perfect(&s.truth);
         for b in &mut around.beams {

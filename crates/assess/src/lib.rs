@@ -1,5 +1,5 @@
-//! How good a calibration is: scored against the truth or against boards and walls, compared with others, applied to a
-//! scan, checked for sanity, and studied over many seeds.
+//! Assessment of calibrations: scoring against the truth or against boards and walls, comparison, application to a scan,
+//! validation, and studies over many seeds.
 
 pub mod apply;
 pub mod compare;

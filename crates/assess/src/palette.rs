@@ -1,6 +1,6 @@
 //! The color of a facet, the same on every page, in every picture and in every exported model.
 
-/// Okabe and Ito's colors, which color-blind readers can distinguish; their yellow is darkened to show on white.
+/// The colors of Okabe and Ito, which color-blind readers can distinguish; the yellow is darkened for a white background.
 const PALETTE: [[u8; 3]; 8] = [
     [0x00, 0x72, 0xB2],
     [0xD5, 0x5E, 0x00],
@@ -12,7 +12,7 @@ const PALETTE: [[u8; 3]; 8] = [
     [0x8A, 0x5A, 0x9E],
 ];
 
-/// The color of the facet of a given number, as sRGB.
+/// Returns the color of a facet by its number, as sRGB.
 pub fn facet_color(facet: usize) -> [u8; 3] {
     PALETTE[facet % PALETTE.len()]
 }

@@ -1,13 +1,13 @@
-//! How a long verb runs: when it stops, whom it reports to, on how many threads.
+//! Control of a long verb: stop request, progress reports, number of threads.
 
 use crate::Error;
 use catoptric_model::Stop;
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
-/// How a long verb runs. The default runs to its end in silence, on all threads of the machine.
+/// Control of a long verb. The default runs to completion without progress reports, on all threads of the machine.
 ///
-/// Nothing here changes a result: a verb that stops has none, and threads change speed only.
+/// Nothing here changes a result: a stopped verb has none, and the number of threads affects speed only.
 ///
 /// ```
 /// use catoptric::{Control, Error, Scene, Template, simulate_with};
@@ -22,28 +22,28 @@ use std::sync::Arc;
 /// ```
 #[derive(Clone, Default)]
 pub struct Control {
-    /// Once it is requested, the verb ends with [`Error::Stopped`] within a tenth of a second and leaves nothing
-    /// half-written.
+    /// Once a stop is requested, the verb ends with [`Error::Stopped`] within a tenth of a second and leaves no
+    /// incomplete files.
     pub stop: Stop,
-    /// Called each time some of the work is done, from one thread at a time.
+    /// Called whenever part of the work is done, from one thread at a time.
     pub progress: Option<Arc<dyn Fn(Progress) + Send + Sync>>,
-    /// Threads to compute with; `None` takes those of the thread pool that the caller is in.
+    /// Number of threads; `None` uses the caller's thread pool.
     pub threads: Option<NonZeroUsize>,
 }
 
-/// How far a verb has come.
+/// Progress of a verb.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
-    /// What it is doing, such as "simulating".
+    /// The current activity, such as "simulating".
     pub doing: &'static str,
     /// Steps done since the last report.
     pub more: usize,
-    /// Steps in all.
+    /// Total number of steps.
     pub of: usize,
 }
 
 impl Control {
-    /// Runs some work on the threads that were asked for.
+    /// Runs some work on the requested number of threads.
     pub(crate) fn run<T: Send>(&self, work: impl FnOnce() -> Result<T, Error> + Send) -> Result<T, Error> {
         self.check()?;
         match self.threads {
@@ -56,12 +56,12 @@ impl Control {
         }
     }
 
-    /// An error once stopping was requested.
+    /// Returns an error once a stop has been requested.
     pub(crate) fn check(&self) -> Result<(), Error> {
         Ok(self.stop.check()?)
     }
 
-    /// Reports that some more of the work is done.
+    /// Reports `more` steps done, out of `of`.
     pub(crate) fn report(&self, doing: &'static str, more: usize, of: usize) {
         if let Some(progress) = &self.progress {
             progress(Progress { doing, more, of });

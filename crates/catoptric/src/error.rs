@@ -1,4 +1,4 @@
-//! What can keep a verb from its result: one error for the whole library.
+//! Why a verb can fail: one error type for the whole library, with help texts and exit codes.
 
 use catoptric_assess::apply::ApplyError;
 use catoptric_assess::study::StudyError;
@@ -10,24 +10,24 @@ use catoptric_sim::SimError;
 
 /// Why a verb has no result.
 ///
-/// A calibration that is not good enough is no error but a [`Verdict`](crate::Verdict); an element that cannot be
-/// solved is data, a [`Status`](crate::model::Status) with its reason.
+/// A calibration that is not good enough is not an error but a [`Verdict`](crate::Verdict); an element that cannot be
+/// solved is data, a [`Status`](crate::model::Status) with a reason.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A scene that cannot be read, or everything that is wrong with it, with line and column.
+    /// A scene cannot be read or is invalid; lists every problem with line and column.
     #[error(transparent)]
     Scene(#[from] SceneErrors),
-    /// A valid scene that still cannot be set up.
+    /// A valid scene cannot be set up.
     #[error(transparent)]
     Setup(#[from] SimError),
-    /// A file that cannot be read, written or understood.
+    /// A file cannot be read, written or parsed.
     #[error(transparent)]
     File(#[from] IoError),
-    /// A dataset that cannot be calibrated, or a request that no calibration can meet.
+    /// A dataset cannot be calibrated, or no calibration can meet the request.
     #[error("cannot calibrate: {0}")]
     Calibration(CalibError),
-    /// A dataset that cannot be turned into the cloud asked for.
+    /// A dataset cannot be turned into the requested point cloud.
     #[error(transparent)]
     Apply(ApplyError),
     /// Readings that a dataset's recording gives no more.
@@ -36,15 +36,15 @@ pub enum Error {
     /// A study that cannot be begun, gone on with or merged.
     #[error(transparent)]
     Study(StudyError),
-    /// Goals, parameters or requirements that a search cannot use.
+    /// A search cannot use the given goals, parameters or requirements.
     #[cfg(feature = "design")]
     #[error(transparent)]
     Optimize(#[from] catoptric_design::optimize::OptimizeError),
-    /// A requirement that no figure answers to.
+    /// A requirement names no existing figure.
     #[cfg(feature = "design")]
     #[error(transparent)]
     Requirement(#[from] catoptric_design::layout::RequirementError),
-    /// A request that makes no sense as it was given.
+    /// An invalid request.
     #[error("{message}")]
     Invalid {
         /// What is wrong.
@@ -55,13 +55,13 @@ pub enum Error {
     /// The work was stopped through [`Control::stop`](crate::Control::stop).
     #[error(transparent)]
     Stopped(#[from] Stopped),
-    /// The system gave no threads.
-    #[error("no threads to compute with: {0}")]
+    /// The system could not start the threads.
+    #[error("cannot start threads: {0}")]
     Threads(String),
 }
 
 impl Error {
-    /// A request that makes no sense as it was given.
+    /// Creates an error for an invalid request.
     pub(crate) fn invalid(message: impl Into<String>, help: Option<&str>) -> Self {
         Self::Invalid {
             message: message.into(),
@@ -69,7 +69,7 @@ impl Error {
         }
     }
 
-    /// What to do about it, where that is known.
+    /// What to do about it, if known.
     pub fn help(&self) -> Option<String> {
         match self {
             Self::Invalid { help, .. } => help.clone(),
@@ -90,8 +90,7 @@ impl Error {
         }
     }
 
-    /// What the program `catoptric` exits with: 2 for invalid input, 3 where reading or writing failed, 130 where it
-    /// was stopped.
+    /// Exit code of the program `catoptric`: 2 for invalid input, 3 if reading or writing failed, 130 if it was stopped.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Stopped(_) => 130,

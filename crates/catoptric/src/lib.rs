@@ -1,7 +1,7 @@
 //! Catoptric: a simulator and calibration testbed for 2D LiDARs that see in 3D through mirrors.
 //!
-//! A scene becomes a dataset as a laboratory would record it, with the truth beside it; an estimator that never sees
-//! the truth turns the dataset into a calibration; a score says how well it did:
+//! A scene is simulated into a dataset as a laboratory would record it, along with the truth; an estimator that never
+//! sees the truth turns the dataset into a calibration; a score reports how good the calibration is:
 //!
 //! ```
 //! # fn main() -> Result<(), catoptric::Error> {
@@ -22,12 +22,12 @@
 //! # The nouns
 //!
 //! - [`Scene`]: an experiment as a person writes it; [`Template`] has four to start from
-//! - [`Dataset`]: what a laboratory recorded, ours or a real one ([`read_dataset`], [`simulate_into`])
-//! - [`Truth`]: what was really simulated; a dataset without it is blind
-//! - [`Characterization`]: the errors of the bare sensor (step 1)
-//! - [`Calibration`]: for every beam (θ, φ) and d with covariance, or a [`Status`](model::Status) and a reason
-//! - [`PointCloud`]: a scan through a calibration
-//! - [`Score`]: how far off it is, at what limit, and whether it knows
+//! - [`Dataset`]: what a laboratory recorded, simulated or real ([`read_dataset`], [`simulate_into`])
+//! - [`Truth`]: what was simulated; a dataset without it is blind
+//! - [`Characterization`]: the range errors of the bare sensor (step 1)
+//! - [`Calibration`]: for every element (θ, φ) and d with covariance, or a [`Status`](model::Status) and a reason
+//! - [`PointCloud`]: the readings of a stretch as points, given a calibration
+//! - [`Score`]: the errors of a calibration, their bounds, and whether its covariance is honest
 //!
 //! # The verbs
 //!
@@ -42,14 +42,15 @@
 //! | [`Scene`] | [`study`](fn@study), [`study_into`], [`merge_studies`] | [`Summary`](study::Summary) |
 //! | [`Scene`] or [`Dataset`] | [`plan`](fn@plan) | [`Plan`](calib::plan::Plan) |
 //! | [`Scene`] | [`layout`](fn@layout), [`optimize`](fn@optimize), [`tolerance`](fn@tolerance), [`export`](fn@export) | figures, better scenes, files |
-//! | all of it | [`report`](fn@report) | a page |
+//! | any of these | [`report`](fn@report) | a page |
 //!
-//! Long verbs take a [`Control`]: stop, progress, threads. Every verb fails with one [`Error`].
+//! Long verbs take a [`Control`]: stop, progress, threads. All verbs share one [`Error`].
 //!
-//! # The rooms
+//! # The crates
 //!
-//! [`model`] is the vocabulary, [`cast`] rays against surfaces, [`sim`] the world, [`calib`] the estimator, [`files`] every file format; [`testing`]
-//! (feature `testing`) has property tests and gates for CI. The [`guide`] explains it chapter by chapter.
+//! [`model`] is the vocabulary, [`cast`] intersects rays with surfaces, [`sim`] is the simulator, [`calib`] the
+//! estimator, [`files`] every file format; [`testing`] (feature `testing`) has property tests and gates for CI. The
+//! [`guide`] explains everything chapter by chapter.
 #![cfg_attr(not(feature = "testing"), doc = "\n[`testing`]: https://docs.rs/catoptric")]
 
 mod control;

@@ -1,4 +1,4 @@
-//! A scene as its author keeps it: the text, where it stands, what was changed, and what it comes to.
+//! A scene as its author keeps it: the text, its file, the settings that change it, and the resolved scene.
 
 use crate::Error;
 use catoptric_files::scene::{self, Template};
@@ -28,18 +28,18 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Reads a scene file and the meshes that it names.
+    /// Reads a scene file and the meshes it refers to.
     ///
     /// # Errors
-    /// [`Error::Scene`]: the file cannot be read, or everything that is wrong with it.
+    /// [`Error::Scene`] if the file cannot be read or is invalid; lists every problem.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
         Self::load_with(path, &[] as &[&str])
     }
 
-    /// Reads a scene file and changes it by settings such as `experiment.scans_per_pose=20`.
+    /// Reads a scene file and applies settings such as `experiment.scans_per_pose=20`.
     ///
     /// # Errors
-    /// As [`load`](Self::load); what is wrong with a setting names the setting.
+    /// Same as [`load`](Self::load); a problem with a setting names the setting.
     pub fn load_with(path: impl AsRef<Path>, settings: &[impl AsRef<str>]) -> Result<Self, Error> {
         let path = path.as_ref();
         let settings = owned(settings);
@@ -55,10 +55,10 @@ impl Scene {
         })
     }
 
-    /// Reads a scene from TOML text; the meshes that it names are looked for in the current folder.
+    /// Reads a scene from TOML text; mesh files are looked up in the current folder.
     ///
     /// # Errors
-    /// [`Error::Scene`] with everything that is wrong with it.
+    /// [`Error::Scene`] with every problem.
     pub fn parse(text: &str) -> Result<Self, Error> {
         Self::parse_in(text, "scene.toml", ".", &[] as &[&str])
     }
@@ -66,7 +66,7 @@ impl Scene {
     /// Reads a scene from text as if it were a file of this name (JSON if it ends in `.json`) in this folder.
     ///
     /// # Errors
-    /// As [`load_with`](Self::load_with).
+    /// Same as [`load_with`](Self::load_with).
     pub fn parse_in(
         text: &str,
         name: &str,
@@ -88,7 +88,7 @@ impl Scene {
     /// A built-in scene to start from.
     #[expect(
         clippy::missing_panics_doc,
-        reason = "a built-in scene is valid: a test reads them all"
+        reason = "built-in scenes are valid: a test reads them all"
     )]
     pub fn template(template: Template) -> Self {
         let name = format!("{}.toml", template.name());
@@ -98,10 +98,10 @@ impl Scene {
         }
     }
 
-    /// The same scene with more settings.
+    /// The same scene with additional settings.
     ///
     /// # Errors
-    /// [`Error::Scene`] with everything that is wrong with it then.
+    /// [`Error::Scene`] with every problem of the changed scene.
     pub fn with(&self, settings: &[impl AsRef<str>]) -> Result<Self, Error> {
         let mut all = self.settings.clone();
         all.extend(owned(settings));
@@ -112,7 +112,7 @@ impl Scene {
         })
     }
 
-    /// The same scene under another seed of every random draw.
+    /// The same scene with another seed of all random effects.
     #[must_use]
     pub fn with_seed(mut self, seed: u64) -> Self {
         self.seed = Some(seed);
@@ -120,7 +120,7 @@ impl Scene {
         self
     }
 
-    /// What the scene comes to: every default, expression, pattern and mesh in its place.
+    /// The resolved scene: every default, expression, pattern and mesh evaluated.
     pub fn resolved(&self) -> &catoptric_sim::Scene {
         &self.resolved
     }
@@ -130,17 +130,17 @@ impl Scene {
         &self.text
     }
 
-    /// The name of its file, as it was given.
+    /// The name of its file, as given.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The folder that the names of meshes start from.
+    /// The folder that mesh file names are relative to.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// The settings that changed it, in order.
+    /// The settings applied to it, in order.
     pub fn settings(&self) -> &[String] {
         &self.settings
     }

@@ -72,7 +72,7 @@ pub(super) fn findings(calibration: &Calibration, score: &Score) -> String {
     let warnings: Vec<&String> = score
         .warnings
         .iter()
-        .filter(|w| !score_words::is_told(w))
+        .filter(|w| !score_words::is_covered_by_report(w))
         .collect();
     if !warnings.is_empty() {
         html += "<ul>\n";

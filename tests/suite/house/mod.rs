@@ -1,10 +1,9 @@
-//! The house keeps its floors: no file imports one that imports it, no folder of a room one that uses it, and no room
-//! one above it.
+//! Layering: no file imports one that imports it, no folder of a crate one that uses it, and no crate one above it.
 //!
-//! What is read are the sources of every package, tests aside: their `use` lines, and paths in code that begin with
-//! `crate`, `super`, a module or a crate. A name that a module only hands on counts for the file that defines it, so a
-//! parent that declares its children and hands their names on imports nothing. It does not see methods: a type's method
-//! may stand in a file above the type's, and be called from anywhere without a path.
+//! The sources of every package are read, tests aside: their `use` lines, and paths in code that begin with `crate`,
+//! `super`, a module or a crate. A re-exported name counts for the file that defines it, so a parent that declares its
+//! children and re-exports their names imports nothing. Methods are not seen: a method may be defined in a file above the
+//! one of its type, and called from anywhere without a path.
 
 mod graph;
 mod source;
@@ -18,16 +17,16 @@ use std::path::{Path, PathBuf};
 /// A room: a package in `crates/`, or the program.
 struct Room {
     name: &'static str,
-    /// Rooms that it stands on; what those stand on it may use as well.
+    /// Rooms that it depends on; it may also use what those depend on.
     on: &'static [&'static str],
-    /// Its folders and files from the ground up, each of which may use those before it; none if any order without a
-    /// circle will do.
+    /// Its folders and files from the bottom up, each of which may use those before it; empty if any acyclic order will
+    /// do.
     floors: &'static [&'static str],
-    /// Whether circles within it are refused; where they are not yet, only its arrows to other rooms are looked at.
+    /// Whether cycles within it are refused; if not yet, only its edges to other rooms are checked.
     untied: bool,
 }
 
-/// The program's package, at the root.
+/// The package of the program, at the root.
 const PROGRAM: &str = "the program";
 
 const fn room(name: &'static str, on: &'static [&'static str]) -> Room {
@@ -102,7 +101,7 @@ const ROOMS: [Room; 16] = [
     room("py", &[PROGRAM]),
 ];
 
-/// The one room that may name each of these packages.
+/// The only room that may name each of these packages.
 const ONE_USER: [(&str, &str); 1] = [("parry3d", "cast")];
 
 fn root() -> PathBuf {
@@ -113,11 +112,11 @@ fn read(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
-/// The rooms that are there, with their folders.
+/// The existing rooms, with their folders.
 fn rooms() -> Vec<(&'static Room, PathBuf)> {
     let known = |name: &str| {
         let room = ROOMS.iter().find(|room| room.name == name);
-        room.unwrap_or_else(|| panic!("crates/{name} has no place in the house"))
+        room.unwrap_or_else(|| panic!("crates/{name} is not among the rooms"))
     };
     let mut found = vec![(known(PROGRAM), root())];
     for entry in std::fs::read_dir(root().join("crates")).unwrap() {
@@ -129,14 +128,14 @@ fn rooms() -> Vec<(&'static Room, PathBuf)> {
     found
 }
 
-/// What a room may use: all below it.
+/// The rooms that a room may use: all below it.
 fn below(room: &Room) -> BTreeSet<&'static str> {
     let mut all = BTreeSet::new();
     let mut open = room.on.to_vec();
     while let Some(name) = open.pop() {
         if all.insert(name) {
             let room = ROOMS.iter().find(|room| room.name == name);
-            open.extend(room.expect("every room named is there").on);
+            open.extend(room.expect("every named room exists").on);
         }
     }
     all
@@ -149,7 +148,7 @@ fn section<'a>(manifest: &'a str, name: &str) -> impl Iterator<Item = &'a str> {
     lines.skip(1).take_while(|line| !line.starts_with('['))
 }
 
-/// The name by which code knows a package's library.
+/// The name by which code refers to a package's library.
 fn library(folder: &Path) -> String {
     let manifest = read(&folder.join("Cargo.toml"));
     let name = section(&manifest, "package").find_map(|line| line.strip_prefix("name = "));
@@ -177,7 +176,7 @@ fn sources() -> (Sources, Vec<(&'static Room, PathBuf)>) {
     (sources, rooms)
 }
 
-/// The room of a file, and what it is in there: a folder, or a file beside the folders.
+/// The room of a file and its place in it: a folder, or a file next to the folders.
 fn place(rooms: &[(&'static Room, PathBuf)], file: &str) -> (&'static str, String) {
     let within = |folder: &PathBuf| {
         Path::new(file)
@@ -193,10 +192,10 @@ fn place(rooms: &[(&'static Room, PathBuf)], file: &str) -> (&'static str, Strin
     (room, first.trim_end_matches(".rs").to_owned())
 }
 
-/// The same arrows between other things: what a name maps to is one of them.
+/// The same edges between other things: those that the names map to.
 fn contracted(graph: &Graph, to: impl Fn(&str) -> Option<String>) -> Graph {
     let mut contracted = Graph::default();
-    for (from, onto, names) in graph.arrows() {
+    for (from, onto, names) in graph.edges() {
         if let (Some(a), Some(b)) = (to(from), to(onto))
             && a != b
         {
@@ -221,9 +220,9 @@ fn short(file: &str) -> &str {
         .trim_start_matches('/')
 }
 
-/// Circles as a person reads them.
-fn told(graph: &Graph) -> Option<String> {
-    let lines = graph.circle()?.into_iter().map(|(from, onto, names)| {
+/// Formats cycles.
+fn formatted_cycles(graph: &Graph) -> Option<String> {
+    let lines = graph.cycle()?.into_iter().map(|(from, onto, names)| {
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         format!(
             "  {} takes {} from {}",
@@ -239,15 +238,15 @@ fn told(graph: &Graph) -> Option<String> {
 fn no_file_imports_one_that_imports_it() {
     let (sources, rooms) = sources();
     let all = sources.graph();
-    assert!(all.arrows().count() > 300, "the sources are not read");
+    assert!(all.edges().count() > 300, "the sources are not read");
     for (room, _) in &rooms {
         let own = contracted(&all, |file| {
             (place(&rooms, file).0 == room.name).then(|| file.to_owned())
         });
         if room.untied
-            && let Some(circle) = told(&own)
+            && let Some(cycle) = formatted_cycles(&own)
         {
-            panic!("a circle of files:\n{circle}");
+            panic!("a cycle of files:\n{cycle}");
         }
     }
 }
@@ -262,18 +261,18 @@ fn no_folder_uses_one_that_uses_it() {
             (name == room.name && floor != "lib" && floor != "main").then_some(floor)
         });
         if room.untied
-            && let Some(circle) = told(&floors)
+            && let Some(cycle) = formatted_cycles(&floors)
         {
-            panic!("a circle of folders in {}:\n{circle}", room.name);
+            panic!("a cycle of folders in {}:\n{cycle}", room.name);
         }
         if room.floors.is_empty() {
             continue;
         }
         let height = |floor: &str| {
             let found = room.floors.iter().position(|f| *f == floor);
-            found.unwrap_or_else(|| panic!("{floor} has no floor in {}", room.name))
+            found.unwrap_or_else(|| panic!("{floor} has no layer in {}", room.name))
         };
-        for (from, onto, names) in floors.arrows() {
+        for (from, onto, names) in floors.edges() {
             assert!(
                 height(from) > height(onto),
                 "in {}, {from} uses {onto}: {names:?}",
@@ -287,9 +286,9 @@ fn no_folder_uses_one_that_uses_it() {
 fn no_room_uses_one_above_it() {
     let (sources, rooms) = sources();
     let all = sources.graph();
-    let arrows = contracted(&all, |file| Some(place(&rooms, file).0.to_owned()));
+    let edges = contracted(&all, |file| Some(place(&rooms, file).0.to_owned()));
     let allowed: BTreeMap<&str, BTreeSet<&str>> = ROOMS.iter().map(|r| (r.name, below(r))).collect();
-    for (from, onto, names) in arrows.arrows() {
+    for (from, onto, names) in edges.edges() {
         assert!(allowed[from].contains(onto), "{from} uses {onto}: {names:?}");
     }
     for (room, folder) in &rooms {
@@ -314,8 +313,12 @@ fn no_room_uses_one_above_it() {
 }
 
 #[test]
-fn the_plan_has_no_circle_itself() {
+fn the_plan_itself_has_no_cycle() {
     for room in &ROOMS {
-        assert!(!below(room).contains(room.name), "{} stands on itself", room.name);
+        assert!(
+            !below(room).contains(room.name),
+            "{} depends on itself",
+            room.name
+        );
     }
 }

@@ -5,17 +5,17 @@ use super::tokens::tokens;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// A path of names, the first of them a crate's where it is absolute.
+/// A path of names; if absolute, the first one is a crate.
 type Names = Vec<String>;
 
-/// A module, which is a file or stands in one.
+/// A module: a file, or part of one.
 #[derive(Debug, Default)]
 struct Module {
     file: String,
     imports: Vec<Import>,
-    /// Paths in its code, as they are written there.
+    /// Paths in its code, as written.
     paths: Vec<Names>,
-    /// The words of its code that begin a path, imports aside.
+    /// First words of paths in its code, except imports.
     words: BTreeSet<String>,
 }
 
@@ -24,7 +24,7 @@ struct Module {
 struct Import {
     path: Names,
     alias: String,
-    /// Whether the name is handed on.
+    /// Whether the name is re-exported.
     public: bool,
 }
 
@@ -33,7 +33,7 @@ struct Import {
 pub(super) struct Sources(BTreeMap<Names, Module>);
 
 impl Sources {
-    /// Reads a crate from its first file on.
+    /// Reads a crate, starting from its root file.
     pub(super) fn add_crate(&mut self, name: &str, file: &Path) {
         self.add_file(vec![name.to_owned()], file);
     }
@@ -58,11 +58,11 @@ impl Sources {
         }
     }
 
-    /// Reads a module and those that stand in its file; the children that have files of their own.
+    /// Reads a module and those inside its file; returns the children that have their own files.
     fn add_text(&mut self, name: &Names, file: &str, text: &str) -> Vec<String> {
         let all = tokens(text);
         let mut children = Vec::new();
-        // The modules that the place is in, with the depth of braces at which each ends.
+        // The modules enclosing the current position, with the brace depth at which each ends.
         let mut open = vec![(name.clone(), 0)];
         let (mut at, mut depth) = (0, 0);
         let mut public = false;
@@ -112,7 +112,7 @@ impl Sources {
             }
             public = match all[at].as_str() {
                 "pub" => true,
-                // Of pub(crate) and the like.
+                // For pub(crate) and the like.
                 "(" | ")" | "crate" | "super" | "in" | "self" => public,
                 _ => false,
             };
@@ -127,7 +127,7 @@ impl Sources {
         module
     }
 
-    /// A path as it is written in a module, from the crate on; none if it begins with a name from elsewhere.
+    /// A path as written in a module, made absolute; `None` if it begins with an external name.
     fn absolute(&self, module: &[String], path: &[String]) -> Option<Names> {
         let from = |base: &[String], rest: &[String]| Some([base, rest].concat());
         match path[0].as_str() {
@@ -150,13 +150,13 @@ impl Sources {
         }
     }
 
-    /// The file that defines what an absolute path leads to, and the name there; none for a module itself.
+    /// The file that defines the target of an absolute path, and the name there; `None` for a module itself.
     fn definition(&self, path: &[String], steps: usize) -> Option<(&str, String)> {
         let mut deepest = (1..=path.len())
             .rev()
             .find(|n| self.0.contains_key(&path[..*n]))?;
         if deepest == path.len() {
-            // A module itself, unless its parent hands on a function of its name.
+            // A module itself, unless its parent re-exports a function of its name.
             deepest -= 1;
             let parent = self.0.get(&path[..deepest])?;
             parent
@@ -166,7 +166,7 @@ impl Sources {
         }
         let module = &self.0[&path[..deepest]];
         let name = &path[deepest];
-        // A name that is handed on is defined where it comes from.
+        // A re-exported name is defined where it comes from.
         let handed = module.imports.iter().find(|import| import.alias == *name);
         if let Some(import) = handed
             && steps > 0
@@ -178,9 +178,9 @@ impl Sources {
         Some((&module.file, name.clone()))
     }
 
-    /// Which file takes what from which.
+    /// Returns which file takes what from which.
     pub(super) fn graph(&self) -> Graph {
-        /// More than a name is ever handed on.
+        /// More than the longest chain of re-exports.
         const STEPS: usize = 8;
         let mut graph = Graph::default();
         for (name, module) in &self.0 {
@@ -216,7 +216,7 @@ fn is_name(token: &str) -> bool {
     token.starts_with(|c: char| c.is_alphabetic() || c == '_')
 }
 
-/// The names that a tree of imports brings.
+/// Collects the names that a tree of imports brings in.
 fn expand(tree: &[String], before: &[String], public: bool, imports: &mut Vec<Import>) {
     let mut path = before.to_vec();
     let mut at = 0;
@@ -261,8 +261,8 @@ fn expand(tree: &[String], before: &[String], public: bool, imports: &mut Vec<Im
 mod tests {
     use super::*;
 
-    /// The arrows of a crate `house` whose files have these texts.
-    fn arrows(files: &[(&str, &str)]) -> Vec<String> {
+    /// The edges of a crate `house` whose files have these texts.
+    fn edges(files: &[(&str, &str)]) -> Vec<String> {
         let mut sources = Sources::default();
         for (name, text) in files {
             let module: Names = std::iter::once("house")
@@ -277,7 +277,7 @@ mod tests {
             sources.add_text(&module, if name.is_empty() { "lib" } else { name }, text);
         }
         let graph = sources.graph();
-        let told = graph.arrows().map(|(from, onto, names)| {
+        let told = graph.edges().map(|(from, onto, names)| {
             let names: Vec<&str> = names.iter().map(String::as_str).collect();
             format!("{from} > {onto}: {}", names.join(" "))
         });
@@ -285,8 +285,8 @@ mod tests {
     }
 
     #[test]
-    fn imports_and_paths_are_arrows() {
-        let found = arrows(&[
+    fn imports_and_paths_are_edges() {
+        let found = edges(&[
             ("", "mod a; mod b; mod c;"),
             (
                 "a",
@@ -306,7 +306,7 @@ mod tests {
 
     #[test]
     fn a_name_counts_for_the_file_that_defines_it() {
-        let found = arrows(&[
+        let found = edges(&[
             ("", "mod parent; pub use parent::Child;"),
             (
                 "parent",
@@ -315,7 +315,7 @@ mod tests {
             ("parent::child", "use super::Used; use crate::Child as Own;"),
             ("parent::other", "pub struct Used;"),
         ]);
-        // To hand a name on is no arrow; to use it is.
+        // Re-exporting a name is not a dependency; using it is.
         assert_eq!(
             found,
             [
@@ -327,7 +327,7 @@ mod tests {
 
     #[test]
     fn a_function_may_have_the_name_of_its_module() {
-        let found = arrows(&[
+        let found = edges(&[
             ("", "mod a; mod b; pub use b::b;"),
             ("a", "use crate::b; fn f() { crate::b(); }"),
             ("b", "pub fn b() {}"),
@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parent_and_its_child_can_be_a_circle() {
+    fn a_parent_and_its_child_can_form_a_cycle() {
         let mut sources = Sources::default();
         let name = |names: &[&str]| names.iter().map(|n| (*n).to_owned()).collect::<Names>();
         sources.add_text(
@@ -349,6 +349,6 @@ mod tests {
             "child",
             "use super::Shared; pub struct Child;",
         );
-        assert_eq!(sources.graph().circle().expect("they import each other").len(), 2);
+        assert_eq!(sources.graph().cycle().expect("they import each other").len(), 2);
     }
 }

@@ -1,6 +1,6 @@
-//! Source as words and signs: without comments, texts and what is compiled for tests alone.
+//! Source code as words and signs: without comments, literals, and code compiled for tests only.
 
-/// What a Rust file is made of.
+/// Splits a Rust file into tokens.
 pub(super) fn tokens(source: &str) -> Vec<String> {
     let mut all = Vec::new();
     let mut rest = source;
@@ -32,7 +32,7 @@ pub(super) fn tokens(source: &str) -> Vec<String> {
     without_tests(&all)
 }
 
-/// Length of the text or character that begins here.
+/// Length of the string or character that begins here.
 fn text(rest: &str) -> Option<usize> {
     let plain = rest.strip_prefix('b').unwrap_or(rest);
     let prefix = rest.len() - plain.len();
@@ -59,7 +59,7 @@ fn text(rest: &str) -> Option<usize> {
     None
 }
 
-/// All but what follows `#[cfg(test)]`.
+/// Everything except what follows `#[cfg(test)]`.
 fn without_tests(all: &[String]) -> Vec<String> {
     const MARK: [&str; 7] = ["#", "[", "cfg", "(", "test", ")", "]"];
     let mut kept = Vec::new();
@@ -76,7 +76,7 @@ fn without_tests(all: &[String]) -> Vec<String> {
     kept
 }
 
-/// How long an item is: up to its semicolon, or to the end of its braces.
+/// Length of an item: up to its semicolon, or to the end of its braces.
 fn item(all: &[String]) -> usize {
     let mut depth = 0;
     for (at, token) in all.iter().enumerate() {
@@ -93,7 +93,7 @@ fn item(all: &[String]) -> usize {
 }
 
 #[test]
-fn comments_texts_and_tests_are_left_out() {
+fn comments_literals_and_tests_are_omitted() {
     let source = r##"
         //! crate::a
         use b::{c as d}; /* crate::e */

@@ -1,4 +1,4 @@
-//! From the readings of a stretch to points in space: Cooper, Eqs. (9) and (10), with a calibration.
+//! Lifts the readings of a stretch to points in space, given a calibration: Cooper, Eqs. (9) and (10).
 
 mod sketch;
 
@@ -15,18 +15,18 @@ pub use sketch::{CloudSketch, Extent};
 /// Why no cloud can be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ApplyError {
-    /// No stretch has the number asked for.
+    /// No stretch has the requested number.
     #[error("the dataset has no pose {asked}; its poses are numbered {first} to {last}")]
     NoSuchPose {
-        /// The number asked for.
+        /// The requested number.
         asked: usize,
-        /// The smallest there is.
+        /// The smallest number in the dataset.
         first: usize,
-        /// The largest there is.
+        /// The largest number in the dataset.
         last: usize,
     },
-    /// No stretch was asked for, and there is none of the room.
-    #[error("the dataset has no stretch of the empty room; say which pose to apply the calibration to")]
+    /// No stretch was requested, and there is none of the empty room.
+    #[error("the dataset has no stretch of the empty room; specify the pose to apply the calibration to")]
     NoRoom,
     /// Readings that the dataset's recording gives no more.
     #[error(transparent)]
@@ -36,14 +36,15 @@ pub enum ApplyError {
     Scanner(#[from] ModelError),
 }
 
-/// Lifts every range of a stretch into space: of pose number `pose`, or else of the first stretch of the empty room.
+/// Lifts every range of a stretch into space: of pose number `pose`, or by default of the first stretch of the empty
+/// room.
 ///
-/// Solved elements follow Eq. 9, direct ones stay in the scan plane, the others are left out and counted. Ranges are
+/// Solved elements follow Eq. (9), direct ones stay in the scan plane, the others are omitted and counted. Ranges are
 /// corrected by E_r and by E_c of the room's color (of the board's, in a stretch with a board), as calibrated or
-/// believed. Unlike the paper's Eq. 3, E_a is not taken off: the incidence on an unknown scene is unknown.
+/// believed. Unlike the paper, Eq. (3), E_a is not subtracted: the incidence on an unknown scene is unknown.
 ///
-/// In a flight the rig is where motion capture saw it at each reading's own time (see [`Motion::room_from_rig`]); sensor
-/// and rig frame are those of that time, too.
+/// In a flight, the pose of the rig is the one tracked by motion capture at the time of each reading (see
+/// [`Motion::room_from_rig`]); the sensor and rig frames are those of that time, too.
 ///
 /// The cloud is in memory; [`Lift`] hands on point by point.
 ///
@@ -213,7 +214,7 @@ fn find(dataset: &Dataset, pose: Option<usize>) -> Result<&PoseRecord, ApplyErro
     })
 }
 
-/// What the calibration says becomes of a beam; `None` where it does not know.
+/// Returns the deflection of a beam according to the calibration; `None` if it has none.
 fn deflection(calibration: &Calibration, beam: usize) -> Option<Deflection> {
     let estimate = calibration.beam(beam)?;
     match estimate.status {

@@ -1,4 +1,4 @@
-//! The cloud of a room is the room, in every frame; what cannot be lifted is counted.
+//! The cloud of a room matches the room, in every frame; readings that cannot be lifted are counted.
 
 use super::*;
 use catoptric_fixtures::ust20lx;
@@ -36,7 +36,7 @@ fn the_cloud_of_the_empty_room_is_the_room() {
         cloud.points.len() + cloud.without_range + cloud.without_direction,
         all
     );
-    // Exact readings, two scans: what is left out are the ranges of rejected and blocked elements.
+    // Exact readings, two scans: only the ranges of rejected and blocked elements are omitted.
     assert_eq!(
         (cloud.without_range, cloud.without_direction),
         (0, 2 * cloud.unsolved_elements)
@@ -75,7 +75,7 @@ fn direct_elements_stay_in_the_plane() {
 }
 
 #[test]
-fn ranges_lose_what_depends_on_distance_and_color_but_not_on_incidence() {
+fn ranges_are_corrected_for_distance_and_color_but_not_for_incidence() {
     let s = sample();
     let mut calibration = perfect(&s.truth);
     let mut bias = RangeBias {
@@ -105,7 +105,7 @@ fn ranges_lose_what_depends_on_distance_and_color_but_not_on_incidence() {
 }
 
 #[test]
-fn codes_are_no_points() {
+fn codes_become_no_points() {
     let mut s = sample();
     for (place, code) in [(540, f64::NAN), (541, f64::INFINITY), (542, f64::NEG_INFINITY)] {
         let ranges = s.dataset.poses[0].readings.held_mut().expect("in memory");
@@ -122,7 +122,7 @@ fn codes_are_no_points() {
 }
 
 #[test]
-fn a_stretch_that_is_not_there_is_an_error() {
+fn a_missing_stretch_is_an_error() {
     let mut s = sample();
     let calibration = perfect(&s.truth);
     let error = apply(&s.dataset, &calibration, Some(99), CloudFrame::Room).expect_err("there are 49");
@@ -136,7 +136,7 @@ fn a_stretch_that_is_not_there_is_an_error() {
 }
 
 #[test]
-fn without_a_mounting_the_drawing_is_used_and_said_so() {
+fn without_a_mounting_the_drawing_is_used_and_reported() {
     let s = sample();
     let mut calibration = perfect(&s.truth);
     calibration.rig_from_sensor = None;

@@ -1,5 +1,5 @@
-//! What the boards can tell, at the true angles: the bounds an element's error is measured by (that of the whole
-//! experiment, and that of the element by itself), and which elements their own boards leave open.
+//! The Cramér–Rao bounds at the true angles: for the whole experiment, for each element from its own boards alone, and
+//! which elements their own boards leave open.
 
 use catoptric_calib::covariance::{MountUncertainty, budget};
 use catoptric_calib::observability::weakness;
@@ -12,20 +12,20 @@ use catoptric_sim::truth::BeamClass;
 use nalgebra::{Matrix2, Point3};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What the boards tell of the elements.
+/// How well the elements can be known from the boards.
 #[derive(Debug, Default)]
 pub struct Knowable {
-    /// Limit of the experiment for each beam, covariance of (θ_a, φ) in rad².
+    /// Limit of the experiment for each beam, as a covariance of (θ_a, φ) in rad².
     pub(super) limits: BTreeMap<usize, Matrix2<f64>>,
-    /// The least covariance of (θ_a, φ), in rad², that an unbiased per-element estimate from these boards can have,
+    /// Lower bound on the covariance of (θ_a, φ), in rad², of an unbiased estimate of one element from its own boards,
     /// for every beam that is deflected once.
     pub(super) bounds: BTreeMap<usize, Matrix2<f64>>,
-    /// Elements, deflected and unsplit, that their own boards leave open: fewer than two boards are hit, or a direction
-    /// is known to no better than [`WEAKEST_SD`](catoptric_calib::observability::WEAKEST_SD).
+    /// Elements, deflected and unsplit, that their own boards leave open: fewer than two boards are hit, or the standard
+    /// deviation of a direction is not below [`WEAKEST_SD`](catoptric_calib::observability::WEAKEST_SD).
     pub(super) open: BTreeSet<usize>,
 }
 
-/// Where every beam goes that is deflected once and unsplit.
+/// Returns the true direction of every beam that is deflected once and unsplit.
 pub fn true_directions(truth: &Truth) -> Vec<TrueDirection> {
     let deflected = truth.beams.iter().filter(|b| b.status == BeamClass::Deflected);
     let directions = deflected.filter_map(|b| {
@@ -38,7 +38,7 @@ pub fn true_directions(truth: &Truth) -> Vec<TrueDirection> {
     directions.collect()
 }
 
-/// The least covariance of (θ_a, φ), in rad², that any estimate from this dataset can have, for every beam that is
+/// Lower bound on the covariance of (θ_a, φ), in rad², of any estimate from this dataset, for every beam that is
 /// deflected once and unsplit: facets, boards, mounting and biases are common to all of them.
 fn of_experiment(dataset: &Dataset, truth: &Truth) -> Result<BTreeMap<usize, Matrix2<f64>>, Unreadable> {
     let believed = &dataset.session.believed;
@@ -56,7 +56,7 @@ fn of_experiment(dataset: &Dataset, truth: &Truth) -> Result<BTreeMap<usize, Mat
     Ok(known.collect())
 }
 
-/// What the boards of a dataset tell of every beam that is deflected once.
+/// Computes how well every beam that is deflected once can be known from the boards of a dataset.
 ///
 /// The boards are those that the true ray meets farther from the edge than its spot; the mounting is as uncertain as
 /// this dataset leaves it. A method that ties elements together, by their facet, may do better.
@@ -102,7 +102,7 @@ pub fn knowable(dataset: &Dataset, truth: &Truth) -> Result<Knowable, Unreadable
         if let Some(bound) = budget(session, &mount, azimuth, &deflection, &views).and_then(|b| b.bound()) {
             knowable.bounds.insert(beam.beam, bound);
         }
-        // What is not known of the mounting turns all beams alike, whatever the boards.
+        // The uncertainty of the mounting rotates all beams together, whatever the boards.
         let boards_alone = budget(session, &MountUncertainty::none(), azimuth, &deflection, &views);
         let is_open =
             views.len() < 2 || boards_alone.is_some_and(|b| weakness(&b, deflection.elevation).is_some());

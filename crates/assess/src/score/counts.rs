@@ -1,4 +1,4 @@
-//! How many elements there are of each kind.
+//! Counts of elements by outcome: solved, abstained, missed, false, open, and by status.
 
 use super::element::solved;
 use super::statistics::mean;
@@ -8,7 +8,7 @@ use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Elements that came back, those that did not, and those that should not have.
+/// Counts the elements that were solved, abstained, missed or false.
 pub(super) fn count(calibration: &Calibration, truth: Option<&Truth>) -> BeamCounts {
     let Some(truth) = truth else {
         return BeamCounts {
@@ -45,7 +45,7 @@ pub(super) fn count(calibration: &Calibration, truth: Option<&Truth>) -> BeamCou
     }
 }
 
-/// Whether an entry has no direction, and says so and why.
+/// Whether an entry has no direction, and a status and a reason instead.
 fn abstains(b: &BeamEstimate) -> bool {
     match b.status {
         Status::Solved | Status::Direct => false,
@@ -55,7 +55,7 @@ fn abstains(b: &BeamEstimate) -> bool {
     }
 }
 
-/// What became of the elements that their boards leave open.
+/// Counts the outcomes of the elements that their boards leave open.
 pub(super) fn open(
     calibration: &Calibration,
     elements: &[ElementError],
@@ -73,7 +73,7 @@ pub(super) fn open(
     }
 }
 
-/// Elements of each status; "absent" are those the calibration does not mention.
+/// Counts the elements of each status; "absent" are those without an entry in the calibration.
 pub(super) fn statuses(dataset: &Dataset, calibration: &Calibration) -> BTreeMap<&'static str, usize> {
     let mut counts: BTreeMap<_, _> = Status::ALL.iter().map(|s| (s.word(), 0)).collect();
     for b in &calibration.beams {
@@ -83,13 +83,13 @@ pub(super) fn statuses(dataset: &Dataset, calibration: &Calibration) -> BTreeMap
     counts
 }
 
-/// Elements that the calibration does not mention.
+/// Counts the elements without an entry in the calibration.
 pub fn absent(dataset: &Dataset, calibration: &Calibration) -> usize {
     let beams = 0..dataset.session.scanner.scan.beams();
     beams.filter(|&b| calibration.beam(b).is_none()).count()
 }
 
-/// The elements of a class that is reported apart.
+/// Scores the elements of a class that is reported separately.
 pub(super) fn apart(
     calibration: &Calibration,
     truth: Option<&Truth>,

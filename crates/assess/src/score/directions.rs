@@ -1,4 +1,4 @@
-//! Everything that follows from estimated and true rays in one frame.
+//! Errors of directions and points, from estimated and true rays in one frame.
 
 use super::statistics::{best_rotation, largest, percentile, rms, rotation_angle};
 use super::{ElementError, POINT_RANGES_M, PointError, Spread};
@@ -79,9 +79,9 @@ impl Directions {
     }
 }
 
-/// Per-axis error of pairs (true, found) in radians: the length of the error in the tangent plane over √2.
+/// Per-axis error of pairs (true, found), in radians: the length of the error in the tangent plane divided by √2.
 ///
-/// Agrees with (cos φ·δθ, δφ) for small errors, and unlike it has no trouble straight up.
+/// Agrees with (cos φ·δθ, δφ) for small errors, but unlike it is not singular at φ = 90°.
 fn per_axis(pairs: impl Iterator<Item = (Unit<Vector3<f64>>, Unit<Vector3<f64>>)>) -> f64 {
     rms(pairs.map(|(v, found)| beam::angle_between(&v, &found))) / std::f64::consts::SQRT_2
 }

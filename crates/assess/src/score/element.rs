@@ -1,4 +1,4 @@
-//! The errors of each element, and the elements among which something is counted.
+//! The errors of each solved element, with its stated covariance and its bounds.
 
 use super::bound::Knowable;
 use super::statistics::mahalanobis_squared;
@@ -12,15 +12,15 @@ use nalgebra::{Matrix2, Vector2};
 pub struct ElementError {
     /// Beam.
     pub beam: usize,
-    /// Facet that deflects it, in truth.
+    /// Facet that deflects it in truth.
     pub facet: String,
-    /// What the structure does to it.
+    /// Its class in truth.
     pub class: BeamClass,
     /// Truth.
     pub truth: Deflection,
-    /// Estimate; d is 0 where the calibration gives none.
+    /// Estimate; d is 0 if the calibration has none.
     pub estimate: Deflection,
-    /// Whether the calibration gives d.
+    /// Whether the calibration has d.
     pub has_distance: bool,
     /// cos φ·δθ.
     pub across: f64,
@@ -32,11 +32,11 @@ pub struct ElementError {
     pub mahalanobis_squared: Option<f64>,
     /// Bound on the covariance of (`across`, `up`) for any estimate from the dataset.
     pub bound: Option<Matrix2<f64>>,
-    /// The same for an estimate of this element by itself.
+    /// The same for an estimate of this element from its own boards alone.
     pub alone_bound: Option<Matrix2<f64>>,
 }
 
-/// The errors of every solved element that the truth deflects once.
+/// Computes the errors of every solved element that is deflected once in truth.
 pub(super) fn compare(calibration: &Calibration, truth: &Truth, knowable: &Knowable) -> Vec<ElementError> {
     let mut elements = Vec::new();
     for true_beam in &truth.beams {
@@ -83,14 +83,14 @@ pub(super) fn compare(calibration: &Calibration, truth: &Truth, knowable: &Knowa
     elements
 }
 
-/// An element's deflection if it is solved and its angles are numbers.
+/// Returns the deflection of an element if it is solved and its angles are finite.
 pub(super) fn solved(estimate: &BeamEstimate) -> Option<Deflection> {
     estimate
         .deflection()
         .filter(|d| d.azimuth.is_finite() && d.elevation.is_finite() && d.distance.is_finite())
 }
 
-/// Brings a difference of azimuths into (−π, π]; one that is there already stays as it is, to the last bit.
+/// Wraps a difference of azimuths to (−π, π]; one in this interval is returned bit for bit.
 pub(crate) fn wrap(difference: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
     if -PI < difference && difference <= PI {

@@ -1,25 +1,25 @@
-//! Whether errors are as large as the covariance stated for them says: judged by NEES and coverage together.
+//! Honesty of the stated covariance: whether errors are as large as stated, judged by NEES and coverage together.
 
 use super::Score;
 use serde::Serialize;
 
-/// Mean NEES above which, and coverage below which, a covariance is called too small without failing the score.
+/// Mean NEES above which, and coverage below which, a covariance is reported as too small without failing the score.
 const OVER_CONFIDENT: (f64, f64) = (2.0, 0.85);
-/// Mean NEES below which a covariance is called too large: if all elements share one error, an honest one is there in
-/// one run of ten.
+/// Mean NEES below which a covariance is reported as too large: if all elements share one error, an honest covariance is
+/// below it in one run of ten.
 const UNDER_CONFIDENT_NEES: f64 = 0.1;
-/// Below this an error is numerical, and nothing is at fault for it, in degrees.
+/// Error below which only rounding is to blame, in degrees.
 pub(super) const NEGLIGIBLE_DEG: f64 = 1e-6;
 
-/// How the warnings begin.
+/// First words of the warnings.
 pub(super) const OVER: &str = "over-confident";
 pub(super) const UNDER: &str = "under-confident";
 
-/// Whether errors are as large as the stated covariance says.
+/// Whether errors are as large as the stated covariance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Honesty {
-    /// They are, as far as one run tells.
+    /// They are, as far as one run can show.
     Honest,
     /// They are larger.
     OverConfident,
@@ -28,7 +28,7 @@ pub enum Honesty {
 }
 
 impl Honesty {
-    /// The words that tables and pages use.
+    /// The words used in tables and on pages.
     pub fn words(self) -> &'static str {
         match self {
             Self::Honest => "honest",
@@ -38,7 +38,7 @@ impl Honesty {
     }
 }
 
-/// The honesty of a score; `None` without a covariance to judge, or if the errors are numerical.
+/// Judges the honesty of a score; `None` without a covariance, or if the errors are only numerical.
 pub(super) fn of(score: &Score) -> Option<Honesty> {
     let (nees, coverage) = (score.nees_mean, score.coverage_95);
     if nees.is_nan() {
@@ -54,12 +54,12 @@ pub(super) fn of(score: &Score) -> Option<Honesty> {
     }
 }
 
-/// How over-confident, in words.
+/// Describes how over-confident a score is.
 pub(super) fn over_confident(score: &Score) -> String {
     let percent = 100.0 * score.coverage_95;
     if score.nees_mean.is_finite() {
         format!(
-            "{OVER}: errors are {:.1} times what it states; the mean normalised squared error is {:.2} where 1 is honest, and {percent:.0} % of the errors are inside their 95 % ellipses",
+            "{OVER}: errors are {:.1} times what it states; the mean normalized squared error is {:.2} where 1 is honest, and {percent:.0} % of the errors are inside their 95 % ellipses",
             score.nees_mean.sqrt(),
             score.nees_mean
         )
@@ -70,10 +70,10 @@ pub(super) fn over_confident(score: &Score) -> String {
     }
 }
 
-/// How under-confident, in words.
+/// Describes how under-confident a score is.
 pub(super) fn under_confident(score: &Score) -> String {
     format!(
-        "{UNDER}: errors are {:.2} times what it states; the mean normalised squared error is {:.2} where 1 is honest",
+        "{UNDER}: errors are {:.2} times what it states; the mean normalized squared error is {:.2} where 1 is honest",
         score.nees_mean.sqrt(),
         score.nees_mean
     )

@@ -1,23 +1,23 @@
-//! How well a calibration came back: against the truth, or, without it, against surveyed boards and walls.
+//! Scoring of a calibration against the truth or, without it, against surveyed boards and walls.
 //!
-//! Accuracy is counted over the *scored* elements: solved, and deflected without being split in truth. With
-//! φ, θ the true angles of an element, δφ, δθ the errors of its estimate, e = (δθ, δφ), P the covariance stated for
-//! it and C the bound on that covariance at the true angles, for any estimate from the dataset:
+//! Accuracy is computed over the *scored* elements: solved, and deflected and unsplit in truth. With φ, θ the true angles
+//! of an element, δφ, δθ the errors of its estimate, e = (δθ, δφ), P its stated covariance and C the bound on the
+//! covariance of any estimate from the dataset, at the true angles:
 //!
 //! ```text
 //! per-axis error    √(mean((cos φ·δθ)² + δφ²) / 2)
 //! direction error   atan2(‖v̂×v‖, v̂·v)
-//! common mode       angle of the rotation R that makes Σ‖v̂ − R·v‖² least
+//! common mode       angle of the rotation R that minimizes Σ‖v̂ − R·v‖²
 //! point error       √mean ‖(d̂ − d)·u + s·(v̂ − v)‖²           at s = 1, 4 and 10 m behind the mirror
 //! NEES              mean(eᵀP⁻¹e) / 2                           1 where the covariance is honest
 //! coverage          share of elements with eᵀP⁻¹e ≤ 5.991      0.95 where the covariance is honest
 //! efficiency        mean(C_θθ·cos²φ + C_φφ) / mean((cos φ·δθ)² + δφ²)
 //! ```
 //!
-//! Every element that the truth deflects unsplit is one of solved, abstained or missed. Those that their own boards leave
-//! open are counted once more: abstaining is right there, and a direction is wrong if the truth lies outside of the
-//! 99.9 % ellipse that is stated for it (a method may know more than the boards, from a facet or the drawing). Figures that do not exist
-//! are NaN here and `null` in JSON, with the reason in `nulls`.
+//! Every element that is deflected and unsplit in truth is either solved, abstained or missed. Those that their own
+//! boards leave open are also counted separately: for them abstaining is correct, and a direction is wrong if the truth
+//! is outside its stated 99.9 % ellipse (a method may know more than the boards, from a facet or the drawing). Figures
+//! that do not exist are NaN here and `null` in JSON, with the reason in `nulls`.
 
 mod bound;
 pub mod counts;
@@ -62,14 +62,14 @@ pub const CHI_SQUARED_95: f64 = 5.991_464_547_107_979;
 /// 99.9 % quantile of the same: −2·ln 0.001.
 pub const CHI_SQUARED_999: f64 = 13.815_510_557_964_274;
 
-/// Mean NEES above which a covariance is dishonest beyond bad luck.
+/// Mean NEES above which a covariance is dishonest beyond statistical fluctuation.
 ///
 /// Elements share errors, so the mean over one run scatters more than over independent draws: at worst all elements
-/// have one and the same error, and the mean is a χ² of two degrees of freedom over two, which exceeds 6 with
-/// probability e⁻⁶ = 0.25 %.
+/// have the same error, and the mean is χ² with two degrees of freedom divided by two, which exceeds 6 with probability
+/// e⁻⁶ = 0.25 %.
 pub const DISHONEST_NEES: f64 = 6.0;
 
-/// Distances behind the mirror at which point errors are given, in metres.
+/// Distances behind the mirror at which point errors are computed, in meters.
 pub const POINT_RANGES_M: [f64; 3] = [1.0, 4.0, 10.0];
 
 /// Scores a calibration against the truth, `&truth`; without one, `None`, against boards and walls only.
@@ -88,10 +88,7 @@ pub fn score<'t>(
     score_by(dataset, calibration, truth.zip(knowable.as_ref()))
 }
 
-/// Scores a calibration against the truth and what can be known of it, which several calibrations of a dataset share.
-///
-/// # Errors
-/// As [`score`].
+/// Scores a calibration against the truth and its [`Knowable`], which several calibrations of a dataset can share.
 pub fn score_by(
     dataset: &Dataset,
     calibration: &Calibration,
@@ -176,7 +173,7 @@ pub fn score_by(
     Ok(score)
 }
 
-/// Where the rig stood, as tracked: the mean over the stretches, through which it did not move.
+/// Returns the tracked pose of the rig: the mean over the stretches, during which it did not move.
 fn tracked_rig(dataset: &Dataset) -> Option<Pose> {
     let frame = |pose: &PoseRecord| TrackedFrame {
         time_s: 0.0,

@@ -1,10 +1,10 @@
-//! Why a figure of a score is null.
+//! Reasons why figures of a score are null.
 
 use super::Score;
 use catoptric_model::Calibration;
 use std::collections::BTreeMap;
 
-/// The figures that are no numbers, by their keys, and why.
+/// Returns the keys of the figures that are not finite, with the reasons.
 pub(super) fn nulls(
     score: &Score,
     calibration: &Calibration,
@@ -108,7 +108,7 @@ pub(super) fn nulls(
         let reason = if score.nees_mean.is_nan() {
             "no scored element has a covariance"
         } else {
-            "the errors are numerical, and do not tell"
+            "the errors are only numerical"
         };
         nulls.insert("honesty", because(reason));
     }

@@ -1,4 +1,4 @@
-//! What needs no truth: how far the points that a calibration makes lie from boards and walls that were surveyed.
+//! Residuals that need no truth: distances of lifted points from surveyed boards and walls.
 
 use catoptric_calib::observations::{self, BoardInSensor};
 use catoptric_calib::tracking;
@@ -10,7 +10,7 @@ use nalgebra::Unit;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Distances of lifted points from the surfaces they lie on, counted positive behind the surface, in millimetres.
+/// Distances of lifted points from the surfaces they were measured on, positive behind the surface, in millimeters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SurfaceResidual {
     /// Stretches that contributed.
@@ -19,13 +19,13 @@ pub struct SurfaceResidual {
     pub elements: usize,
     /// Readings that contributed.
     pub readings: usize,
-    /// Mean over the readings: what they share.
+    /// Mean over the readings, their common error.
     pub mean: f64,
     /// Root mean square over the readings.
     pub rms: f64,
 }
 
-/// What a beam is expected to meet.
+/// The surface that a beam is expected to hit.
 struct Surface {
     predicted: f64,
     cos_incidence: f64,
@@ -42,10 +42,10 @@ struct Visit {
     sum_of_squares: f64,
 }
 
-/// Point-to-board residual of every reading of the solved elements on the boards of their facets.
+/// Point-to-board residuals of the readings of the solved elements on the boards of their facets.
 ///
-/// An element is on a board if its outgoing ray, as calibrated, meets the board's face farther from the edge than
-/// its spot. A reading there is corrected by all of Eq. 3, since board and incidence are known, and its residual is
+/// An element is on a board if its outgoing ray, as calibrated, hits the board's face farther from the edge than its
+/// spot. A reading there is corrected by all terms of Eq. (3), since board and incidence are known, and its residual is
 /// the distance of the lifted point from the board's plane, cos θ_N·(r − d − s).
 ///
 /// # Errors
@@ -97,7 +97,7 @@ pub fn walls(dataset: &Dataset, calibration: &Calibration) -> Result<SurfaceResi
     })
 }
 
-/// The mounting used: as calibrated, or as drawn where the calibration has none.
+/// Returns the mounting as calibrated, or as drawn if the calibration has none.
 pub fn mount(dataset: &Dataset, calibration: &Calibration) -> Pose {
     match &calibration.rig_from_sensor {
         Some(estimate) => estimate.pose(),
@@ -105,7 +105,7 @@ pub fn mount(dataset: &Dataset, calibration: &Calibration) -> Pose {
     }
 }
 
-/// The biases used: as calibrated, or as believed where the calibration has none.
+/// Returns the biases as calibrated, or as believed if the calibration has none.
 pub fn bias<'a>(dataset: &'a Dataset, calibration: &'a Calibration) -> &'a RangeBias {
     calibration
         .bias
@@ -113,7 +113,7 @@ pub fn bias<'a>(dataset: &'a Dataset, calibration: &'a Calibration) -> &'a Range
         .unwrap_or(&dataset.session.believed.bias)
 }
 
-/// Residuals over all stretches of a kind; `expect` says what a beam meets in one of them.
+/// Collects residuals over all stretches of a kind; `expect` returns the surface that a beam hits in one of them.
 fn collect<E>(
     dataset: &Dataset,
     calibration: &Calibration,

@@ -1,29 +1,29 @@
-//! The statistics a score is made of: each one formula, none of them about lasers.
+//! General statistics used by scores: moments, percentiles, Mahalanobis length, best rotation.
 
 use nalgebra::{Matrix2, Matrix3, Rotation3, Unit, Vector2, Vector3};
 
 type Direction = Unit<Vector3<f64>>;
 
-/// Root mean square; NaN of nothing.
+/// Root mean square; NaN if there are no values.
 pub(super) fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     mean(values.into_iter().map(|v| v * v)).sqrt()
 }
 
-/// Arithmetic mean; NaN of nothing.
+/// Arithmetic mean; NaN if there are no values.
 pub(super) fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     let (sum, count) = values.into_iter().fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
     sum / count
 }
 
-/// Largest of some numbers; NaN of nothing.
+/// Maximum; NaN if there are no values.
 pub(super) fn largest(values: impl Iterator<Item = f64>) -> f64 {
     values.fold(f64::NAN, f64::max)
 }
 
-/// The value below which a share of the values lies, interpolated linearly between order statistics.
+/// Percentile of some values, interpolated linearly between order statistics.
 ///
-/// Of n values in order, the share p stands at place p·(n − 1), counted from 0: p = 0 is the smallest, p = 1 the
-/// largest, p = ½ the usual median. NaN of nothing.
+/// Of n sorted values, the share p is at index p·(n − 1), counted from 0: p = 0 is the minimum, p = 1 the maximum, p = ½
+/// the usual median. NaN if there are no values.
 ///
 /// ```
 /// use catoptric_assess::score::percentile;
@@ -36,7 +36,7 @@ pub fn percentile(values: &[f64], share: f64) -> f64 {
         return f64::NAN;
     };
     let place = share.clamp(0.0, 1.0) * last as f64;
-    // Between 0 and `last` by the clamp, so nothing is cut off but the fraction that is meant to be.
+    // Between 0 and `last` because of the clamp, so the cast truncates only the fraction.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let below = place.floor() as usize;
     let above = (below + 1).min(last);
@@ -45,8 +45,8 @@ pub fn percentile(values: &[f64], share: f64) -> f64 {
 
 /// Squared Mahalanobis length eᵀP⁻¹e of an error under a covariance.
 ///
-/// Zero for an error that is exactly zero; infinite for any other error under a covariance that is not positive
-/// definite, since such a covariance claims that the error cannot happen.
+/// Zero for an error of exactly zero; infinite for any other error under a covariance that is not positive definite,
+/// since such a covariance rules out errors in some direction.
 pub(crate) fn mahalanobis_squared(error: &Vector2<f64>, covariance: &Matrix2<f64>) -> f64 {
     if error.norm_squared() == 0.0 {
         return 0.0;
@@ -57,29 +57,29 @@ pub(crate) fn mahalanobis_squared(error: &Vector2<f64>, covariance: &Matrix2<f64
     }
 }
 
-/// The rotation R that best takes `from` to `to` in the sense of Wahba: least Σ‖to − R·from‖² (Kabsch).
+/// The rotation R that best maps `from` to `to` in the sense of Wahba: it minimizes Σ‖to − R·from‖² (Kabsch).
 ///
-/// `None` unless the directions span at least a plane: one direction leaves a turn about itself free.
+/// `None` unless the directions span at least a plane: a single direction leaves the rotation about itself undetermined.
 #[doc(alias = "Kabsch")]
 pub(super) fn best_rotation(pairs: &[(Direction, Direction)]) -> Option<Rotation3<f64>> {
-    // Directions closer together than a microradian span no plane worth the name.
-    const LEAST_SPAN: f64 = 1e-12;
+    // Directions closer together than a microradian do not determine a plane.
+    const MIN_SPAN: f64 = 1e-12;
     let spread: Matrix3<f64> = pairs
         .iter()
         .map(|(from, to)| to.into_inner() * from.transpose())
         .sum();
     let svd = spread.svd(true, true);
     let (u, v_t) = (svd.u?, svd.v_t?);
-    if svd.singular_values[1] <= LEAST_SPAN * svd.singular_values[0] {
+    if svd.singular_values[1] <= MIN_SPAN * svd.singular_values[0] {
         return None;
     }
-    // Without the sign the best orthogonal matrix may be a reflection.
+    // Without the sign, the best orthogonal matrix may be a reflection.
     let sign = (u.determinant() * v_t.determinant()).signum();
     let rotation = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t;
     Some(Rotation3::from_matrix_unchecked(rotation))
 }
 
-/// Angle of a rotation, in radians: exact for small angles, where an arc cosine of the trace is not.
+/// Angle of a rotation, in radians; accurate for small angles, unlike the arc cosine of the trace.
 pub(super) fn rotation_angle(rotation: &Rotation3<f64>) -> f64 {
     let m = rotation.matrix();
     let twice_sine_axis = Vector3::new(
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn best_rotation_is_found_again_however_small() {
+    fn best_rotation_is_recovered_however_small() {
         for angle in [1e-9, 1e-3, 1.0, 3.0] {
             let axis = Unit::new_normalize(Vector3::new(0.3, -0.5, 0.8));
             let given = Rotation3::from_axis_angle(&axis, angle);
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn one_direction_does_not_make_a_rotation() {
+    fn one_direction_does_not_determine_a_rotation() {
         let v = Unit::new_normalize(Vector3::new(0.1, 0.2, 0.3));
         assert!(best_rotation(&[(v, v), (v, v)]).is_none());
         assert!(best_rotation(&[]).is_none());

@@ -1,4 +1,4 @@
-//! The truth has no error, known errors come back as their figures, and every element is counted once.
+//! Tests of scores: the truth has no error, known errors yield the expected figures, and every element is counted once.
 
 use super::element::wrap;
 use super::*;
@@ -39,16 +39,16 @@ fn the_truth_itself_has_no_error_and_passes() {
     assert_eq!(score.point_mm.at_10m, 0.0);
     assert_eq!((score.nees_mean, score.coverage_95), (0.0, 1.0));
     assert!(score.common_mode_deg < 1e-12);
-    // The mean of the tracked poses rounds, so the room is met only to the last bits.
+    // The mean of the tracked poses is rounded, so the room frame agrees only up to rounding.
     assert!(score.per_axis_rms_room_deg < 1e-12 && score.point_room_mm.at_10m < 1e-10);
     assert!(score.crlb_per_axis_deg > 0.001 && score.crlb_per_axis_deg < 1.0);
-    // Readings are exact, so points lie on boards and walls.
+    // Readings are exact, so points are on boards and walls.
     assert!(score.boards_mm.stretches == 48 && score.boards_mm.rms < 1e-9);
     assert!(score.walls_mm.elements == deflected && score.walls_mm.rms < 1e-9);
 }
 
 #[test]
-fn a_common_rotation_shows_as_nothing_else() {
+fn a_common_rotation_appears_only_in_the_common_mode() {
     let s = sample();
     let angle = 0.5_f64.to_radians();
     let score = score(&s.dataset, &turned(perfect(&s.truth), angle), Some(&s.truth)).expect("in memory");
@@ -65,7 +65,7 @@ fn a_common_rotation_shows_as_nothing_else() {
 }
 
 #[test]
-fn a_mounting_that_is_off_shows_in_the_room_only() {
+fn a_wrong_mounting_shows_in_the_room_only() {
     let s = sample();
     let mut calibration = perfect(&s.truth);
     let mount = calibration.rig_from_sensor.as_mut().expect("it has one");
@@ -92,8 +92,8 @@ fn a_mounting_that_is_off_shows_in_the_room_only() {
 }
 
 #[test]
-fn errors_are_counted_as_the_formulas_say() {
-    // Two elements, errors written by hand.
+fn figures_follow_the_formulas() {
+    // Two elements with given errors.
     let s = sample();
     let mut calibration = perfect(&s.truth);
     let beams = deflected(&s.truth);
@@ -118,13 +118,13 @@ fn errors_are_counted_as_the_formulas_say() {
     let per_axis = (squares / 4.0).sqrt().to_degrees();
     assert!((score.per_axis_rms_deg - per_axis).abs() < 1e-12);
     assert!((score.direction_deg.rms - per_axis * 2.0_f64.sqrt()).abs() < 1e-7);
-    // eᵀP⁻¹e is 9 for the first and 4 for the second: mean over two dimensions (9 + 4)/4, one of two inside.
+    // eᵀP⁻¹e is 9 for the first and 4 for the second: the mean over two dimensions is (9 + 4)/4, one of two is inside.
     assert!((score.nees_mean - 13.0 / 4.0).abs() < 1e-9);
     assert_eq!(score.coverage_95, 0.5);
     assert!((score.distance_mm.rms - 12.5_f64.sqrt()).abs() < 1e-9);
     assert!((score.distance_mm.max - 4.0).abs() < 1e-9);
     assert_eq!(score.beams.abstained, beams.len() - 2);
-    // ‖δP + s·δv‖² is a square in s: mean δd², 2s times a cross term, s² times the mean squared chord.
+    // ‖δP + s·δv‖² is quadratic in s: mean δd², 2s times a cross term, s² times the mean squared chord.
     let p = &score.point_mm;
     let chord = squares / 2.0 * 1e6;
     let cross = p.at_1m.powi(2) - 12.5 - chord;
@@ -141,7 +141,7 @@ fn errors_are_counted_as_the_formulas_say() {
 }
 
 #[test]
-fn an_honest_covariance_is_found_honest() {
+fn an_honest_covariance_is_judged_honest() {
     let s = sample();
     let score = score(&s.dataset, &noisy(&s.truth, 1e-3, 3), Some(&s.truth)).expect("in memory");
     // About 450 independent elements: the mean of χ²₂/2 scatters by 1/√450 = 0.05; four of those.
@@ -166,7 +166,7 @@ fn a_covariance_a_tenth_too_small_per_axis_fails() {
     assert!((score.nees_mean - 100.0).abs() < 20.0);
 }
 
-/// A submission of known errors whose covariance is `factor` times what it should be.
+/// A calibration with known errors whose covariance is `factor` times what it should be.
 fn stated(truth: &Truth, factor: f64) -> Calibration {
     let mut calibration = noisy(truth, 1e-3, 3);
     for b in &mut calibration.beams {
@@ -176,7 +176,7 @@ fn stated(truth: &Truth, factor: f64) -> Calibration {
 }
 
 #[test]
-fn honesty_is_called_by_its_name_and_size() {
+fn honesty_is_reported_with_its_size() {
     let s = sample();
     let of = |calibration: &Calibration, truth| score(&s.dataset, calibration, truth).expect("in memory");
     let honest = of(&stated(&s.truth, 1.0), Some(&s.truth));
@@ -200,7 +200,7 @@ fn honesty_is_called_by_its_name_and_size() {
         .split("errors are ")
         .nth(1)
         .and_then(|rest| rest.split(' ').next()?.parse().ok())
-        .expect("it says how many times");
+        .expect("the warning states a factor");
     assert!((times - 8.0).abs() < 0.5, "{}", over.warnings[0]);
     assert_eq!(
         over.warnings
@@ -213,23 +213,23 @@ fn honesty_is_called_by_its_name_and_size() {
         of(&stated(&s.truth, 1.0 / 4.0), Some(&s.truth)).verdict,
         Verdict::Pass
     );
-    for (nothing_told, reason) in [
+    for (not_judged, reason) in [
         (of(&stated(&s.truth, 1.0), None), "there is no truth"),
         (
             of(&perfect(&s.truth), Some(&s.truth)),
-            "the errors are numerical, and do not tell",
+            "the errors are only numerical",
         ),
     ] {
-        assert_eq!(nothing_told.honesty, None);
-        assert_eq!(nothing_told.nulls["honesty"], reason);
+        assert_eq!(not_judged.honesty, None);
+        assert_eq!(not_judged.nulls["honesty"], reason);
     }
 }
 
 #[test]
-fn what_the_boards_leave_open_is_rightly_not_solved() {
+fn abstaining_is_correct_where_the_boards_leave_elements_open() {
     let s = sample();
     let mut dataset = s.dataset.clone();
-    // No board before any mirror.
+    // No board in front of any mirror.
     dataset
         .poses
         .retain(|p| p.label.kind != catoptric_model::PoseKind::Facet);
@@ -299,7 +299,7 @@ fn without_a_mirror_there_is_nothing_to_judge() {
         (Verdict::Blind, Some(0))
     );
     assert!(nothing.warnings[0].ends_with("there is nothing to judge"));
-    // But a direction for a beam that no mirror deflects is false.
+    // A direction for a beam that no mirror deflects is false.
     let solved = perfect(&s.truth);
     assert_eq!(score_of(&solved).verdict, Verdict::Fail);
 }
@@ -332,7 +332,7 @@ fn every_deflected_element_is_solved_abstained_or_missed() {
     *estimate(&mut calibration, beams[1]) = without(beams[1], Status::Unobservable, None);
     *estimate(&mut calibration, beams[2]) = without(beams[2], Status::Direct, None);
     estimate(&mut calibration, beams[3]).azimuth_rad = Some(f64::NAN);
-    // Turned into another beam's entry, this one is absent and the direct beam 540 is called solved.
+    // As the entry of another beam, this element is absent and the direct beam 540 is called solved.
     estimate(&mut calibration, beams[4]).beam = 540;
     calibration.beams.remove(540);
     let score = score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory");
@@ -350,7 +350,7 @@ fn every_deflected_element_is_solved_abstained_or_missed() {
 }
 
 #[test]
-fn split_elements_are_reported_apart() {
+fn split_elements_are_reported_separately() {
     let s = sample();
     let mut calibration = perfect(&s.truth);
     let split = s
@@ -437,7 +437,7 @@ fn json_has_the_keys_of_the_interface() {
 }
 
 #[test]
-fn azimuths_are_compared_around_the_circle() {
+fn azimuth_differences_wrap_around_the_circle() {
     use std::f64::consts::PI;
     assert_eq!(wrap(0.3), 0.3);
     assert!((wrap(2.0 * PI - 1e-3) + 1e-3).abs() < 1e-15);

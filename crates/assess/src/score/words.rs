@@ -1,4 +1,4 @@
-//! What a score comes to, and why, in words.
+//! The verdict of a score, with its reasons and warnings as text.
 
 use super::honesty::{self, Honesty};
 use super::nulls::nulls;
@@ -6,22 +6,22 @@ use super::{DISHONEST_NEES, Score, Verdict};
 use catoptric_model::{Calibration, Dataset, Status};
 use std::collections::BTreeMap;
 
-/// Share of the squared error beyond which one rotation is said to dominate it.
+/// Share of the squared error above which one rotation is reported to dominate it.
 pub const DOMINANT_SHARE: f64 = 0.5;
-/// Share of the elements beyond which abstentions are worth a word.
+/// Share of the elements above which abstentions are worth a warning.
 const MANY: f64 = 0.1;
-/// What warnings say whose matter a report tells in sentences of its own.
+// Phrases of warnings whose subject a report covers in sentences of its own.
 const COMMON: &str = "common mode dominates";
 const UNSOLVED: &str = "elements were not solved";
 
-/// Whether a warning is about accuracy, covariance or abstentions, of which a report speaks anyway.
-pub fn is_told(warning: &str) -> bool {
+/// Whether a warning is about accuracy, covariance or abstentions, which a report covers anyway.
+pub fn is_covered_by_report(warning: &str) -> bool {
     [honesty::OVER, honesty::UNDER, COMMON, UNSOLVED]
         .iter()
         .any(|words| warning.contains(words))
 }
 
-/// Share of the squared error that one rotation common to all elements explains; NaN where it does not exist.
+/// Share of the squared error that one rotation common to all elements explains; NaN if it does not exist.
 pub fn common_share(score: &Score) -> f64 {
     1.0 - (score.differential_per_axis_rms_deg / score.per_axis_rms_deg).powi(2)
 }
@@ -41,7 +41,7 @@ pub(super) fn judge(score: &mut Score, dataset: &Dataset, calibration: &Calibrat
     score.nulls = nulls(score, calibration, has_truth);
 }
 
-/// Whether there is a truth, and no element in it whose direction could be asked for.
+/// Whether there is a truth, but no element in it with a direction to estimate.
 fn nothing_deflected(score: &Score) -> bool {
     score.beams.deflected == Some(0)
 }
@@ -63,7 +63,7 @@ fn failures(score: &Score) -> Vec<String> {
     let mut failures = Vec::new();
     if let Some(missed @ 1..) = score.beams.missed {
         failures.push(format!(
-            "fails: {} deflected by a mirror but given neither a direction nor a reason",
+            "fails: {} deflected by a mirror, with neither a direction nor a reason",
             elements(missed, "is", "are")
         ));
     }
@@ -74,17 +74,17 @@ fn failures(score: &Score) -> Vec<String> {
             if wrong == 1 { "it" } else { "them" }
         ));
     }
-    // Infinity is above the limit too; NaN, which is no covariance, is not.
+    // Infinity is above the limit too; NaN, without a covariance, is not.
     if score.nees_mean > DISHONEST_NEES {
         failures.push(format!(
-            "fails: {}; {DISHONEST_NEES} is the limit for a mean normalised squared error",
+            "fails: {}; {DISHONEST_NEES} is the limit for a mean normalized squared error",
             honesty::over_confident(score)
         ));
     }
-    // If all of them share one error, an honest covariance has all of them wrong once in a thousand runs.
+    // If all of them share one error, they are all wrong under an honest covariance once in a thousand runs.
     if let Some(open) = score.open.filter(|o| o.wrong > 0 && 2 * o.wrong > o.solved) {
         failures.push(format!(
-            "fails: {} left open by the boards and given a direction with a covariance that rules out the truth; abstaining is right there",
+            "fails: {} left open by the boards and given a direction with a covariance that rules out the truth; abstaining would be correct",
             elements(open.wrong, "is", "are")
         ));
     }
@@ -95,7 +95,7 @@ fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<St
     let mut warnings = Vec::new();
     if calibration.frame != "sensor" {
         warnings.push(format!(
-            "the file says its angles are in the frame {:?}; they are scored as in \"sensor\"",
+            "the file states its angles in the frame {:?}; they are scored as if in \"sensor\"",
             calibration.frame
         ));
     }
@@ -118,7 +118,7 @@ fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<St
     }
     if let Some(open) = score.open.filter(|o| o.elements > 0) {
         warnings.push(format!(
-            "their own boards leave {} of {} elements open: {} abstained there, which is right, {} solved, {} of these wrong by what they state",
+            "their own boards leave {} of {} elements open: of these {} abstained, which is correct, and {} solved, {} of them wrong according to their stated covariance",
             open.elements,
             score.beams.deflected.unwrap_or_default(),
             open.abstained,
@@ -130,14 +130,14 @@ fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<St
     let scored = score.scored().count();
     if stated < scored {
         warnings.push(format!(
-            "{} of {scored} scored elements come without a covariance",
+            "{} of {scored} scored elements have no covariance",
             scored - stated
         ));
     }
     let share = common_share(score);
     if share > DOMINANT_SHARE && score.per_axis_rms_deg > honesty::NEGLIGIBLE_DEG {
         warnings.push(format!(
-            "{COMMON}: one rotation of {:.4}° shared by all elements makes {:.0} % of the squared error, as an error of the sensor's mounting does",
+            "{COMMON}: one rotation of {:.4}° common to all elements accounts for {:.0} % of the squared error, like an error of the sensor's mounting",
             score.common_mode_deg,
             share * 100.0
         ));
@@ -145,8 +145,8 @@ fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<St
     let without_distance = score.scored().filter(|e| !e.has_distance).count();
     if without_distance > 0 {
         warnings.push(format!(
-            "{} without d; point errors take d as 0 there",
-            elements(without_distance, "comes", "come")
+            "{} no d; point errors assume d = 0 for them",
+            elements(without_distance, "has", "have")
         ));
     }
     let candidates = score
@@ -160,14 +160,14 @@ fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<St
             .map(|a| format!("{} {} ({})", a.count, a.status, a.reason))
             .collect();
         warnings.push(format!(
-            "{} of {candidates} {UNSOLVED}; over all elements the usual reasons are: {}",
+            "{} of {candidates} {UNSOLVED}; over all elements, the most frequent reasons are: {}",
             score.beams.abstained,
             reasons.join(", ")
         ));
     }
     if calibration.rig_from_sensor.is_none() {
         warnings.push(
-            "the calibration says nothing about where the sensor sits in the rig; residuals take the drawing for it"
+            "the calibration has no mounting of the sensor in the rig; residuals use the one of the drawing"
                 .to_owned(),
         );
     }
@@ -176,17 +176,17 @@ fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<St
 
 /// Elements without a direction that share a reason.
 pub struct Abstention {
-    /// Their status, as a reader would write it.
+    /// Their status, with spaces.
     pub status: String,
     /// The reason of the first of them.
     pub reason: String,
-    /// How many they are.
+    /// Number of elements.
     pub count: usize,
 }
 
-/// Reasons of the elements that are neither solved nor direct, the most frequent first.
+/// Returns the reasons of the elements that are neither solved nor direct, most frequent first.
 ///
-/// Reasons that differ in their numbers only count as one, and the first of them stands for all.
+/// Reasons that differ only in their numbers count as one, represented by the first of them.
 pub fn abstentions(calibration: &Calibration) -> Vec<Abstention> {
     let mut groups: BTreeMap<(&'static str, String), Abstention> = BTreeMap::new();
     for b in &calibration.beams {
@@ -206,7 +206,7 @@ pub fn abstentions(calibration: &Calibration) -> Vec<Abstention> {
     sorted
 }
 
-/// A status as a reader would write it.
+/// Returns the word of a status with spaces instead of underscores.
 pub fn spelled(status: Status) -> String {
     status.word().replace('_', " ")
 }

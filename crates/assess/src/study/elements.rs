@@ -1,6 +1,6 @@
-//! Angles of every element of every run, and their table `elements.csv`, exactly: every number comes back as it was.
+//! Angles of every element of every run, and their table `elements.csv`, which preserves every number exactly.
 
-/// First line of `elements.csv`. Angles are in degrees.
+/// Header of `elements.csv`. Angles are in degrees.
 pub const ELEMENTS_HEADER: [&str; 8] = [
     "cell",
     "seed",
@@ -30,7 +30,7 @@ pub struct ElementAngles {
 }
 
 impl ElementAngles {
-    /// Error of θ_a, brought to −180° … 180°, and of φ, in degrees.
+    /// Returns the error of θ_a, wrapped to −180° … 180°, and of φ, in degrees.
     pub fn error(&self) -> [f64; 2] {
         let azimuth = self.estimate[0] - self.truth[0];
         [
@@ -40,7 +40,7 @@ impl ElementAngles {
     }
 }
 
-/// The table of some elements.
+/// Formats elements as a table.
 pub fn elements_to_csv(elements: &[ElementAngles]) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
     // Writing to memory cannot fail.
@@ -63,10 +63,10 @@ pub fn elements_to_csv(elements: &[ElementAngles]) -> String {
     String::from_utf8(bytes).unwrap_or_default()
 }
 
-/// Elements from a table.
+/// Parses elements from a table.
 ///
 /// # Errors
-/// In words, with the line, what is not as [`elements_to_csv`] writes it.
+/// As text, with the line that [`elements_to_csv`] could not have written.
 pub fn elements_from_csv(text: &str) -> Result<Vec<ElementAngles>, String> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let header = reader.headers().map_err(|e| e.to_string())?;
@@ -79,7 +79,7 @@ pub fn elements_from_csv(text: &str) -> Result<Vec<ElementAngles>, String> {
     let mut elements = Vec::new();
     for (i, record) in reader.records().enumerate() {
         let record = record.map_err(|e| e.to_string())?;
-        elements.push(parsed(&record).ok_or_else(|| format!("line {}: it is no element", i + 2))?);
+        elements.push(parsed(&record).ok_or_else(|| format!("line {}: not a valid element", i + 2))?);
     }
     Ok(elements)
 }
@@ -101,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_table_comes_back_as_it_was() {
+    fn a_table_round_trips_exactly() {
         let element = ElementAngles {
             cell: 2,
             seed: 3,
@@ -116,7 +116,7 @@ mod tests {
         let broken = text.replace("700", "seven");
         assert_eq!(
             elements_from_csv(&broken),
-            Err("line 2: it is no element".to_owned())
+            Err("line 2: not a valid element".to_owned())
         );
         assert!(elements_from_csv("a,b\n").is_err());
     }

@@ -1,14 +1,14 @@
-//! What can keep a study from being begun, gone on with or merged. A calibrator that fails is a result.
+//! Why a study cannot be started, resumed or merged. A calibrator that fails is a result, not an error.
 
 use catoptric_files::IoError;
 use catoptric_files::scene::SceneErrors;
 use catoptric_model::Stopped;
 use catoptric_sim::SimError;
 
-/// Why there is no study.
+/// Why a study fails.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
-    /// What was asked for makes no sense, or does not fit what is there.
+    /// The request is invalid, or does not match the existing files.
     #[error("{message}")]
     Invalid {
         /// What is wrong.
@@ -16,16 +16,16 @@ pub enum StudyError {
         /// What to do about it.
         help: String,
     },
-    /// A scene that is not valid with the values of a cell.
+    /// A scene is invalid with the values of a cell.
     #[error(transparent)]
     Scene(#[from] SceneErrors),
-    /// A scene that cannot be set up.
+    /// A scene cannot be set up.
     #[error(transparent)]
     Setup(#[from] SimError),
-    /// A file that cannot be read, written or understood.
+    /// A file cannot be read, written or parsed.
     #[error(transparent)]
     File(#[from] IoError),
-    /// The study was stopped; what is on disk is kept, and the same request goes on from there.
+    /// The study was stopped; finished experiments stay on disk, and the same request resumes from there.
     #[error(transparent)]
     Stopped(#[from] Stopped),
 }
@@ -38,8 +38,8 @@ impl StudyError {
         }
     }
 
-    /// What a program that ends with this error reports to its caller: 2 for invalid input, 3 where reading or writing
-    /// failed, 130 where it was stopped.
+    /// Exit code of a program that ends with this error: 2 for invalid input, 3 if reading or writing failed, 130 if it
+    /// was stopped.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Invalid { .. } | Self::Setup(_) | Self::Scene(SceneErrors::Invalid(_)) => 2,

@@ -1,5 +1,5 @@
-//! A study in a folder: tables of its runs, of a chunk of them while it is under way, of all at its end. What is there
-//! is not done again, so that an interrupted study goes on.
+//! A study in a folder: tables of its runs, by chunks during the study, of all runs at the end. Existing results are not
+//! computed again, so an interrupted study resumes.
 
 use super::plan::Plan;
 use super::{
@@ -12,26 +12,26 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Name of the result.
+/// File name of the result.
 pub const RESULT: &str = "study.json";
-/// Name of the table of how elements scatter.
+/// File name of the table of the scatter of elements.
 pub const SPREAD: &str = "spread.csv";
 
-/// Experiments between two files on disk: what an interruption can cost.
+/// Number of experiments between two files on disk: the most that an interruption can cost.
 const CHUNK: usize = 32;
 
-/// What experiments gave.
+/// Results of experiments.
 #[derive(Debug, Default)]
 pub struct Found {
-    /// What became of every contestant in every experiment.
+    /// Result of every contestant in every experiment.
     pub runs: Vec<Run>,
-    /// Where they were asked for.
+    /// Angles of every element, if requested.
     pub elements: Option<Vec<ElementAngles>>,
-    /// How long each calibration took.
+    /// Duration of each calibration.
     pub times: Vec<Time>,
 }
 
-/// How long a calibration took: beside what is compared, since no two runs take equally long.
+/// Duration of a calibration: kept apart from the results, since it differs every time.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Time {
@@ -41,17 +41,17 @@ pub struct Time {
     milliseconds: f64,
 }
 
-/// The tables of all runs, or of a chunk of them while a study is under way.
+/// Paths of the tables of all runs, or of a chunk of them during a study.
 pub struct Tables {
-    /// The runs; written last, so that all is there with them.
+    /// The runs; written last, so their existence shows that the other tables are complete.
     pub runs: PathBuf,
-    /// The angles of every element, where they were asked for.
+    /// The angles of every element, if requested.
     pub elements: PathBuf,
     times: PathBuf,
 }
 
 impl Found {
-    /// Adds what other experiments gave.
+    /// Appends the results of other experiments.
     pub fn extend(&mut self, other: Self) {
         self.runs.extend(other.runs);
         self.times.extend(other.times);
@@ -60,12 +60,12 @@ impl Found {
         }
     }
 
-    /// Brings what shards gave into the study's order.
+    /// Sorts the results of shards into the order of the study.
     pub fn sort(&mut self, study: &Study) -> Result<(), StudyError> {
-        // Each shard was whole, and each was there once.
+        // Each shard was complete and given once.
         self.runs = merge(study, std::mem::take(&mut self.runs))
             .map_err(|what| StudyError::invalid(what, "give every shard once"))?;
-        // Within an experiment they are in order, which sorting keeps.
+        // Within an experiment they are in order, which a stable sort keeps.
         self.times.sort_by_key(|t| (t.cell, t.seed));
         if let Some(elements) = &mut self.elements {
             elements.sort_by_key(|e| (e.cell, e.seed));
@@ -75,7 +75,7 @@ impl Found {
 }
 
 impl Tables {
-    /// The tables of a study.
+    /// Paths of the tables of a study.
     pub fn of(folder: &Path) -> Self {
         Self {
             runs: folder.join("runs.csv"),
@@ -84,7 +84,7 @@ impl Tables {
         }
     }
 
-    /// The tables of a chunk of it.
+    /// Paths of the tables of a chunk of a study.
     pub fn of_chunk(folder: &Path, number: usize) -> Self {
         let path = |kind: &str| folder.join(format!("{kind}-{number:06}.csv"));
         Self {
@@ -94,7 +94,7 @@ impl Tables {
         }
     }
 
-    /// Writes them, the runs last: with them all is there.
+    /// Writes the tables, the runs last.
     pub fn write(&self, found: &Found) -> Result<(), StudyError> {
         write_file(&self.times, times_to_csv(&found.times)?.as_bytes())?;
         if let Some(elements) = &found.elements {
@@ -103,7 +103,7 @@ impl Tables {
         Ok(write_file(&self.runs, to_csv(&found.runs).as_bytes())?)
     }
 
-    /// Reads them, the runs being those of some experiments: no fewer, no more.
+    /// Reads the tables and checks that the runs are exactly those of the given experiments.
     pub fn read(&self, study: &Study, jobs: &[Job]) -> Result<Found, StudyError> {
         let runs = parsed(&self.runs, |text| in_order(study, jobs, from_csv(text)?))?;
         let elements = if self.elements.exists() {
@@ -123,7 +123,7 @@ impl Tables {
         })
     }
 
-    /// Removes those that are there.
+    /// Removes those that exist.
     pub fn remove(&self) -> Result<(), StudyError> {
         for path in [&self.runs, &self.elements, &self.times] {
             match std::fs::remove_file(path) {
@@ -145,12 +145,12 @@ fn parsed<T>(path: &Path, parse: impl FnOnce(&str) -> Result<T, String>) -> Resu
     parse(&text).map_err(|what| {
         StudyError::invalid(
             format!("{}: {what}", path.display()),
-            "delete it, and the command that wrote it does its runs again",
+            "delete it; the command that wrote it then repeats these runs",
         )
     })
 }
 
-/// The times of runs.
+/// Returns the durations of runs.
 pub fn times(runs: &[Run]) -> Vec<Time> {
     let time = |r: &Run| Time {
         cell: r.cell,
@@ -163,7 +163,7 @@ pub fn times(runs: &[Run]) -> Vec<Time> {
 
 fn times_to_csv(times: &[Time]) -> Result<String, StudyError> {
     let failed = |e: csv::Error| {
-        StudyError::invalid(format!("the times cannot be written: {e}"), "do the study again")
+        StudyError::invalid(format!("the times cannot be written: {e}"), "run the study again")
     };
     let mut writer = csv::Writer::from_writer(Vec::new());
     for time in times {
@@ -180,13 +180,13 @@ fn times_from_csv(text: &str) -> Result<Vec<Time>, String> {
         .map_err(|e| e.to_string())
 }
 
-/// Runs a part of a study in a folder, which is new or holds the very same part; runs that are there are not done again.
+/// Runs a part of a study in a folder that is new or contains the same part; existing runs are not repeated.
 ///
-/// `done` is called with the number of experiments that are done, of how many. With `with_elements` the angles of
-/// every element are listed as well, and always where they were before.
+/// `done` is called with the number of experiments newly finished and their total number. With `with_elements`, or if
+/// they were listed before, the angles of every element are listed as well.
 ///
 /// # Errors
-/// [`StudyError`]; after [`Stopped`](StudyError::Stopped) the folder keeps what was done.
+/// [`StudyError`]; after [`Stopped`](StudyError::Stopped) the folder keeps the finished experiments.
 pub fn run_in(
     folder: &Path,
     study: &Study,
@@ -198,7 +198,7 @@ pub fn run_in(
     plan.claim(folder)?;
     let jobs = study.jobs_of_part(part);
     let tables = Tables::of(folder);
-    // Once they were asked for, they belong to the study.
+    // Once requested, they belong to the study.
     let with_elements = with_elements || tables.elements.exists();
     if tables.runs.exists() && tables.elements.exists() >= with_elements {
         return Ok((plan, tables.read(study, &jobs)?));
@@ -220,7 +220,8 @@ pub fn run_in(
     Ok((plan, found))
 }
 
-/// Nothing of a chunk is kept if the study was stopped meanwhile: programs are ended then, which is no failure of theirs.
+/// Runs a chunk of experiments. None of its results are kept if the study is stopped meanwhile: programs are terminated
+/// then, which must not count as their failure.
 fn experiments(study: &Study, chunk: &[Job], with_elements: bool) -> Result<Found, StudyError> {
     let one = |job: &Job| {
         study.stop.check()?;
@@ -241,7 +242,7 @@ fn experiments(study: &Study, chunk: &[Job], with_elements: bool) -> Result<Foun
     })
 }
 
-/// Writes the tables and the result, and removes the tables of chunks; the summary that comes back has the times too.
+/// Writes the tables and the result, and removes the tables of chunks; the returned summary includes the durations.
 ///
 /// # Errors
 /// [`StudyError::File`] if writing fails.

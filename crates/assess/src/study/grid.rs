@@ -1,13 +1,13 @@
-//! The grid of a study: every combination of the values of some keys of a scene.
+//! The grid of a study: all combinations of the values of some keys of a scene.
 
 use super::{Cell, StudyError};
 use catoptric_sim::Scene;
 use std::str::FromStr;
 
-/// Most values that a range of an axis is divided into.
-const MOST_STEPS: u32 = 1000;
+/// Maximum number of values in a range of an axis.
+const MAX_STEPS: u32 = 1000;
 
-/// A key of the scene and the values that it takes in turn.
+/// A key of the scene and its values.
 ///
 /// ```
 /// use catoptric_assess::study::Axis;
@@ -32,7 +32,7 @@ impl Axis {
         &self.key
     }
 
-    /// Its values, each once.
+    /// Its values, without repetition.
     pub fn values(&self) -> &[String] {
         &self.values
     }
@@ -45,7 +45,7 @@ impl FromStr for Axis {
     fn from_str(text: &str) -> Result<Self, StudyError> {
         let wrong = || {
             StudyError::invalid(
-                format!("axis {text}: it is neither KEY=a,b,c nor KEY=from:to:steps"),
+                format!("axis {text}: expected KEY=a,b,c or KEY=from:to:steps"),
                 "experiment.poses_per_group=3,4,6 or errors.drift_sd_mm=0:2:5",
             )
         };
@@ -57,7 +57,7 @@ impl FromStr for Axis {
                 let steps: u32 = steps
                     .parse()
                     .ok()
-                    .filter(|n| (2..=MOST_STEPS).contains(n))
+                    .filter(|n| (2..=MAX_STEPS).contains(n))
                     .ok_or_else(wrong)?;
                 (0..steps)
                     .map(|i| (from + (to - from) * f64::from(i) / f64::from(steps - 1)).to_string())
@@ -71,7 +71,7 @@ impl FromStr for Axis {
         }
         if let Some(twice) = (1..values.len()).find(|i| values[..*i].contains(&values[*i])) {
             return Err(StudyError::invalid(
-                format!("axis {text}: {} is there twice", values[twice]),
+                format!("axis {text}: {} is given twice", values[twice]),
                 "give every value of an axis once",
             ));
         }
@@ -83,10 +83,11 @@ impl FromStr for Axis {
     }
 }
 
-/// Every combination of the axes' values, each with the scene that `load` makes of the settings `KEY=VALUE`.
+/// Returns all combinations of the values of the axes, each with the scene that `load` returns for the settings
+/// `KEY=VALUE`.
 ///
 /// # Errors
-/// [`StudyError::Invalid`] if a key has two axes, or an axis and a setting; else what `load` says.
+/// [`StudyError::Invalid`] if a key has two axes, or an axis and a setting; any error of `load`.
 pub fn grid<E: From<StudyError>>(
     axes: &[Axis],
     settings: &[String],
@@ -96,7 +97,7 @@ pub fn grid<E: From<StudyError>>(
     for (number, axis) in axes.iter().enumerate() {
         if axes[..number].iter().any(|other| other.key == axis.key) {
             return Err(StudyError::invalid(
-                format!("axis {}: {} is an axis already", axis.text, axis.key),
+                format!("axis {}: {} already has an axis", axis.text, axis.key),
                 "give all values of a key in one axis",
             )
             .into());
@@ -107,7 +108,7 @@ pub fn grid<E: From<StudyError>>(
         {
             return Err(StudyError::invalid(
                 format!("axis {}: the setting {set} gives it one value", axis.text),
-                "leave the setting out",
+                "omit the setting",
             )
             .into());
         }

@@ -1,19 +1,19 @@
-//! Runs of several parts as those of one study: each once, in order, and none missing.
+//! Merging of the runs of several parts into those of one study: each exactly once and in order.
 
 use super::{Job, Run, Study};
 
-/// Puts the runs of all parts of a study in order.
+/// Sorts the runs of all parts of a study.
 ///
 /// # Errors
-/// In words: the first run that is missing, there twice, or of no contestant of this study.
+/// As text, the first run that is missing, duplicate, or of an unknown contestant.
 pub fn merge(study: &Study, runs: Vec<Run>) -> Result<Vec<Run>, String> {
     in_order(study, &study.jobs().collect::<Vec<_>>(), runs)
 }
 
-/// Puts the runs of some experiments in order; `jobs` are in the study's order.
+/// Sorts the runs of some experiments; `jobs` are in the order of the study.
 ///
 /// # Errors
-/// As [`merge`].
+/// Same as [`merge`].
 pub fn in_order(study: &Study, jobs: &[Job], mut runs: Vec<Run>) -> Result<Vec<Run>, String> {
     let names: Vec<String> = study.contestants.iter().map(super::Contestant::name).collect();
     let key = |r: &Run| (r.cell, r.seed, names.iter().position(|n| *n == r.method));
@@ -38,7 +38,7 @@ pub fn in_order(study: &Study, jobs: &[Job], mut runs: Vec<Run>) -> Result<Vec<R
 
 fn too_many(run: &Run) -> String {
     format!(
-        "there is a run too many, of {} on seed {} of cell {}",
+        "there is an extra run, of {} on seed {} of cell {}",
         run.method, run.seed, run.cell
     )
 }
@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_are_put_in_order_and_must_be_whole() {
+    fn parts_are_sorted_and_must_be_complete() {
         let study = study();
         let whole = runs(&study);
         let text = |runs: &[Run]| to_csv(runs);
@@ -88,17 +88,17 @@ mod tests {
         mixed.push(whole[5].clone());
         assert_eq!(
             merge(&study, mixed.clone()),
-            Err("there is a run too many, of beam on seed 3 of cell 0".to_owned())
+            Err("there is an extra run, of beam on seed 3 of cell 0".to_owned())
         );
         mixed[0].method = "other".to_owned();
         assert_eq!(
             merge(&study, mixed),
-            Err("there is a run too many, of other on seed 3 of cell 0".to_owned())
+            Err("there is an extra run, of other on seed 3 of cell 0".to_owned())
         );
     }
 
     #[test]
-    fn parts_share_the_experiments_out() {
+    fn parts_divide_the_experiments() {
         let study = study();
         let mut all: Vec<Job> = [1, 2]
             .iter()

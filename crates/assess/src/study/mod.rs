@@ -1,14 +1,14 @@
-//! Monte-Carlo studies: many seeds, scene values and calibrators, and what their errors have in common.
+//! Monte Carlo studies: the statistics of errors over many seeds, scene values and calibrators.
 //!
-//! A run is one experiment of one cell of the grid of scene values, simulated, calibrated by every contestant and scored
-//! in memory. Runs are independent, so that statistics over them have exact bounds; the elements of one run are not, since
-//! they share mounting, boards and biases. What needs independence therefore takes one element of each run:
+//! A run is one experiment of one cell of the grid of scene values, simulated, calibrated by a contestant and scored in
+//! memory. Runs are independent, so statistics over them have exact bounds; the elements of one run are not, since they
+//! share mounting, boards and biases. Statistics that need independence therefore use one element of each run:
 //!
 //! ```text
 //! per-axis error  √(mean of squares over elements and runs)      efficiency  1 / mean(error²/bound²) over runs
 //! ANEES           mean(eᵀP⁻¹e)/2 of one element per run, 1 if P is honest, within χ²_{2n}/2n bounds of 99.9 %
 //! coverage        share of those inside their 68, 95, 99 % ellipses, Clopper–Pearson intervals of 95 %
-//! bias            Hotelling's T² of the same elements' mean error: p of an error as large by chance
+//! bias            Hotelling's T² of the same elements' mean error: p-value under the hypothesis of no bias
 //! ```
 //!
 //! ```
@@ -76,14 +76,14 @@ use std::sync::Arc;
 /// Version of `study.json`.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// Who calibrates.
+/// A calibrator in a study.
 #[derive(Clone)]
 pub enum Contestant {
     /// One of our methods.
     Method(Method),
-    /// One of our methods, told of no bias: the session's corrections are taken out first.
+    /// One of our methods without bias corrections: those of the session are removed first.
     Uncorrected(Method),
-    /// The truth itself, which must score no error.
+    /// The truth itself, which must score zero error.
     Oracle,
     /// A program that is given a blind dataset.
     #[cfg(feature = "recording")]
@@ -101,22 +101,22 @@ impl fmt::Debug for Contestant {
 /// One point of the grid of scene values.
 #[derive(Debug, Clone)]
 pub struct Cell {
-    /// Keys and values as they were set, in the order of the axes.
+    /// Keys and values, in the order of the axes.
     pub values: Vec<(String, String)>,
     /// The scene with them.
     pub scene: Scene,
 }
 
-/// What is studied.
+/// A study: the grid, the number of seeds and the contestants.
 #[derive(Debug, Clone)]
 pub struct Study {
     /// The grid.
     pub cells: Vec<Cell>,
-    /// Seeds 1 to this one.
+    /// Number of seeds: 1 to this one.
     pub seeds: u64,
-    /// Who calibrates each experiment.
+    /// The calibrators of each experiment.
     pub contestants: Vec<Contestant>,
-    /// Once it is set, programs under way are ended; what they were at is then no result.
+    /// Once a stop is requested, running programs are terminated, and their experiments yield no result.
     pub stop: Stop,
 }
 
@@ -130,7 +130,7 @@ pub struct Job {
 }
 
 impl Contestant {
-    /// One of our methods, or "oracle", by its name.
+    /// Returns one of our methods, or "oracle", by its name.
     ///
     /// # Errors
     /// [`CalibError::UnknownMethod`] lists the names.
@@ -141,7 +141,7 @@ impl Contestant {
         }
     }
 
-    /// What tables call it.
+    /// Its name in tables.
     pub fn name(&self) -> String {
         match self {
             Self::Method(method) => method.name().to_owned(),
@@ -155,7 +155,7 @@ impl Contestant {
 }
 
 impl Study {
-    /// One scene as it is.
+    /// Creates a study of a single scene.
     pub fn of_scene(scene: Scene, seeds: u64, contestants: Vec<Contestant>) -> Self {
         Self {
             cells: vec![Cell {
@@ -174,7 +174,7 @@ impl Study {
         (0..self.cells.len()).flat_map(move |cell| (1..=seeds).map(move |seed| Job { cell, seed }))
     }
 
-    /// The experiments of a part: every `parts`-th, so that all parts take about as long.
+    /// The experiments of a part: every `parts`-th one, so that all parts take about the same time.
     pub fn jobs_of_part(&self, Part { part, parts }: Part) -> Vec<Job> {
         self.jobs()
             .skip(part.saturating_sub(1))

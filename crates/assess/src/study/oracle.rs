@@ -1,4 +1,4 @@
-//! The truth as a calibration: what a score must find no error in.
+//! The oracle: the truth as a calibration, which must score zero error.
 
 use catoptric_calib::{CalibError, Calibrator};
 use catoptric_model::calibration::MountEstimate;
@@ -6,13 +6,13 @@ use catoptric_model::{BeamEstimate, Calibration, Dataset, Status, calibration};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
 
-/// Covariance that stands for certainty, in square radians: a microradian's.
+/// Variance that represents certainty, in square radians: a standard deviation of one microradian.
 const CERTAIN: f64 = 1e-12;
 
-/// A calibrator that knows the truth. It is no estimator: it shows that a score is right.
+/// A calibrator that knows the truth. It is not an estimator but a check of the score.
 #[derive(Debug, Clone)]
 pub struct Oracle {
-    /// What it knows.
+    /// The truth.
     pub truth: Truth,
 }
 

@@ -1,11 +1,11 @@
-//! A part of a study, for machines that work side by side.
+//! A part of a study, for running it on several machines in parallel.
 
 use super::StudyError;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// Which part of how many, written `1/4`.
+/// A part of a study by its number and the number of parts, written `1/4`.
 ///
 /// ```
 /// use catoptric_assess::study::Part;
@@ -15,14 +15,14 @@ use std::str::FromStr;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(from = "[usize; 2]", into = "[usize; 2]")]
 pub struct Part {
-    /// Which, from 1.
+    /// Number of the part, from 1.
     pub part: usize,
-    /// Of how many.
+    /// Number of parts.
     pub parts: usize,
 }
 
 impl Part {
-    /// All of it.
+    /// The whole study.
     pub const WHOLE: Self = Self { part: 1, parts: 1 };
 }
 
@@ -58,7 +58,7 @@ impl FromStr for Part {
             .filter(|found| (1..=found.parts).contains(&found.part))
             .ok_or_else(|| {
                 StudyError::invalid(
-                    format!("shard {text}: it is no part of a whole"),
+                    format!("shard {text}: expected i/N with i from 1 to N"),
                     "1/4 is the first of four",
                 )
             })

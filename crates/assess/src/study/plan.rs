@@ -1,4 +1,4 @@
-//! What was asked for, in the folder of the study: what makes two folders parts of one study.
+//! The plan of a study, written to its folder: what was requested, by which folders are recognized as parts of one study.
 
 use super::{Cell, Contestant, Part, Program, SCHEMA_VERSION, Study, StudyError};
 use catoptric_files::scene::{self, Template};
@@ -17,14 +17,14 @@ pub struct Plan {
     version: String,
     /// Name of the scene.
     pub name: String,
-    /// Every cell's values and the SHA-256 of its scene.
+    /// The values of every cell and the SHA-256 of its scene.
     cells: Vec<PlannedCell>,
     seeds: u64,
     contestants: Vec<String>,
-    /// Those of the contestants that are programs.
+    /// The contestants that are programs.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     programs: Vec<Program>,
-    /// Which part of how many.
+    /// The part that the folder contains.
     pub shard: Part,
 }
 
@@ -36,7 +36,7 @@ struct PlannedCell {
 }
 
 impl Plan {
-    /// The plan of a part of a study.
+    /// Creates the plan of a part of a study.
     pub fn of(study: &Study, shard: Part) -> Result<Self, StudyError> {
         let cells = study.cells.iter().map(|cell| {
             let text = scene::to_toml(&cell.scene).map_err(|e| {
@@ -66,12 +66,12 @@ impl Plan {
         })
     }
 
-    /// The plan of a folder.
+    /// Reads the plan of a folder.
     pub fn read(folder: &Path) -> Result<Self, StudyError> {
         Ok(read_json(folder.join(FILE))?)
     }
 
-    /// Takes a folder that is new, or of the very same study.
+    /// Claims a folder that is new, or belongs to the same part of the same study.
     pub fn claim(&self, out: &Path) -> Result<(), StudyError> {
         if out.join(FILE).exists() {
             let there = Self::read(out)?;
@@ -80,36 +80,36 @@ impl Plan {
             }
             let what = there.difference(self);
             return Err(StudyError::invalid(
-                format!("{} holds another study: {what}", out.display()),
-                "give another --out, or the same arguments to go on with it",
+                format!("{} contains another study: {what}", out.display()),
+                "choose another --out, or give the same arguments to resume it",
             ));
         }
         if out.read_dir().is_ok_and(|mut entries| entries.next().is_some()) {
             return Err(StudyError::invalid(
-                format!("{} is not empty and holds no study", out.display()),
-                "give another --out",
+                format!("{} is not empty and contains no study", out.display()),
+                "choose another --out",
             ));
         }
         std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
         Ok(write_json(out.join(FILE), self)?)
     }
 
-    /// What of another plan is not as here, in words.
+    /// Describes how this plan differs from another one.
     pub fn difference(&self, wanted: &Self) -> String {
         if self.version != wanted.version {
             format!(
-                "it was begun by version {}, this is {}",
+                "it was started by version {}, this is {}",
                 self.version, wanted.version
             )
         } else if self.seeds != wanted.seeds {
-            format!("{} seeds, {} asked for", self.seeds, wanted.seeds)
+            format!("{} seeds, {} requested", self.seeds, wanted.seeds)
         } else if self.contestants != wanted.contestants {
             let names = |plan: &Self| plan.contestants.join(",");
-            format!("methods {}, {} asked for", names(self), names(wanted))
+            format!("methods {}, {} requested", names(self), names(wanted))
         } else if self.programs != wanted.programs {
-            "a program's command or its time differs".to_owned()
+            "a program's command or time limit differs".to_owned()
         } else if self.shard != wanted.shard {
-            format!("shard {}, {} asked for", self.shard, wanted.shard)
+            format!("shard {}, {} requested", self.shard, wanted.shard)
         } else if self.cells.len() == wanted.cells.len()
             && self
                 .cells
@@ -123,7 +123,7 @@ impl Plan {
         }
     }
 
-    /// The study as far as names and values go; its scenes are not needed any more.
+    /// Reconstructs the study with its names and values, but not its scenes, which merging does not need.
     pub fn study(&self) -> Result<Study, StudyError> {
         let scene = scene::parse(Template::Prototype.text(), "prototype.toml", &[])?;
         let contestant = |name: &String| {
@@ -137,8 +137,8 @@ impl Plan {
                 (Ok(method), _) => Ok(Contestant::Method(method)),
                 (_, Some(Ok(method))) => Ok(Contestant::Uncorrected(method)),
                 _ => Err(StudyError::invalid(
-                    format!("{FILE}: {name:?} is no method of ours and no program of the plan"),
-                    "a plan is written by `catoptric study`; do the study again",
+                    format!("{FILE}: {name:?} is neither one of our methods nor a program of the plan"),
+                    "a plan is written by `catoptric study`; run the study again",
                 )),
             }
         };

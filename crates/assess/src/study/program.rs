@@ -1,4 +1,4 @@
-//! Anybody's calibrator as a program: it gets the folder of a blind dataset and writes `calibration.json`.
+//! Third-party calibrators as programs: each is given the folder of a blind dataset and writes `calibration.json`.
 
 use crate::validate::{Severity, validate};
 use catoptric_files::{dataset::DatasetWriter, manifest::Provenance};
@@ -9,27 +9,27 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Characters of a program's own words that are passed on.
+/// Maximum number of characters quoted from a program's output.
 const QUOTED: usize = 300;
 
-/// Time between two looks whether a program has ended.
+/// Interval at which a program is polled for its end.
 const POLL: Duration = Duration::from_millis(20);
 
-/// A program and how it is called.
+/// A calibration program and its command line.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Program {
-    /// What tables call it.
+    /// Its name in tables.
     pub name: String,
-    /// Words of the command; `{dataset}` and `{out}` stand for the folder and for the file to write, and each is added at the
-    /// end if no word has it.
+    /// Words of the command; `{dataset}` and `{out}` are replaced by the folder and by the file to write, and appended
+    /// if no word contains them.
     pub command: Vec<String>,
-    /// After how long it is taken to hang, in seconds. It is ended then, and on Unix so is what it has started itself.
+    /// Time limit, in seconds. The program is killed then, on Unix along with its child processes.
     pub timeout_s: u64,
 }
 
 impl Program {
-    /// A program from `NAME=COMMAND`, the command split at spaces; `None` without a name or a command.
+    /// Parses `NAME=COMMAND`, splitting the command at spaces; `None` without a name or a command.
     pub fn parse(text: &str, timeout_s: u64) -> Option<Self> {
         let (name, command) = text.split_once('=')?;
         let command: Vec<String> = command.split_whitespace().map(str::to_owned).collect();
@@ -40,14 +40,14 @@ impl Program {
         })
     }
 
-    /// Records an experiment into a folder that goes afterwards, without its truth, and runs the program on it. Once `stop`
-    /// is set it is ended as one that hangs.
+    /// Records an experiment into a temporary folder, without its truth, and runs the program on it. Once `stop` is
+    /// requested, the program is killed.
     ///
     /// # Errors
-    /// In words, which do not depend on where the folder was: the program cannot be started, fails, hangs, or what it writes
-    /// is no sane calibration.
+    /// As text independent of the path of the folder: the program cannot be started, fails, exceeds its time limit, or
+    /// does not write a valid calibration.
     pub fn calibrate(&self, laboratory: &Laboratory, stop: &Stop) -> Result<Calibration, String> {
-        let folder = tempfile::tempdir().map_err(|e| format!("no folder can be made for it: {e}"))?;
+        let folder = tempfile::tempdir().map_err(|e| format!("no folder can be created for it: {e}"))?;
         self.calibrate_in(folder.path(), laboratory, stop)
             .map_err(|words| shortened(&anywhere(folder.path(), words)))
     }
@@ -73,7 +73,7 @@ impl Program {
         }
     }
 
-    /// The words of the command for the places of the files.
+    /// Returns the words of the command with the paths of the files.
     fn words(&self, dataset: &Path, out: &Path) -> Vec<String> {
         let places =
             [("{dataset}", dataset), ("{out}", out)].map(|(key, path)| (key, path.to_string_lossy()));
@@ -123,7 +123,7 @@ impl Program {
     }
 }
 
-/// Starts a program at the head of a process group of its own, so that all it starts can be ended with it.
+/// Starts a program as the leader of a new process group, so that its child processes can be killed with it.
 #[cfg(unix)]
 fn spawn(command: &mut Command) -> std::io::Result<Child> {
     use std::os::unix::process::CommandExt;
@@ -135,20 +135,20 @@ fn spawn(command: &mut Command) -> std::io::Result<Child> {
     command.spawn()
 }
 
-/// Ends a program that has not been waited for, so that its number is still its own, and its group.
+/// Kills a program and its process group. It has not been waited for, so its process ID is still valid.
 fn end(child: &mut Child) {
     #[cfg(unix)]
     if let Ok(group) = i32::try_from(child.id()) {
         use nix::sys::signal::{Signal, killpg};
-        // Nobody may be left in it.
+        // The group may be empty already.
         let _ = killpg(nix::unistd::Pid::from_raw(group), Signal::SIGKILL);
     }
-    // It may just have ended by itself.
+    // It may just have ended on its own.
     let _ = child.kill();
     let _ = child.wait();
 }
 
-/// What a program said.
+/// Returns what a program wrote to standard error.
 fn last_words(mut said: std::fs::File) -> String {
     use std::io::{Read, Seek, SeekFrom};
     let mut text = Vec::new();
@@ -162,7 +162,7 @@ fn last_words(mut said: std::fs::File) -> String {
     }
 }
 
-/// Words without the place of a folder of chance, so that the same failure reads the same in every run.
+/// Replaces the path of the temporary folder in a text, so that the same failure reads the same in every run.
 fn anywhere(folder: &Path, words: String) -> String {
     let real = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
     let mut words = words;
@@ -175,7 +175,7 @@ fn anywhere(folder: &Path, words: String) -> String {
     words
 }
 
-/// Words on one line, and their beginning and end if they are long: a program says last what is wrong.
+/// Joins a text to one line, and shortens a long one to its beginning and end, where programs report what is wrong.
 fn shortened(words: &str) -> String {
     let line = words.split_whitespace().collect::<Vec<_>>().join(" ");
     let length = line.chars().count();
@@ -188,7 +188,7 @@ fn shortened(words: &str) -> String {
     format!("{begin} … {end}")
 }
 
-/// The dataset of a laboratory, blind.
+/// Writes the dataset of a laboratory without the truth.
 fn record(laboratory: &Laboratory, out: &Path) -> Result<(), Box<dyn std::error::Error>> {
     let mut writer = DatasetWriter::create(out, false, &laboratory.session()?)?;
     for number in 0..laboratory.stretches() {
@@ -207,10 +207,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_failure_reads_alike_wherever_it_was() {
-        let folder = Path::new("/folder/of-chance");
+    fn a_failure_reads_the_same_in_every_folder() {
+        let folder = Path::new("/folder/of-random");
         let words =
-            "no /folder/of-chance/dataset/x,\n no /folder/of-chance/calibration.json, no /folder/of-chance/y"
+            "no /folder/of-random/dataset/x,\n no /folder/of-random/calibration.json, no /folder/of-random/y"
                 .to_owned();
         let said = shortened(&anywhere(folder, words));
         assert_eq!(said, "no {dataset}/x, no {out}, no {folder}/y");
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn a_command_gets_the_places_that_it_does_not_name() {
+    fn missing_placeholders_are_appended_to_a_command() {
         let words = |command: &str| {
             let program = Program::parse(&format!("mine={command}"), 5).expect("it has a command");
             program.words(Path::new("/d"), Path::new("/o")).join(" ")

@@ -10,7 +10,7 @@ use catoptric_sim::truth::BeamClass;
 use catoptric_sim::{Laboratory, SimError, Truth};
 use std::time::Instant;
 
-/// What one contestant made of one experiment. Angles are in radians; figures that do not exist are NaN.
+/// Result of one contestant in one experiment. Angles are in radians; figures that do not exist are NaN.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
     /// Index of the cell.
@@ -25,42 +25,42 @@ pub struct Run {
     pub abstained: usize,
     /// Such elements with neither.
     pub missed: usize,
-    /// Elements solved that are not deflected.
+    /// Solved elements that are not deflected.
     pub wrong: usize,
-    /// Mean square error along an axis, in the sensor frame and in the room frame, in rad².
+    /// Mean square per-axis error in the sensor frame, in rad².
     pub square: f64,
-    /// As `square`, in the room frame.
+    /// Mean square per-axis error in the room frame, in rad².
     pub room_square: f64,
-    /// Mean of the limit on it, over the same elements.
+    /// Mean of the limit on `square`, over the same elements.
     pub bound_square: f64,
     /// Mean over the elements of eᵀP⁻¹e/2.
     pub nees: f64,
-    /// One element, drawn by the seed: its beam.
+    /// Beam of one element, selected by the seed.
     pub beam: usize,
-    /// Its errors cos φ·δθ and δφ.
+    /// Its error cos φ·δθ.
     pub across: f64,
-    /// As `across`.
+    /// Its error δφ.
     pub up: f64,
     /// Its eᵀP⁻¹e.
     pub mahalanobis_squared: f64,
     /// Why there is no calibration; empty otherwise.
     pub failure: String,
-    /// Time it took, in milliseconds: no part of a table that is compared.
+    /// Duration, in milliseconds; not part of tables that are compared.
     pub milliseconds: f64,
 }
 
 /// Runs every contestant on one experiment.
 ///
 /// # Errors
-/// A scene that cannot be set up. A contestant that fails is a result, not an error.
+/// The scene cannot be set up. A contestant that fails is a result, not an error.
 pub fn run(study: &Study, job: Job) -> Result<Vec<Run>, SimError> {
     Ok(run_with_elements(study, job)?.0)
 }
 
-/// As [`run`], and the angles of every scored element.
+/// Same as [`run`], and the angles of every scored element.
 ///
 /// # Errors
-/// As [`run`].
+/// Same as [`run`].
 pub fn run_with_elements(study: &Study, job: Job) -> Result<(Vec<Run>, Vec<ElementAngles>), SimError> {
     let experiment = Experiment::of(study, job)?;
     let mut runs = Vec::with_capacity(study.contestants.len());
@@ -80,7 +80,7 @@ pub fn run_with_elements(study: &Study, job: Job) -> Result<(Vec<Run>, Vec<Eleme
 const IN_MEMORY: &str = "a simulated dataset is in memory";
 
 struct Experiment {
-    /// What a program is given its dataset by.
+    /// Records the dataset for programs.
     #[cfg(feature = "recording")]
     laboratory: Laboratory,
     dataset: Dataset,
@@ -109,7 +109,7 @@ impl Experiment {
             Contestant::Uncorrected(method) => {
                 let mut dataset = self.dataset.clone();
                 let believed = &mut dataset.session.believed;
-                // Who does not correct does not know better: the biases are as likely as they are large.
+                // Without corrections, the believed standard deviations must cover the biases themselves.
                 let nodes = &believed.bias.distance.error_mm;
                 let largest = nodes.iter().fold(0.0, |l: f64, e| l.max(e.abs()));
                 believed.distance_bias_sd_mm = libm::hypot(believed.distance_bias_sd_mm, largest);
@@ -202,10 +202,10 @@ impl Experiment {
     }
 }
 
-/// One element by the seed: a multiple of the golden section, so that successive seeds go all over the scan.
+/// Selects one element by the seed: a multiple of the golden ratio, so that successive seeds cover the whole scan.
 pub(crate) fn drawn<'e>(scored: &[&'e ElementError], seed: u64) -> Option<&'e ElementError> {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
-    // Below the number of elements.
+    // The result is below the number of elements.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let place = ((seed as f64 * GOLDEN).fract() * scored.len() as f64) as usize;
     scored.get(place).copied()

@@ -1,14 +1,14 @@
-//! The shards of a study, put together.
+//! Merging of the shards of a study.
 
 use super::folder::{Found, Tables};
 use super::plan::Plan;
 use super::{Part, Study, StudyError};
 use std::path::{Path, PathBuf};
 
-/// The plan, the study and all runs of the shards in some folders.
+/// Reads the plan, the study and all runs from the folders of its shards.
 ///
 /// # Errors
-/// [`StudyError`] if they are not all the shards of one study, or one of them is not finished.
+/// [`StudyError`] unless they are all the shards of one study, each finished.
 pub fn gather(folders: &[PathBuf]) -> Result<(Plan, Study, Found), StudyError> {
     let plans = folders
         .iter()
@@ -25,16 +25,16 @@ pub fn gather(folders: &[PathBuf]) -> Result<(Plan, Study, Found), StudyError> {
         if !tables.runs.exists() {
             return Err(StudyError::invalid(
                 format!("{} is not finished", folder.display()),
-                "the command that began it goes on with it",
+                "run its command again to resume it",
             ));
         }
         if with_elements && !tables.elements.exists() {
             return Err(StudyError::invalid(
                 format!(
-                    "{} has no list of elements, and other shards have",
+                    "{} has no list of elements, but other shards have one",
                     folder.display()
                 ),
-                "give its command again with --elements",
+                "run its command again with --elements",
             ));
         }
         found.extend(tables.read(&study, &study.jobs_of_part(plan.shard))?);
@@ -43,7 +43,7 @@ pub fn gather(folders: &[PathBuf]) -> Result<(Plan, Study, Found), StudyError> {
     Ok((whole, study, found))
 }
 
-/// The plan of the whole, if these are all its parts.
+/// Returns the plan of the whole study, if these are all its parts.
 fn one_study(plans: &[(&Path, Plan)]) -> Result<Plan, StudyError> {
     let Some((first, plan)) = plans.first() else {
         return Err(StudyError::invalid(
@@ -56,15 +56,15 @@ fn one_study(plans: &[(&Path, Plan)]) -> Result<Plan, StudyError> {
     let mut seen: Vec<usize> = Vec::new();
     for (folder, plan) in plans {
         let Part { part, parts } = plan.shard;
-        let mut alike = plan.clone();
-        alike.shard = Part::WHOLE;
-        if alike != whole {
+        let mut of_whole = plan.clone();
+        of_whole.shard = Part::WHOLE;
+        if of_whole != whole {
             return Err(StudyError::invalid(
                 format!(
-                    "{} is a part of another study than {}: {}",
+                    "{} and {} are not parts of the same study: {}",
                     folder.display(),
                     first.display(),
-                    alike.difference(&whole).replace("asked for", "there")
+                    of_whole.difference(&whole).replace("requested", "there")
                 ),
                 "give the shards of one study: same scene, seeds, methods and axes",
             ));

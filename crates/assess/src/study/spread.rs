@@ -1,9 +1,9 @@
-//! How the angles of each element scatter over the trials of a study, as in the paper's Figure 10.
+//! Scatter of the angles of each element over the trials of a study, as in the paper's Figure 10.
 
 use super::ElementAngles;
 use std::collections::BTreeMap;
 
-/// First line of `spread.csv`. Angles are in degrees.
+/// Header of `spread.csv`. Angles are in degrees.
 const HEADER: [&str; 12] = [
     "cell",
     "method",
@@ -19,8 +19,8 @@ const HEADER: [&str; 12] = [
     "elevation_error_sd_deg",
 ];
 
-/// θ_a and φ of one element by one contestant in one cell, over its trials, in degrees. Standard deviations are those of a
-/// sample, and NaN for one trial.
+/// Statistics of θ_a and φ of one element by one contestant in one cell, over its trials, in degrees. Standard deviations
+/// are those of a sample, and NaN for one trial.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spread {
     /// Index of the cell.
@@ -29,7 +29,7 @@ pub struct Spread {
     pub method: String,
     /// Beam.
     pub beam: usize,
-    /// Trials in which it was scored.
+    /// Number of trials in which it was scored.
     pub trials: usize,
     /// Mean of the estimates.
     pub mean: [f64; 2],
@@ -37,11 +37,11 @@ pub struct Spread {
     pub sd: [f64; 2],
     /// Mean error.
     pub error_mean: [f64; 2],
-    /// Standard deviation of the error: that of the estimates where the mirror stands alike in all trials.
+    /// Standard deviation of the error: equals that of the estimates if the mirror has the same pose in all trials.
     pub error_sd: [f64; 2],
 }
 
-/// The spread of every element, by cell, then in the order in which the contestants first come, then by beam.
+/// Returns the spread of every element, ordered by cell, then by first appearance of the contestant, then by beam.
 pub fn spread(elements: &[ElementAngles]) -> Vec<Spread> {
     let mut order: Vec<&str> = Vec::new();
     let mut groups: BTreeMap<(usize, usize, usize), Vec<&ElementAngles>> = BTreeMap::new();
@@ -53,16 +53,16 @@ pub fn spread(elements: &[ElementAngles]) -> Vec<Spread> {
         groups.entry((e.cell, place, e.beam)).or_default().push(e);
     }
     let of_group = |((cell, place, beam), trials): ((usize, usize, usize), Vec<&ElementAngles>)| {
-        // An azimuth is averaged beside the first trial's, so that ±180° is no seam.
+        // Azimuths are averaged relative to that of the first trial, so that there is no discontinuity at ±180°.
         let first = trials[0].estimate;
-        let beside = |e: &&ElementAngles| {
+        let near_first = |e: &&ElementAngles| {
             let azimuth = e.estimate[0] - first[0];
             [
                 first[0] + azimuth - 360.0 * (azimuth / 360.0).round(),
                 e.estimate[1],
             ]
         };
-        let (mean, sd) = moments(&trials.iter().map(beside).collect::<Vec<_>>());
+        let (mean, sd) = moments(&trials.iter().map(near_first).collect::<Vec<_>>());
         let (error_mean, error_sd) = moments(&trials.iter().map(|e| e.error()).collect::<Vec<_>>());
         Spread {
             cell,
@@ -78,7 +78,7 @@ pub fn spread(elements: &[ElementAngles]) -> Vec<Spread> {
     groups.into_iter().map(of_group).collect()
 }
 
-/// The table of spreads, `spread.csv`.
+/// Formats the table of spreads, `spread.csv`.
 pub fn spread_to_csv(spreads: &[Spread]) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
     // Writing to memory cannot fail.
@@ -100,7 +100,7 @@ pub fn spread_to_csv(spreads: &[Spread]) -> String {
     String::from_utf8(bytes).unwrap_or_default()
 }
 
-/// Mean and standard deviation of each of two.
+/// Mean and standard deviation of each component of some pairs.
 fn moments(pairs: &[[f64; 2]]) -> ([f64; 2], [f64; 2]) {
     let n = pairs.len() as f64;
     let mean = [0, 1].map(|i| pairs.iter().map(|p| p[i]).sum::<f64>() / n);

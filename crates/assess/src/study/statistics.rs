@@ -2,8 +2,8 @@
 
 use statrs::distribution::{Beta, ChiSquared, ContinuousCDF, FisherSnedecor};
 
-/// Bounds within which a mean of n squared errors in two dimensions, over 2, lies with the given probability if their
-/// covariance is honest: χ² quantiles with 2n degrees of freedom over 2n.
+/// Bounds that contain the mean of n squared errors in two dimensions, divided by 2, with the given probability if their
+/// covariance is honest: χ² quantiles with 2n degrees of freedom, divided by 2n.
 pub(crate) fn mean_bounds(n: usize, probability: f64) -> [f64; 2] {
     let freedom = 2.0 * n as f64;
     let outside = 0.5 * (1.0 - probability);
@@ -15,7 +15,7 @@ pub(crate) fn mean_bounds(n: usize, probability: f64) -> [f64; 2] {
     })
 }
 
-/// The interval of Clopper and Pearson for a share of which `hits` of n were seen, at 95 %.
+/// The 95 % interval of Clopper and Pearson for a share, given `hits` out of n.
 pub(super) fn clopper_pearson(hits: usize, n: usize) -> [f64; 2] {
     share_bounds(hits, n, 0.95)
 }
@@ -38,8 +38,8 @@ pub(crate) fn share_bounds(hits: usize, n: usize, probability: f64) -> [f64; 2] 
     [low, high]
 }
 
-/// Chance of a mean error at least as large if there is no bias: Hotelling's T² = n·x̄ᵀS⁻¹x̄ in two dimensions, of which
-/// (n − 2)/(2(n − 1)) is Fisher's F with 2 and n − 2 degrees of freedom. NaN for fewer than four errors.
+/// Probability of a mean error at least as large if there is no bias: Hotelling's T² = n·x̄ᵀS⁻¹x̄ in two dimensions; T²
+/// times (n − 2)/(2(n − 1)) follows Fisher's F with 2 and n − 2 degrees of freedom. NaN for fewer than four errors.
 pub(super) fn bias_p_value(errors: &[[f64; 2]]) -> f64 {
     let n = errors.len() as f64;
     if errors.len() < 4 {
@@ -73,7 +73,7 @@ mod tests {
         // χ² with 200 degrees of freedom: 152.241 and 255.264 at 0.5 and 99.5 %, of 100 errors in two dimensions.
         let [low, high] = mean_bounds(100, 0.99);
         assert!((200.0 * low - 152.241).abs() < 1e-3 && (200.0 * high - 255.264).abs() < 1e-3);
-        // Clopper and Pearson's own kind of example: 0 of 10 and 8 of 10 (Newcombe 1998).
+        // Clopper–Pearson intervals for 0 of 10 and 8 of 10 (Newcombe 1998).
         let [low, high] = clopper_pearson(0, 10);
         assert!(low == 0.0 && (high - 0.308_497).abs() < 1e-5);
         let [low, high] = clopper_pearson(8, 10);
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bias_is_seen_and_none_is_not() {
+    fn a_bias_is_detected_and_its_absence_too() {
         let around = |x: f64| {
             let errors = [
                 [1.0, 0.3],

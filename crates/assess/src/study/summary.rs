@@ -1,4 +1,4 @@
-//! What the runs of each contestant in each cell have in common.
+//! Statistics over the runs of each contestant in each cell.
 
 use super::statistics::{bias_p_value, clopper_pearson, mean_bounds};
 use super::{Run, SCHEMA_VERSION, Study};
@@ -8,82 +8,81 @@ use std::collections::BTreeMap;
 /// Probability of the bounds on ANEES.
 const PROBABILITY: f64 = 0.999;
 
-/// A study's result: `study.json`.
+/// Result of a study: `study.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// Version of this format.
     pub schema_version: u32,
-    /// Seeds of every cell.
+    /// Number of seeds per cell.
     pub seeds: u64,
-    /// One entry for each contestant in each cell.
+    /// One entry per contestant and cell.
     pub methods: Vec<MethodSummary>,
 }
 
-/// A contestant in a cell. A figure that does not exist is NaN here and `null` in JSON.
+/// Statistics of a contestant in a cell. A figure that does not exist is NaN here and `null` in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MethodSummary {
     /// Name of the contestant.
     pub method: String,
     /// Values of the axes.
     pub axes: BTreeMap<String, String>,
-    /// Experiments.
+    /// Number of experiments.
     pub runs: usize,
-    /// Experiments without a calibration.
+    /// Number of experiments without a calibration.
     pub failed: usize,
     /// Why the first of them has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
-    /// Mean over the runs of deflected elements solved, abstained, missed, and of others solved by mistake.
+    /// Deflected elements that were solved, mean over the runs.
     pub solved: f64,
-    /// As `solved`.
+    /// Deflected elements that abstained, mean over the runs.
     pub abstained: f64,
-    /// As `solved`.
+    /// Deflected elements that were missed, mean over the runs.
     pub missed: f64,
-    /// As `solved`.
+    /// Other elements that were solved by mistake, mean over the runs.
     #[serde(rename = "false")]
     pub wrong: f64,
-    /// Root mean square error along an axis, in degrees.
+    /// Root mean square per-axis error, in degrees.
     pub per_axis_rms_deg: f64,
-    /// Median over the runs of the same.
+    /// Median of the per-axis error over the runs, in degrees.
     pub per_axis_median_deg: f64,
-    /// As `per_axis_rms_deg`, in the room frame.
+    /// Same as `per_axis_rms_deg`, in the room frame.
     pub per_axis_rms_room_deg: f64,
-    /// Limit on it, in degrees.
+    /// Limit on `per_axis_rms_deg`, in degrees.
     pub crlb_per_axis_deg: f64,
-    /// 1 / mean(error²/limit²) over the runs: 1 is the best that can be.
+    /// 1 / mean(error²/limit²) over the runs: 1 is optimal.
     pub efficiency: f64,
     /// Its standard error.
     pub efficiency_se: f64,
     /// Mean eᵀP⁻¹e/2 of one element per run: 1 if the covariance is honest.
     pub anees: f64,
-    /// 99.9 % bounds of an honest one.
+    /// 99.9 % bounds of `anees` for an honest covariance.
     pub anees_bounds: [f64; 2],
-    /// Share of the same elements inside their ellipses.
+    /// Share of the same elements inside their 68 % ellipses.
     pub coverage_68: f64,
-    /// Its 95 % interval, of Clopper and Pearson.
+    /// Its 95 % interval of Clopper and Pearson.
     pub coverage_68_interval: [f64; 2],
-    /// As `coverage_68`.
+    /// Share of the same elements inside their 95 % ellipses.
     pub coverage_95: f64,
-    /// As `coverage_68_interval`.
+    /// Its 95 % interval of Clopper and Pearson.
     pub coverage_95_interval: [f64; 2],
-    /// As `coverage_68`.
+    /// Share of the same elements inside their 99 % ellipses.
     pub coverage_99: f64,
-    /// As `coverage_68_interval`.
+    /// Its 95 % interval of Clopper and Pearson.
     pub coverage_99_interval: [f64; 2],
-    /// Chance of a mean error as large without bias.
+    /// Probability of a mean error at least as large without bias.
     pub bias_p_value: f64,
-    /// Mean time of a calibration, in milliseconds: only where it was measured, and never in `study.json`, which is the same
-    /// every time.
+    /// Mean duration of a calibration, in milliseconds, if measured; never in `study.json`, whose bytes are reproducible.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ms_per_calibration: Option<f64>,
-    /// What the figures say of its honesty.
+    /// Verdict on the honesty of its covariance.
     pub verdict: String,
     /// Figures that do not exist, and why.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub nulls: BTreeMap<&'static str, &'static str>,
 }
 
-/// Sums up runs, which must be in the order of the study's jobs and contestants.
+/// Summarizes runs, which must be in the order of the study's jobs and contestants.
 pub fn summarize(study: &Study, runs: &[Run]) -> Summary {
     let mut methods = Vec::new();
     for (index, cell) in study.cells.iter().enumerate() {
@@ -126,7 +125,7 @@ fn summary(method: String, axes: BTreeMap<String, String>, runs: &[&Run]) -> Met
     let scatter = mean(ratios.iter().map(|r| (r - ratio).powi(2)));
     let mut errors: Vec<f64> = solved.iter().map(|r| r.square.sqrt().to_degrees()).collect();
     errors.sort_by(f64::total_cmp);
-    // An infinite one counts: its covariance rules out the error that was made.
+    // An infinite value counts: its covariance rules out the actual error.
     let squares: Vec<f64> = solved
         .iter()
         .map(|r| r.mahalanobis_squared)
@@ -217,7 +216,7 @@ fn verdict(m: &MethodSummary, judged: usize, solved: usize) -> String {
     }
 }
 
-/// Why a figure is no number, by its key.
+/// Returns the keys of figures that are not finite, with the reasons.
 fn nulls(m: &MethodSummary, judged: usize, drawn: usize) -> BTreeMap<&'static str, &'static str> {
     let nothing = "nothing was solved";
     let because = |reason: &'static str| {
@@ -273,7 +272,7 @@ mod tests {
     use super::*;
     use crate::study::{Contestant, from_csv, to_csv};
 
-    /// The summary of runs with the given eᵀP⁻¹e of their element, as they are written.
+    /// Summarizes runs with the given eᵀP⁻¹e of their element, as written in a table.
     fn of(squares: &[&str]) -> MethodSummary {
         let scene =
             toml::from_str(include_str!("../../../../scenes/reference-facet.toml")).expect("it is valid");
@@ -287,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn verdicts_are_those_of_the_stated_covariance() {
+    fn verdicts_follow_the_stated_covariance() {
         let honest = of(&["2"; 8]);
         assert_eq!((honest.anees, honest.verdict.as_str()), (1.0, "consistent"));
         assert_eq!(
@@ -307,7 +306,7 @@ mod tests {
 
     #[test]
     fn an_error_that_is_ruled_out_counts() {
-        // One covariance of zero among honest ones, and elements without any, which are not judged.
+        // One covariance of zero among honest ones; elements without a covariance are not judged.
         let found = of(&["2", "2", "inf", "", ""]);
         assert_eq!(
             found.verdict,

@@ -1,8 +1,8 @@
-//! Runs as rows of a CSV table, exactly: every number comes back as it was.
+//! Runs as rows of a CSV table, which preserves every number exactly.
 
 use super::Run;
 
-/// First line of `runs.csv`. Squares are in rad², errors in radians.
+/// Header of `runs.csv`. Squares are in rad², errors in radians.
 pub const HEADER: [&str; 16] = [
     "cell",
     "seed",
@@ -22,7 +22,7 @@ pub const HEADER: [&str; 16] = [
     "failure",
 ];
 
-/// The table of some runs.
+/// Formats runs as a table.
 pub fn to_csv(runs: &[Run]) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
     // Writing to memory cannot fail.
@@ -56,10 +56,10 @@ fn row(r: &Run) -> [String; 16] {
     ]
 }
 
-/// Runs from a table, without the times that they took.
+/// Parses runs from a table, which does not contain their durations.
 ///
 /// # Errors
-/// In words, with the line, what is not as [`to_csv`] writes it.
+/// As text, with the line that [`to_csv`] could not have written.
 pub fn from_csv(text: &str) -> Result<Vec<Run>, String> {
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let header = reader.headers().map_err(|e| e.to_string())?;
@@ -69,7 +69,7 @@ pub fn from_csv(text: &str) -> Result<Vec<Run>, String> {
     let mut runs = Vec::new();
     for (i, record) in reader.records().enumerate() {
         let record = record.map_err(|e| e.to_string())?;
-        runs.push(parsed(&record).ok_or_else(|| format!("line {}: it is no run", i + 2))?);
+        runs.push(parsed(&record).ok_or_else(|| format!("line {}: not a valid run", i + 2))?);
     }
     Ok(runs)
 }

@@ -1,9 +1,9 @@
-//! Tables 1 to 4 as measured, beside the paper's, and the numbers of Eqs. 3 to 5.
+//! Tables 1 to 4 as measured, next to the values of the paper, and the fitted parameters of Eqs. (3)–(5).
 
 use catoptric_model::characterization::{Characterization, Parameter, StretchRow};
 use catoptric_model::{RangeBias, TestKind, paper};
 
-/// What a table is about.
+/// Subject of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Subject {
     /// Table 1.
@@ -14,28 +14,28 @@ pub enum Subject {
     Angle,
     /// Table 4.
     Color,
-    /// The numbers of Eqs. 3 to 5.
+    /// The parameters of Eqs. (3)–(5).
     Numbers,
 }
 
-/// A table of words and numbers, for a terminal or a page.
+/// A table of text and numbers, for a terminal or a page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// What it is about.
+    /// Subject.
     pub subject: Subject,
-    /// What it shows.
+    /// Title.
     pub title: &'static str,
-    /// Headings of the columns, with units.
+    /// Column headings, with units.
     pub headings: Vec<&'static str>,
-    /// The cells; a dash where there is nothing.
+    /// The cells; a dash where a value does not exist.
     pub rows: Vec<Vec<String>>,
-    /// What to see in it.
+    /// Remark below the table; may be empty.
     pub remark: String,
 }
 
-/// All tables for which something was recorded.
+/// Returns all tables for which data were recorded.
 ///
-/// `injected` is what a simulation put in, where that is known.
+/// `injected` are the biases that a simulation injected, if known.
 pub fn tables(found: &Characterization, injected: Option<&RangeBias>) -> Vec<Table> {
     let all = [
         spots(found),
@@ -47,10 +47,10 @@ pub fn tables(found: &Characterization, injected: Option<&RangeBias>) -> Vec<Tab
     all.into_iter().filter(|t| !t.rows.is_empty()).collect()
 }
 
-/// A number with some decimals.
+/// Formats a number with the given number of decimals.
 pub fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
-    // Rounded to zero, a negative number is zero.
+    // A negative number that is rounded to zero loses its sign.
     if text
         .trim_start_matches('-')
         .chars()
@@ -90,7 +90,7 @@ fn spots(found: &Characterization) -> Table {
     });
     Table {
         subject: Subject::Spot,
-        title: "Table 1: spot of neighbouring beams",
+        title: "Table 1: spot of neighboring beams",
         headings: vec![
             "distance (m)",
             "beams",
@@ -109,7 +109,7 @@ fn of(found: &Characterization, kind: TestKind) -> impl Iterator<Item = &Stretch
     found.stretches.iter().filter(move |s| s.test == Some(kind))
 }
 
-/// Mean of the mean errors of one setting, once its last trial is reached.
+/// Mean of the mean errors of one setting, at its last trial.
 fn mean_of_setting(found: &Characterization, row: &StretchRow) -> Option<f64> {
     let trials: Vec<&StretchRow> = found
         .stretches
@@ -224,12 +224,12 @@ fn angles(found: &Characterization) -> Table {
             .map(|m| m.misfit_mm.abs())
             .fold(0.0, f64::max);
         let verdict = if fit.is_rejected() {
-            "is rejected, a table stands on it"
+            "is rejected and replaced by a table"
         } else {
             "fits"
         };
         format!(
-            "the cosine law {verdict}: χ² {} with {}, it misses by {} mm at most",
+            "the cosine law {verdict}: χ² {} with {}, maximum misfit {} mm",
             fixed(fit.chi_squared, 1),
             fit.degrees_of_freedom,
             fixed(worst, 1)
@@ -272,7 +272,7 @@ fn noise(found: &Characterization) -> Table {
     }
 }
 
-/// What of a bias a fitted number is.
+/// Returns the injected value of a fitted parameter.
 fn injected_value(parameter: &Parameter, bias: &RangeBias, moved_to_normal: bool) -> f64 {
     let color = parameter.color.as_deref().and_then(|c| bias.color.get(c));
     match parameter.symbol.as_str() {
@@ -296,7 +296,7 @@ fn numbers(found: &Characterization, injected: Option<&RangeBias>) -> Table {
     let normal_in_distance = !found.bias.distance.range_m.is_empty();
     let mut headings = vec!["number", "of", "value", "σ", "unit", "paper"];
     if injected.is_some() {
-        headings.extend(["injected", "off by (σ)"]);
+        headings.extend(["injected", "error (σ)"]);
     }
     let row = |p: &Parameter| {
         let printed = match p.symbol.as_str() {
@@ -323,7 +323,7 @@ fn numbers(found: &Characterization, injected: Option<&RangeBias>) -> Table {
         cells
     };
     let convention = if normal_in_distance {
-        "E_r holds the error at normal incidence, B_a = −A_a"
+        "E_r includes the error at normal incidence, B_a = −A_a"
     } else {
         "E_r is 0"
     };
@@ -334,7 +334,7 @@ fn numbers(found: &Characterization, injected: Option<&RangeBias>) -> Table {
     };
     Table {
         subject: Subject::Numbers,
-        title: "Equations 3 to 5",
+        title: "Parameters of Eqs. (3)–(5)",
         headings,
         rows: found.parameters.iter().map(row).collect(),
         remark: format!(
@@ -347,7 +347,7 @@ fn numbers(found: &Characterization, injected: Option<&RangeBias>) -> Table {
 }
 
 impl Table {
-    /// The table as text, its columns in line, numbers to the right.
+    /// Formats the table as text with aligned columns, numbers right-aligned.
     pub fn text(&self) -> String {
         let width = |column: usize| {
             let cells = self.rows.iter().map(|row| row[column].chars().count());
@@ -385,7 +385,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn columns_are_in_line() {
+    fn columns_are_aligned() {
         let table = Table {
             subject: Subject::Numbers,
             title: "T",
@@ -400,13 +400,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_rounded_to_zero_is_zero() {
+    fn numbers_rounded_to_zero_have_no_sign() {
         assert_eq!(fixed(-0.04, 1), "0.0");
         assert_eq!(fixed(-0.06, 1), "-0.1");
     }
 
     #[test]
-    fn the_paper_stands_beside_what_is_near_it() {
+    fn values_of_the_paper_are_shown_next_to_close_ones_only() {
         assert_eq!(paper::noise("jet_black", 1.02), Some(6.06));
         assert_eq!(paper::noise("jet_black", 1.3), None);
         assert_eq!(paper::noise("white", 1.011), None);

@@ -1,4 +1,4 @@
-//! Without noise every deflected element comes back.
+//! Closure test: without errors, the estimate of every deflected element equals the truth.
 
 use super::Failure;
 use super::trial::Experiment;
@@ -9,7 +9,7 @@ use catoptric_sim::truth::BeamClass;
 use catoptric_sim::{Scene, Truth};
 
 /// Simulates a scene, which should be [without errors](super::without_errors), calibrates it, and compares both angles of
-/// every deflected element with the truth. Gives the largest error, in radians.
+/// every deflected element with the truth. Returns the largest error, in radians.
 ///
 /// ```
 /// use catoptric_calib::Method;
@@ -23,7 +23,7 @@ use catoptric_sim::{Scene, Truth};
 /// ```
 ///
 /// # Errors
-/// [`Failure::Unsolved`], [`Failure::False`] or [`Failure::Off`] for the worst element; what keeps it from being told.
+/// [`Failure::Unsolved`], [`Failure::False`] or [`Failure::Off`] for the worst element; any failure of the experiment.
 pub fn closure(
     scene: &Scene,
     seed: u64,
@@ -35,10 +35,10 @@ pub fn closure(
     closure_of(&experiment.truth, &calibration, within_rad)
 }
 
-/// As [`closure`], for a calibration that is there already, from a file perhaps.
+/// Same as [`closure`], for an existing calibration, such as one from a file.
 ///
 /// # Errors
-/// As [`closure`].
+/// Same as [`closure`].
 pub fn closure_of(truth: &Truth, calibration: &Calibration, within_rad: f64) -> Result<f64, Failure> {
     let seed = truth.seed;
     let mut worst: Option<(f64, usize, String)> = None;
@@ -70,7 +70,7 @@ pub fn closure_of(truth: &Truth, calibration: &Calibration, within_rad: f64) -> 
         };
         let across = wrap(estimate.azimuth - actual.azimuth).abs();
         let off = across.max((estimate.elevation - actual.elevation).abs());
-        // What is no number is worse than any number.
+        // NaN is worse than any number.
         let off = if off.is_nan() { f64::INFINITY } else { off };
         if worst.as_ref().is_none_or(|(w, ..)| off > *w) {
             worst = Some((off, known.beam, facet));
@@ -91,7 +91,7 @@ pub fn closure_of(truth: &Truth, calibration: &Calibration, within_rad: f64) -> 
     })
 }
 
-/// As [`closure`].
+/// Same as [`closure`], but panics.
 ///
 /// # Panics
 /// With the text of the failure.
@@ -102,7 +102,7 @@ pub fn assert_closure(scene: &Scene, seed: u64, calibrator: &(impl Calibrator + 
     }
 }
 
-/// As [`closure_of`].
+/// Same as [`closure_of`], but panics.
 ///
 /// # Panics
 /// With the text of the failure.

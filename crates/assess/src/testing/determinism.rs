@@ -1,26 +1,26 @@
-//! The same data give the same bytes, again and on any number of threads.
+//! Determinism test: the same data yield the same bytes, every time and on any number of threads.
 
 use super::Failure;
 use super::trial::Experiment;
 use catoptric_calib::Calibrator;
 use catoptric_sim::Scene;
 
-/// Runs something twice on each number of threads and compares all results with the first.
+/// Runs a function twice on each number of threads and compares all results with the first one.
 ///
 /// # Errors
-/// In words, where they differ or why it could not be run.
+/// As text: which run differs, or why it could not be run.
 pub fn same_result<T: PartialEq + Send>(threads: &[usize], run: impl Fn() -> T + Sync) -> Result<(), String> {
     let mut first: Option<(T, usize)> = None;
     for &count in threads {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build();
-        let pool = pool.map_err(|e| format!("{count} threads cannot be had: {e}"))?;
+        let pool = pool.map_err(|e| format!("cannot start {count} threads: {e}"))?;
         for time in ["first", "second"] {
             let result = pool.install(&run);
             match &first {
                 None => first = Some((result, count)),
                 Some((expected, on)) if *expected != result => {
                     return Err(format!(
-                        "the {time} run on {count} threads is not what the first run on {on} threads gave"
+                        "the {time} run on {count} threads differs from the first run on {on} threads"
                     ));
                 }
                 Some(_) => {}
@@ -30,7 +30,7 @@ pub fn same_result<T: PartialEq + Send>(threads: &[usize], run: impl Fn() -> T +
     Ok(())
 }
 
-/// Simulates a scene once, and calibrates it twice on each number of threads: all files would be the same, byte by byte.
+/// Simulates a scene once and calibrates it twice on each number of threads: all files must be identical, byte for byte.
 ///
 /// ```
 /// use catoptric_calib::Method;
@@ -44,7 +44,7 @@ pub fn same_result<T: PartialEq + Send>(threads: &[usize], run: impl Fn() -> T +
 /// ```
 ///
 /// # Errors
-/// [`Failure::Different`]; what keeps it from being told.
+/// [`Failure::Different`]; any failure of the experiment.
 pub fn deterministic<C: Calibrator + Sync + ?Sized>(
     scene: &Scene,
     seed: u64,
@@ -52,7 +52,7 @@ pub fn deterministic<C: Calibrator + Sync + ?Sized>(
     threads: &[usize],
 ) -> Result<(), Failure> {
     let experiment = Experiment::of(scene, seed)?;
-    // A calibrator that fails should at least fail alike, and with its own words.
+    // A calibrator that always fails is reported with its own message.
     experiment.calibrate(calibrator)?;
     let bytes = || {
         let calibration = experiment.calibrate(calibrator).map_err(|e| e.to_string())?;
@@ -64,7 +64,7 @@ pub fn deterministic<C: Calibrator + Sync + ?Sized>(
     })
 }
 
-/// As [`deterministic`].
+/// Same as [`deterministic`], but panics.
 ///
 /// # Panics
 /// With the text of the failure.

@@ -1,4 +1,4 @@
-//! What a test found instead of what it asks for.
+//! Failures of the tests of a calibrator, with everything needed to reproduce them.
 
 use super::Significance;
 use catoptric_sim::SimError;
@@ -15,14 +15,14 @@ pub enum Failure {
         /// Why.
         source: SimError,
     },
-    /// The calibrator gave no calibration.
-    #[error("seed {seed}: {calibrator} gives no calibration: {reason}")]
+    /// The calibrator returned no calibration.
+    #[error("seed {seed}: {calibrator} returned no calibration: {reason}")]
     Calibrator {
         /// Seed of the experiment.
         seed: u64,
-        /// Its name.
+        /// Name of the calibrator.
         calibrator: String,
-        /// In its words.
+        /// Its error message.
         reason: String,
     },
     /// A deflected element has no direction.
@@ -34,7 +34,7 @@ pub enum Failure {
         beam: usize,
         /// The facet.
         facet: String,
-        /// What the calibration says of it.
+        /// The entry of the calibration, as text.
         found: String,
     },
     /// A beam that no mirror deflects has a direction.
@@ -50,16 +50,16 @@ pub enum Failure {
     Off {
         /// Seed of the experiment.
         seed: u64,
-        /// Beam, the worst of all.
+        /// The worst beam.
         beam: usize,
         /// The facet.
         facet: String,
-        /// Larger of the errors of θ_a and φ, in radians.
+        /// The larger of the errors of θ_a and φ, in radians.
         off_rad: f64,
-        /// What is allowed, in radians.
+        /// The allowed error, in radians.
         within_rad: f64,
     },
-    /// The truth has no deflected element, or the trials none that was solved: there is nothing to judge.
+    /// The truth has no deflected element, or no trial has a solved one: there is nothing to judge.
     #[error("nothing to judge: {0}")]
     Nothing(String),
     /// An element has a direction without a covariance.
@@ -70,24 +70,24 @@ pub enum Failure {
         /// Beam.
         beam: usize,
     },
-    /// A figure over many trials is outside of its bounds.
+    /// A figure over many trials is outside its bounds.
     #[error(
-        "{what} is {found:.4} over {trials} trials, outside of {low:.4} to {high:.4} (significance {significance}); {meaning}; the worst is seed {seed}, beam {beam}"
+        "{what} is {found:.4} over {trials} trials, outside {low:.4} to {high:.4} (significance {significance}); {meaning}; the worst is seed {seed}, beam {beam}"
     )]
     Gate {
         /// The figure.
         what: &'static str,
         /// Its value.
         found: f64,
-        /// Least value allowed.
+        /// Minimum value allowed.
         low: f64,
-        /// Greatest value allowed.
+        /// Maximum value allowed.
         high: f64,
-        /// Trials that it is over.
+        /// Number of trials.
         trials: usize,
-        /// Chance of this although all is well.
+        /// Probability of this failure although the hypothesis holds.
         significance: Significance,
-        /// What it means.
+        /// Interpretation.
         meaning: &'static str,
         /// Seed of the trial that contributes most.
         seed: u64,

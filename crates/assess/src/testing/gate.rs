@@ -1,31 +1,31 @@
-//! Gates over independent trials: exact bounds of χ², and of Clopper and Pearson.
+//! Gates over independent trials, with the exact bounds of χ² and of Clopper and Pearson.
 //!
 //! ```text
 //! ANEES       A = Σ eᵀP⁻¹e / 2n      2nA is χ² with 2n degrees of freedom if P is honest; two-sided
-//! coverage    hits / n               the share asked for lies in the interval of Clopper and Pearson; two-sided
-//! efficiency  E = 2n / Σ eᵀC⁻¹e      fails if 2n·least/E is above the χ² quantile: it is below `least` beyond chance
+//! coverage    hits / n               the nominal share is inside the interval of Clopper and Pearson; two-sided
+//! efficiency  E = 2n / Σ eᵀC⁻¹e      fails if 2n·least/E exceeds the χ² quantile: E is significantly below `least`
 //! ```
 
 use super::trial::Drawn;
 use super::{Failure, Significance, Trial};
 use crate::study::{mean_bounds, share_bounds};
 
-/// Mean of the errors squared over the stated covariance.
+/// Gate on the mean normalized squared error under the stated covariance.
 #[derive(Debug, Clone, Copy)]
 pub struct Anees<'t>(&'t [Trial]);
 
-/// Share of the errors inside their stated ellipses.
+/// Gate on the share of the errors inside their stated ellipses.
 #[derive(Debug, Clone, Copy)]
 pub struct Coverage<'t> {
     trials: &'t [Trial],
     share: f64,
 }
 
-/// How close the errors come to the Cramér–Rao bound, 1 the best that can be.
+/// Gate on how close the errors are to the Cramér–Rao bound; 1 is optimal.
 #[derive(Debug, Clone, Copy)]
 pub struct Efficiency<'t>(&'t [Trial]);
 
-/// Squared errors with their places, and the largest of them.
+/// Squared errors, and the seed and beam of the largest one.
 struct Sample {
     squares: Vec<f64>,
     worst: (u64, usize),
@@ -46,7 +46,7 @@ impl Sample {
             let Some(square) = square(trial.seed, drawn)? else {
                 continue;
             };
-            // What is no number is ruled out by any covariance.
+            // NaN counts as ruled out by the covariance.
             let square = if square.is_nan() { f64::INFINITY } else { square };
             if square > largest {
                 largest = square;
@@ -101,16 +101,16 @@ impl Sample {
 }
 
 impl<'t> Anees<'t> {
-    /// Over some trials.
+    /// The gate over some trials.
     pub fn over(trials: &'t [Trial]) -> Self {
         Self(trials)
     }
 
-    /// Gives the figure if an honest covariance has one like it.
+    /// Returns the figure if it is consistent with an honest covariance.
     ///
     /// # Errors
-    /// [`Failure::Gate`] if it is too large (over-confident) or too small; [`Failure::NoCovariance`],
-    /// [`Failure::Nothing`] if it cannot be told.
+    /// [`Failure::Gate`] if it is too large (over-confident) or too small (under-confident); [`Failure::NoCovariance`],
+    /// [`Failure::Nothing`] if it cannot be computed.
     pub fn gate(self, significance: Significance) -> Result<f64, Failure> {
         let sample = Sample::stated(self.0)?;
         let bounds = mean_bounds(sample.squares.len(), 1.0 - significance.rate());
@@ -124,7 +124,7 @@ impl<'t> Anees<'t> {
         sample.judge("ANEES", sample.mean(), bounds, significance, meaning)
     }
 
-    /// As [`gate`](Self::gate).
+    /// Same as [`gate`](Self::gate), but panics.
     ///
     /// # Panics
     /// With the text of the failure.
@@ -137,16 +137,16 @@ impl<'t> Anees<'t> {
 }
 
 impl<'t> Coverage<'t> {
-    /// Of the ellipses that should hold a share of all errors, 0.95 for example, over some trials.
+    /// Coverage of the ellipses that should contain a share of all errors, such as 0.95, over some trials.
     pub fn over(trials: &'t [Trial], share: f64) -> Self {
         Self { trials, share }
     }
 
-    /// Gives the share that was found if an honest covariance has one like it.
+    /// Returns the observed share if it is consistent with an honest covariance.
     ///
     /// # Errors
-    /// As [`Anees::gate`]; the bounds of the failure are those of what the ellipses hold, given what was found, and
-    /// what they should hold is `found`.
+    /// Same as [`Anees::gate`]; the bounds of the failure are the confidence interval of the share inside the ellipses,
+    /// and `found` is the nominal share.
     pub fn gate(self, significance: Significance) -> Result<f64, Failure> {
         let sample = Sample::stated(self.trials)?;
         // The quantile of χ² with two degrees of freedom is −2·ln(1 − p).
@@ -158,13 +158,13 @@ impl<'t> Coverage<'t> {
         let bounds = share_bounds(hits, n, 1.0 - significance.rate());
         let meaning = |low| {
             if low {
-                "under-confident: the ellipses hold more than they should"
+                "under-confident: the ellipses contain more errors than they should"
             } else {
-                "over-confident: the ellipses hold less than they should"
+                "over-confident: the ellipses contain fewer errors than they should"
             }
         };
         sample.judge(
-            "the share that the ellipses should hold",
+            "the nominal share inside the ellipses",
             self.share,
             bounds,
             significance,
@@ -173,7 +173,7 @@ impl<'t> Coverage<'t> {
         Ok(hits as f64 / n as f64)
     }
 
-    /// As [`gate`](Self::gate).
+    /// Same as [`gate`](Self::gate), but panics.
     ///
     /// # Panics
     /// With the text of the failure.
@@ -186,15 +186,15 @@ impl<'t> Coverage<'t> {
 }
 
 impl<'t> Efficiency<'t> {
-    /// Over some trials.
+    /// The gate over some trials.
     pub fn over(trials: &'t [Trial]) -> Self {
         Self(trials)
     }
 
-    /// Gives the efficiency, unless it is below `least` beyond chance. Trials without a bound are left out.
+    /// Returns the efficiency unless it is significantly below `least`. Trials without a bound are omitted.
     ///
     /// # Errors
-    /// [`Failure::Gate`] if it is; [`Failure::Nothing`] if it cannot be told.
+    /// [`Failure::Gate`] if it is significantly below; [`Failure::Nothing`] if it cannot be computed.
     pub fn gate(self, least: f64, significance: Significance) -> Result<f64, Failure> {
         let sample = Sample::of(self.0, |_, d| Ok(d.bound))?;
         // One-sided: the upper of two bounds of twice the significance.
@@ -204,7 +204,7 @@ impl<'t> Efficiency<'t> {
         sample.judge("efficiency", 1.0 / sample.mean(), bounds, significance, meaning)
     }
 
-    /// As [`gate`](Self::gate).
+    /// Same as [`gate`](Self::gate), but panics.
     ///
     /// # Panics
     /// With the text of the failure.

@@ -1,17 +1,17 @@
-//! Property tests and gates for whoever tests a calibrator in CI: random valid scenes that shrink toward simple ones, and
-//! assertions whose rate of false alarms is known. Behind the cargo feature `testing`.
+//! Property tests and gates for testing a calibrator in CI: random valid scenes that shrink toward simple ones, and
+//! assertions with a known rate of false alarms. Requires the cargo feature `testing`.
 //!
-//! | to know whether | call |
+//! | to check that | call |
 //! |---|---|
-//! | without noise every deflected element comes back | [`closure`], [`closure_of`] |
-//! | the stated covariance is that of the errors | [`Anees`], [`Coverage`] |
+//! | without noise every deflected element is recovered | [`closure`], [`closure_of`] |
+//! | the stated covariance matches the errors | [`Anees`], [`Coverage`] |
 //! | the errors are as small as the data allow | [`Efficiency`] |
-//! | the same data give the same bytes on any number of threads | [`deterministic`] |
+//! | the same data yield the same bytes on any number of threads | [`deterministic`] |
 //!
-//! Each is a function that returns a [`Failure`] and one called `assert_…` (or `assert`) that panics with its text. The
-//! gates look at one element of each [`Trial`], since the elements of one experiment share their errors: the trials are
-//! independent, and the bounds exact. A [`Calibrator`](catoptric_calib::Calibrator) is given as such; a calibration from a
-//! file goes through [`closure_of`] and [`Trial::of`].
+//! Each check has one function that returns a [`Failure`] and one called `assert_…` (or `assert`) that panics with its
+//! text. The gates use one element of each [`Trial`], since the elements of one experiment share errors: the trials are
+//! independent, and the bounds exact. A [`Calibrator`](catoptric_calib::Calibrator) can be passed directly; a calibration
+//! from a file is passed to [`closure_of`] and [`Trial::of`].
 //!
 //! ```
 //! use catoptric_calib::Method;

@@ -1,16 +1,16 @@
-//! How often a gate may be wrong about a calibrator that is right.
+//! Significance: the rate of false alarms of a gate.
 
 use std::fmt;
 
-/// The chance that a gate fails although what it tests holds: the rate of false alarms, one per job in which it runs.
+/// The probability that a gate fails although its hypothesis holds: the rate of false alarms per job that runs it.
 ///
-/// A job on every commit, 30 commits a day, is alarmed for nothing about once a month at one per mille. Seeds that are
-/// the same in every job fail in all or in none until the code changes.
+/// At one per mille, a job that runs on every commit, 30 commits a day, has about one false alarm a month. With the same
+/// seeds in every job, either all jobs fail or none until the code changes.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
 pub struct Significance(f64);
 
 impl Significance {
-    /// 1 in 100: for a look, not for CI.
+    /// 1 in 100: for interactive use, not for CI.
     pub const PER_CENT: Self = Self(1e-2);
     /// 1 in 1000.
     pub const PER_MILLE: Self = Self(1e-3);
@@ -27,10 +27,11 @@ impl Significance {
         self.0
     }
 
-    /// What is left for each of several gates if the chance that any of them is wrong shall be this one (Bonferroni).
+    /// Returns the significance of each of several gates if the probability of any false alarm is to be this one
+    /// (Bonferroni).
     ///
-    /// It holds however the gates depend on one another. Šidák's 1 − (1 − α)^(1/k), which is larger by less than
-    /// α/2 in proportion, holds for independent ones, and gates over the same trials are not.
+    /// It holds whatever the dependence between the gates. Šidák's 1 − (1 − α)^(1/k), which is larger by a relative
+    /// difference below α/2, holds for independent gates only, and gates over the same trials are not independent.
     ///
     /// ```
     /// use catoptric_assess::testing::Significance;

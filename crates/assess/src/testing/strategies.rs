@@ -1,7 +1,7 @@
-//! Random scenes that are valid, and that shrink toward simple ones.
+//! Strategies for random valid scenes that shrink toward simple ones.
 //!
-//! Every number is a simple one plus a whole number of steps, so that it is round and shrinks to the simple one; every
-//! choice shrinks to its first.
+//! Every number is a simple value plus an integer number of steps, so that it is round and shrinks to the simple value;
+//! every choice shrinks to its first option.
 
 use catoptric_files::scene::Template;
 use catoptric_sim::scene::{
@@ -14,20 +14,20 @@ use proptest::prelude::*;
 use proptest::sample::select;
 use std::ops::RangeInclusive;
 
-/// A number some steps away from a simple one.
+/// A number some steps away from a simple value.
 fn around(simple: f64, step: f64, steps: RangeInclusive<i32>) -> impl Strategy<Value = f64> + Clone {
     // Rounded, since 3 · 0.1 is not 0.3.
     steps.prop_map(move |k| ((simple + step * f64::from(k)) * 1e6).round() / 1e6)
 }
 
-/// The scene that everything is put into.
+/// The scene that all others are derived from.
 fn base() -> Scene {
     let parsed = toml::from_str(Template::Prototype.text());
-    parsed.expect("the built-in scene is one")
+    parsed.expect("the built-in scene is valid")
 }
 
-/// Turns every error off that the sensor, the room and the recording can have, as [`closure`](super::closure) needs; the
-/// mirrors stay as built.
+/// Turns off all errors of the sensor, the room and the recording, as [`closure`](super::closure) requires; the mirrors
+/// stay as built.
 #[must_use]
 pub fn without_errors(mut scene: Scene) -> Scene {
     scene.scanner.sub_rays = 1;
@@ -39,7 +39,7 @@ pub fn without_errors(mut scene: Scene) -> Scene {
         marker: None,
         ..scene.mocap
     };
-    // Measured by other means it stays, exactly.
+    // If d is measured by other means, it still is, but exactly.
     scene.experiment.bare_distance_sd_mm = scene.experiment.bare_distance_sd_mm.map(|_| 0.0);
     scene.experiment.scans_per_pose = 1;
     scene.experiment.room_scans = 1;
@@ -47,7 +47,7 @@ pub fn without_errors(mut scene: Scene) -> Scene {
     scene
 }
 
-/// Scanners: the presets and one's own, pencil beams and finite ones, with and without a housing. The simplest is the
+/// Scanners: presets and custom ones, with pencil beams and finite ones, with and without a housing. The simplest is the
 /// UST-20LX with one ray per beam.
 pub fn scanners() -> impl Strategy<Value = Scanner> {
     let own = (
@@ -87,8 +87,7 @@ pub fn scanners() -> impl Strategy<Value = Scanner> {
     )
 }
 
-/// Rooms in which boards can stand in all directions of the rig. The simplest is 7 × 7 × 4.4 m with the rig in its
-/// middle.
+/// Rooms in which boards fit in all directions from the rig. The simplest is 7 × 7 × 4.4 m with the rig in the middle.
 pub fn rooms() -> impl Strategy<Value = Room> {
     (
         [around(7.0, 0.25, 0..=8), around(7.0, 0.25, 0..=8)],
@@ -104,8 +103,8 @@ pub fn rooms() -> impl Strategy<Value = Room> {
         })
 }
 
-/// Boards and a procedure whose poses determine θ and φ: every group of beams gets at least four, tilted by 20° and more
-/// in directions that go round evenly. The simplest is one white board of 1.2 × 1 m and the prototype's procedure.
+/// Boards and a procedure whose poses determine θ and φ: every group of beams gets at least four poses, tilted by 20° or
+/// more in evenly distributed directions. The simplest is one white board of 1.2 × 1 m and the prototype's procedure.
 pub fn board_designs() -> impl Strategy<Value = (Vec<Board>, Experiment)> {
     (
         vec(around(1200.0, 50.0, 0..=6), 1..=2),
@@ -139,7 +138,7 @@ pub fn board_designs() -> impl Strategy<Value = (Vec<Board>, Experiment)> {
         })
 }
 
-/// How a facet lies in its slot: width, distance, turn and elevation of its middle beam, whether it looks up.
+/// A facet in its slot: width, distance, added azimuth and elevation of its middle beam, and whether it deflects upward.
 type Slot = (f64, f64, f64, f64, bool);
 
 fn slots(count: RangeInclusive<usize>) -> impl Strategy<Value = Vec<Slot>> {
@@ -153,9 +152,9 @@ fn slots(count: RangeInclusive<usize>) -> impl Strategy<Value = Vec<Slot>> {
     vec(slot, count)
 }
 
-/// A layout that is valid in a room of [`rooms`] and for a scanner of [`scanners`]: one to eight facets beside a scanner
-/// whose forward sector is free, none of which shades another. The simplest is one facet on the left; everything else
-/// is without errors, so that [`closure`](super::closure) holds.
+/// Layouts that are valid in a room of [`rooms`] and for a scanner of [`scanners`]: one to eight facets on both sides
+/// of a scanner whose forward sector is free, none of which occludes another. The simplest is one facet on the left;
+/// everything else is without errors, so that [`closure`](super::closure) holds.
 pub fn layouts() -> impl Strategy<Value = Scene> {
     (slots(1..=4), slots(0..=4), select(vec![1.0, -1.0])).prop_map(|(near, far, side)| {
         let mut scene = without_errors(base());
@@ -177,7 +176,7 @@ pub fn layouts() -> impl Strategy<Value = Scene> {
     })
 }
 
-/// Slots of 17° from 62° on; a facet takes 8° to 14° of its slot.
+/// A facet in one of the slots of 17° from 62° on, of which it occupies 8° to 14°.
 fn facet(side: &str, index: usize, sign: f64, &(width, distance_mm, turn, elevation, up): &Slot) -> Facet {
     let first = 63.0 + 17.0 * index as f64;
     let last = first + width;
@@ -198,8 +197,8 @@ fn facet(side: &str, index: usize, sign: f64, &(width, distance_mm, turn, elevat
     }
 }
 
-/// Whole experiments, with every error of the prototype: a layout, a scanner, a room, a board design, motion capture and a
-/// seed. Each passes `catoptric check`, and its boards have their places.
+/// Complete experiments, with all errors of the prototype: a layout, a scanner, a room, a board design, motion capture
+/// and a seed. Each passes `catoptric check`, and its boards can be placed.
 pub fn scenes() -> impl Strategy<Value = Scene> {
     let mocap = select(vec![
         MocapProfile::Modern,

@@ -1,4 +1,4 @@
-//! Independent trials: an experiment, a calibration of it, and one element drawn from it.
+//! Independent trials: an experiment, its calibration, and one element drawn from it.
 
 use super::Failure;
 use crate::score::{mahalanobis_squared, score};
@@ -10,7 +10,7 @@ use catoptric_sim::{Laboratory, Scene, Truth};
 use nalgebra::Vector2;
 use rayon::prelude::*;
 
-/// What a gate sees of an experiment.
+/// The part of an experiment that a gate uses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
     /// Seed of the experiment.
@@ -19,14 +19,14 @@ pub struct Trial {
     pub drawn: Option<Drawn>,
 }
 
-/// An element's error against two covariances of two angles each.
+/// The error of an element, normalized by its stated covariance and by its bound.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drawn {
     /// Beam.
     pub beam: usize,
-    /// eᵀP⁻¹e with the covariance P that is stated, χ² with two degrees of freedom if P is honest; `None` without one.
+    /// eᵀP⁻¹e with the stated covariance P, χ² with two degrees of freedom if P is honest; `None` without a covariance.
     pub stated: Option<f64>,
-    /// eᵀC⁻¹e with the Cramér–Rao bound C, χ² with two degrees of freedom if the estimate is efficient; `None` where the
+    /// eᵀC⁻¹e with the Cramér–Rao bound C, χ² with two degrees of freedom if the estimate is efficient; `None` if the
     /// experiment has no bound, as without errors.
     pub bound: Option<f64>,
 }
@@ -60,7 +60,7 @@ impl Experiment {
 }
 
 impl Trial {
-    /// A trial from files: a dataset, the truth about it, and anybody's calibration.
+    /// Creates a trial from a dataset, its truth, and any calibration, such as a third-party one from a file.
     ///
     /// ```no_run
     /// use catoptric_assess::testing::Trial;
@@ -100,10 +100,10 @@ impl Trial {
     }
 }
 
-/// One trial for each seed, in parallel, in the order of the seeds.
+/// Runs one trial per seed, in parallel; returns them in the order of the seeds.
 ///
 /// # Errors
-/// The first seed whose experiment cannot be simulated or calibrated.
+/// The failure of the first seed whose experiment cannot be simulated or calibrated.
 pub fn trials<C: Calibrator + Sync + ?Sized>(
     scene: &Scene,
     seeds: impl IntoIterator<Item = u64>,

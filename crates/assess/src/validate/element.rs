@@ -1,4 +1,4 @@
-//! One element: its status fits the rest, its angles and distance are those of a mirror, its covariances are ones.
+//! Validation of one element: a status consistent with the rest, plausible angles and distance, valid covariances.
 
 use super::problem::OfBeam;
 use super::sane::{check_covariance, is_unit};
@@ -7,7 +7,7 @@ use catoptric_model::{BeamEstimate, Status};
 use nalgebra::SVector;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// Everything that can be wrong with one element.
+/// Checks one element.
 pub(super) fn check_element(at: &mut OfBeam, b: &BeamEstimate) {
     check_status(at, b);
     check_angles(at, b);
@@ -31,7 +31,7 @@ fn check_status(at: &mut OfBeam, b: &BeamEstimate) {
             if has_angles {
                 at.error(
                     "status",
-                    "is direct, and yet there are angles of deflection".to_owned(),
+                    "is direct, but there are angles of deflection".to_owned(),
                 );
             }
         }
@@ -47,7 +47,7 @@ fn check_status(at: &mut OfBeam, b: &BeamEstimate) {
     if b.status == Status::Unobservable && has_angles {
         at.error(
             "azimuth_rad",
-            "or elevation_rad is a number, but the element is unobservable: what cannot be observed is never a number"
+            "or elevation_rad is a number, but the element is unobservable: an unobservable angle is never a number"
                 .to_owned(),
         );
     }
@@ -56,7 +56,7 @@ fn check_status(at: &mut OfBeam, b: &BeamEstimate) {
         if !is_unit(length) {
             at.error(
                 "null_direction",
-                format!("has length {length}, a direction has 1"),
+                format!("has length {length}, a direction has length 1"),
             );
         }
     }
@@ -69,7 +69,7 @@ fn check_angles(at: &mut OfBeam, b: &BeamEstimate) {
     ] {
         match value {
             Some(value) if !value.is_finite() => at.error(key, format!("is {value}, not a number")),
-            // Rounding to nine digits may carry an angle that far beyond its limit.
+            // Rounding to nine digits may move an angle this far beyond its limit.
             Some(value) if value.abs() > limit + 1e-9 => {
                 let hint = if value.abs() > TAU {
                     format!(
@@ -86,10 +86,13 @@ fn check_angles(at: &mut OfBeam, b: &BeamEstimate) {
     }
     match b.distance_m {
         Some(d) if !d.is_finite() => at.error("distance_m", format!("is {d}, not a number")),
-        Some(d) if d <= 0.0 => at.error("distance_m", format!("is {d}, a mirror is farther than 0")),
+        Some(d) if d <= 0.0 => at.error(
+            "distance_m",
+            format!("is {d}, but a mirror has a positive distance"),
+        ),
         Some(d) if d > MIRROR_DISTANCE_M => at.error(
             "distance_m",
-            format!("is {d}, a mirror is nearer than {MIRROR_DISTANCE_M} m; it looks like millimetres"),
+            format!("is {d}, but a mirror is closer than {MIRROR_DISTANCE_M} m; it looks like millimeters"),
         ),
         _ => {}
     }
@@ -97,7 +100,7 @@ fn check_angles(at: &mut OfBeam, b: &BeamEstimate) {
         Some(r) if !(r.is_finite() && r >= 0.0) => {
             at.error(
                 "rms_residual_m",
-                format!("is {r}, a root mean square is a number from 0"),
+                format!("is {r}, but a root mean square is a non-negative number"),
             );
         }
         _ => {}
@@ -123,13 +126,13 @@ fn check_covariances(at: &mut OfBeam, b: &BeamEstimate) {
             at.error(
                 key,
                 format!(
-                    "means a standard deviation of {largest:.3} rad, which says nothing; is it in degrees?"
+                    "means a standard deviation of {largest:.3} rad, which is meaningless; is it in degrees?"
                 ),
             );
         } else if smallest < least {
             at.warning(
                 key,
-                format!("means a standard deviation of {smallest:e} rad, which no measurement has"),
+                format!("means a standard deviation of {smallest:e} rad, which no measurement attains"),
             );
         }
     }

@@ -1,4 +1,4 @@
-//! Whether a `calibration.json` is well formed and physically sane, whoever wrote it.
+//! Validation of a `calibration.json` from any source: whether it is well formed and physically plausible.
 
 mod element;
 mod problem;
@@ -15,11 +15,11 @@ use std::f64::consts::PI;
 
 pub use problem::{Problem, Severity};
 
-/// Distances from the scanner at which a mirror can be, in metres: beyond, millimetres were meant.
+/// Maximum distance of a mirror from the scanner, in meters; larger values are probably millimeters.
 pub const MIRROR_DISTANCE_M: f64 = 10.0;
 
-/// Standard deviations an angle can have, in radians: a millionth of the least that was ever measured, and a turn
-/// that says nothing.
+/// Minimum and maximum plausible standard deviation of an angle, in radians: a millionth of the smallest ever measured,
+/// and half a turn, which is no information at all.
 pub const ANGLE_SD_RAD: [f64; 2] = [1e-10, PI];
 
 /// Hexadecimal digits of a SHA-256.
@@ -51,7 +51,7 @@ pub fn validate(calibration: &Calibration) -> Vec<Problem> {
         problems.error(
             "schema_version",
             format!(
-                "is {}, this program reads 1 to {}",
+                "is {}, but this program reads 1 to {}",
                 calibration.schema_version,
                 calibration::SCHEMA_VERSION
             ),
@@ -63,7 +63,7 @@ pub fn validate(calibration: &Calibration) -> Vec<Problem> {
     if calibration.frame != "sensor" {
         problems.error(
             "frame",
-            format!("is {:?}; angles are given in \"sensor\"", calibration.frame),
+            format!("is {:?}, but angles are given in \"sensor\"", calibration.frame),
         );
     }
     if let Some(Err(wrong)) = calibration.scanner.map(|angles| angles.check()) {

@@ -1,24 +1,24 @@
-//! A problem and where in the file it is.
+//! A problem of a calibration file, with its severity and location.
 
 use std::fmt;
 
-/// How grave a problem is.
+/// Severity of a problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
-    /// Odd, but it can be scored and applied.
+    /// Unusual, but the calibration can be scored and applied.
     Warning,
-    /// The file does not say what it has to, or says what cannot be.
+    /// A required value is missing or impossible.
     Error,
 }
 
-/// Something wrong with a calibration.
+/// A problem of a calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
-    /// How grave it is.
+    /// Severity.
     pub severity: Severity,
     /// Key in the file, such as `beams[3].azimuth_rad`.
     pub key: String,
-    /// Beam it is about.
+    /// Beam concerned, if any.
     pub beam: Option<usize>,
     /// What is wrong.
     pub message: String,
@@ -38,7 +38,7 @@ impl fmt::Display for Problem {
     }
 }
 
-/// A list in the making.
+/// Collects problems.
 #[derive(Default)]
 pub(super) struct Problems {
     pub(super) list: Vec<Problem>,
@@ -63,7 +63,7 @@ impl Problems {
     }
 }
 
-/// The list, for problems of one element.
+/// Collects the problems of one element.
 pub(super) struct OfBeam<'a> {
     list: &'a mut Vec<Problem>,
     place: usize,

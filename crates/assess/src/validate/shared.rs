@@ -1,4 +1,4 @@
-//! What elements share: facets, the mounting of the sensor, range biases.
+//! Validation of what elements share: facets, the mounting of the sensor, range biases.
 
 use super::MIRROR_DISTANCE_M;
 use super::problem::Problems;
@@ -12,7 +12,10 @@ pub(super) fn check_facet(problems: &mut Problems, key: &str, facet: &FacetEstim
     if !is_unit(length) {
         problems.error(
             &format!("{key}.normal"),
-            format!("of {:?} has length {length}, a unit normal has 1", facet.facet),
+            format!(
+                "of {:?} has length {length}, a unit normal has length 1",
+                facet.facet
+            ),
         );
     }
     if !is_near(facet.offset_m) {
@@ -43,7 +46,7 @@ pub(super) fn check_mount(problems: &mut Problems, mount: &MountEstimate) {
     if !is_unit(length) {
         problems.error(
             "rig_from_sensor.rotation_xyzw",
-            format!("has length {length}, a unit quaternion has 1"),
+            format!("has length {length}, a unit quaternion has length 1"),
         );
     }
     if let Some(covariance) = mount.covariance
@@ -71,11 +74,11 @@ pub(super) fn check_bias(problems: &mut Problems, bias: &RangeBias) {
         .chain(distance.error_mm.iter().copied())
         .chain(bias.angle.table.iter().flat_map(|t| t.error_mm.iter().copied()));
     if !numbers.into_iter().all(f64::is_finite) {
-        problems.error("bias", "holds something that is not a number".to_owned());
+        problems.error("bias", "contains a value that is not a number".to_owned());
     }
 }
 
-/// A table of errors over nodes that have a name.
+/// Checks a table of errors over named nodes.
 fn check_table(problems: &mut Problems, table: &str, (name, nodes): (&str, &[f64]), error_mm: &[f64]) {
     if nodes.len() != error_mm.len() {
         let what = name.split('_').next().unwrap_or(name);

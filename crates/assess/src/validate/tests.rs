@@ -1,11 +1,11 @@
-//! Sound calibrations have no problem; each slip is named by its key.
+//! Tests of validation: valid calibrations have no problem; each mistake is reported with its key.
 
 use super::*;
 use catoptric_fixtures::{noisy, perfect, sample};
 use catoptric_model::calibration::FacetEstimate;
 use catoptric_model::{BeamEstimate, RangeBias, Status};
 
-/// A sound calibration after one change, and what is found wrong with it.
+/// The problems of a valid calibration after one change.
 fn after(change: impl FnOnce(&mut Calibration, usize)) -> Vec<Problem> {
     let truth = sample().truth;
     let mut calibration = noisy(&truth, 1e-3, 1);
@@ -24,7 +24,7 @@ fn one(problems: &[Problem]) -> &Problem {
 }
 
 #[test]
-fn a_sound_calibration_has_no_problem() {
+fn a_valid_calibration_has_no_problem() {
     let truth = sample().truth;
     assert_eq!(validate(&noisy(&truth, 1e-3, 1)), []);
     assert_eq!(validate(&perfect(&truth)), []);
@@ -74,11 +74,11 @@ fn angles_have_limits_and_numbers() {
 }
 
 #[test]
-fn distances_are_positive_metres() {
+fn distances_are_positive_meters() {
     assert!(
         one(&after(|c, i| c.beams[i].distance_m = Some(65.0)))
             .message
-            .contains("millimetres")
+            .contains("millimeters")
     );
     assert!(
         one(&after(|c, i| c.beams[i].distance_m = Some(-0.06)))
@@ -96,11 +96,11 @@ fn a_covariance_is_symmetric_and_positive() {
         ([[-1e-6, 0.0], [0.0, 1e-6]], "has the negative variance -1e-6"),
         (
             [[f64::NAN, 0.0], [0.0, 1e-6]],
-            "holds something that is not a number",
+            "contains a value that is not a number",
         ),
         (
             [[100.0, 0.0], [0.0, 1e-6]],
-            "means a standard deviation of 10.000 rad, which says nothing; is it in degrees?",
+            "means a standard deviation of 10.000 rad, which is meaningless; is it in degrees?",
         ),
     ] {
         let problems = after(|c, i| c.beams[i].covariance_rad2 = Some(covariance));
@@ -109,7 +109,7 @@ fn a_covariance_is_symmetric_and_positive() {
     }
     let tiny = after(|c, i| c.beams[i].covariance_rad2 = Some([[1e-24, 0.0], [0.0, 1e-24]]));
     assert_eq!(one(&tiny).severity, Severity::Warning);
-    // Perfectly correlated is semi-definite, and sound.
+    // Perfectly correlated is semi-definite, and valid.
     assert_eq!(
         after(|c, i| c.beams[i].covariance_rad2 = Some([[4e-6, 2e-6], [2e-6, 1e-6]])),
         []
@@ -117,7 +117,7 @@ fn a_covariance_is_symmetric_and_positive() {
 }
 
 #[test]
-fn a_status_fits_the_rest() {
+fn a_status_is_consistent_with_the_rest() {
     let unsolved = |status, reason: Option<&str>, angle| {
         after(|c, i| {
             let mut b = BeamEstimate::without_angles(c.beams[i].beam, status, reason.map(str::to_owned));
@@ -150,7 +150,7 @@ fn a_status_fits_the_rest() {
 }
 
 #[test]
-fn the_rest_of_the_file_is_looked_at_too() {
+fn the_rest_of_the_file_is_checked_too() {
     let key = |change: fn(&mut Calibration, usize)| {
         let problems = after(change);
         one(&problems).key.clone()

@@ -1,14 +1,14 @@
-//! From a recorded experiment to a calibration, and step 1 before it.
+//! Calibration of a recorded experiment, and the characterization of the bare sensor (step 1) before it.
 
 use crate::{Control, Error};
 use catoptric_calib::{Method, Options};
 use catoptric_model::{Calibration, Characterization, Dataset};
 
-/// Calibrates a recorded experiment by the method `joint`: where every mirrored beam goes, and how well that is known.
+/// Calibrates a recorded experiment by the method `joint`: the direction of every mirrored beam, with its covariance.
 ///
 /// # Errors
-/// [`Error::Calibration`] if no calibration can be made from the dataset at all; an element that cannot be solved has a
-/// status and a reason instead.
+/// [`Error::Calibration`] if the dataset cannot be calibrated at all; an element that cannot be solved has a status and a
+/// reason instead.
 pub fn calibrate(dataset: &Dataset) -> Result<Calibration, Error> {
     Ok(catoptric_calib::calibrate(
         dataset,
@@ -17,7 +17,7 @@ pub fn calibrate(dataset: &Dataset) -> Result<Calibration, Error> {
     )?)
 }
 
-/// As [`calibrate`], by any method.
+/// Same as [`calibrate`], by any method.
 ///
 /// ```
 /// use catoptric::calib::{Method, Options};
@@ -33,7 +33,7 @@ pub fn calibrate(dataset: &Dataset) -> Result<Calibration, Error> {
 /// ```
 ///
 /// # Errors
-/// As [`calibrate`], and [`Error::Stopped`].
+/// Same as [`calibrate`], and [`Error::Stopped`].
 pub fn calibrate_with(
     dataset: &Dataset,
     method: Method,
@@ -50,10 +50,10 @@ pub fn calibrate_with(
     })
 }
 
-/// Measures the errors of the bare sensor (step 1): Tables 1 to 4, and the numbers of Eqs. (3) to (5).
+/// Measures the range errors of the bare sensor (step 1): Tables 1 to 4, and the numbers of Eqs. (3)–(5).
 ///
 /// # Errors
-/// [`Error::Calibration`] if no board was recorded before the bare sensor.
+/// [`Error::Calibration`] if no board was recorded in front of the bare sensor.
 pub fn characterize(dataset: &Dataset) -> Result<Characterization, Error> {
     Ok(catoptric_calib::characterize(dataset)?)
 }

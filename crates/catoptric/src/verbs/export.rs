@@ -1,24 +1,23 @@
-//! A layout as files for making and using it, a dataset's boards as a table.
+//! Export of a layout as files for manufacturing and use, and of a dataset's boards as a table.
 
 use crate::{Error, Scene};
 use catoptric_design::export::{self, Part};
 use catoptric_design::layout::Drawing;
 use catoptric_model::Dataset;
 
-/// What a layout is exported as.
+/// The format of an exported layout.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Format {
     /// Closed solids in millimeters, for slicers and CAD: mirrors, a printable frame, or both.
     Stl(Part),
-    /// Mirrors, housing and beams to look at (binary glTF), in meters; beams that leave end this far after their last
-    /// mirror.
+    /// Mirrors, housing and beams for viewing (binary glTF), in meters.
     Glb {
-        /// How far, in meters.
+        /// Length of outgoing beams after their last mirror, in meters.
         reach_m: f64,
     },
     /// Corners, angles and tolerances of every mirror, as CSV.
     Csv,
-    /// The laser's and the mirrors' frames in the rig.
+    /// Frames of the laser and the mirrors in the rig.
     Urdf,
 }
 
@@ -27,7 +26,7 @@ pub enum Format {
 pub struct Exported {
     /// The bytes of the file.
     pub bytes: Vec<u8>,
-    /// Solids in it, or mirrors.
+    /// Number of solids in it, or of mirrors.
     pub parts: usize,
     /// Elements whose view the printed frame blocks.
     pub shaded: Vec<usize>,
@@ -46,14 +45,14 @@ pub struct Exported {
 /// ```
 ///
 /// # Errors
-/// [`Error::Setup`] if the scene cannot be set up, [`Error::Invalid`] if there is nothing of that kind to make, or the
-/// reach is not a positive number.
+/// [`Error::Setup`] if the scene cannot be set up, [`Error::Invalid`] if the scene has no such solids or the reach is
+/// not a positive number.
 pub fn export(scene: &Scene, format: Format, seed: Option<u64>) -> Result<Exported, Error> {
     let scene = scene.resolved();
     if let Format::Glb { reach_m } = format
         && !(reach_m.is_finite() && reach_m > 0.0)
     {
-        let message = format!("the reach of beams is a positive number, it was given {reach_m}");
+        let message = format!("the reach of beams must be a positive number, not {reach_m}");
         return Err(Error::invalid(message, None));
     }
     let drawing = Drawing::new(scene, seed)?;
@@ -62,7 +61,7 @@ pub fn export(scene: &Scene, format: Format, seed: Option<u64>) -> Result<Export
         Format::Stl(part) => {
             let solids = export::solids(scene, &drawing, part);
             if solids.is_empty() {
-                let message = "the scene has nothing of that kind to make";
+                let message = "the scene has no such solids";
                 return Err(Error::invalid(message, Some("see --part")));
             }
             let shaded = match part {
@@ -81,7 +80,7 @@ pub fn export(scene: &Scene, format: Format, seed: Option<u64>) -> Result<Export
     Ok(Exported { bytes, parts, shaded })
 }
 
-/// What every beam read of every board of a dataset, as CSV, and how many boards that are.
+/// Returns the readings of every beam on every board of a dataset as CSV, and the number of boards.
 ///
 /// # Errors
 /// [`Error::Invalid`] if no board was recorded.

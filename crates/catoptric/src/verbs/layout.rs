@@ -1,23 +1,23 @@
-//! What a mirror layout sees, loses and allows, of a scene or as files.
+//! Analysis of a mirror layout: coverage, losses and attainable accuracy, as values or as files.
 
 use crate::{Control, Error, Scene};
 use catoptric_design::layout::{self, Analysis, Detail};
 use serde::Serialize;
 use std::path::Path;
 
-/// How a layout is looked at.
+/// Options of the analysis of a layout.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct LayoutOptions {
-    /// Look at the structure as built under the seed instead of the drawing.
+    /// Analyze the structure as built under the seed instead of the drawing.
     pub as_built: bool,
     /// Seed of the structure as built and of the predicted accuracy; the scene's own by default.
     pub seed: Option<u64>,
-    /// One ray per beam and no prediction of accuracy: an answer in milliseconds.
+    /// Use one ray per beam and predict no accuracy: takes milliseconds.
     pub coarse: bool,
 }
 
-/// Analyzes a scene's mirror layout, without noise: the class of every element, field of regard, margins, sizes, and the
-/// accuracy that a calibration from its own boards can reach.
+/// Analyzes the mirror layout of a scene, without noise: the class of every element, field of regard, margins, sizes, and
+/// the accuracy that a calibration with the boards of the scene can attain.
 ///
 /// ```
 /// use catoptric::{LayoutOptions, Scene, Template, layout};
@@ -47,14 +47,14 @@ pub fn layout(scene: &Scene, options: &LayoutOptions) -> Result<Analysis, Error>
     Ok(analysis)
 }
 
-/// What is printed of several layouts.
+/// JSON form of several analyses.
 #[derive(Serialize)]
 struct SideBySide<'a> {
     schema_version: u32,
     layouts: &'a [Analysis],
 }
 
-/// Analyses as `layout --json` prints them: one by itself, several in a list.
+/// Returns analyses as `layout --json` prints them: a single one as an object, several in a list.
 ///
 /// # Errors
 /// [`Error::Invalid`] if an analysis has no JSON form.
@@ -70,10 +70,10 @@ pub fn layout_json(analyses: &[Analysis]) -> Result<String, Error> {
         .map_err(|e| Error::invalid(e.to_string(), None))
 }
 
-/// Name of the page of layouts.
+/// File name of the page about layouts.
 pub const LAYOUT_PAGE: &str = "report.html";
 
-/// Writes analyses of layouts into a folder: `layout.json`, the pictures and a page.
+/// Writes analyses of layouts to a folder: `layout.json`, the pictures and a page.
 ///
 /// # Errors
 /// [`Error::Setup`] if a scene cannot be set up, [`Error::File`] if writing fails, [`Error::Stopped`].

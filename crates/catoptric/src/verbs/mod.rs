@@ -1,4 +1,4 @@
-//! The verbs, a file each: what they need, what they make, what can keep them from it.
+//! The verbs, one file each: inputs, results and errors.
 
 #[cfg(feature = "recording")]
 mod apply;

@@ -1,4 +1,4 @@
-//! The search of a scene's parameters for better layouts, and its results as files.
+//! Search of a scene's parameters for better layouts, and its results as files.
 
 use crate::{Control, Error, Scene};
 use catoptric_design::optimize::{Candidate, Optimum, Options};
@@ -6,15 +6,15 @@ use catoptric_files::parametric::ParametricScene;
 use catoptric_files::{IoError, scene as scenes, write_file};
 use std::path::Path;
 
-/// Layouts of the front that are shown and written, at most.
+/// Maximum number of layouts of the front that are shown and written.
 const SHOWN: usize = 12;
 
-/// Searches the parameters of a scene that have both limits for layouts that are better in some goals.
+/// Searches those parameters of a scene that have both limits for layouts that are better with respect to some goals.
 ///
-/// Stopping is no error: the search ends early, says so (`interrupted`), and what it found so far stands.
+/// Stopping is not an error: the search ends early, sets `interrupted`, and returns what it has found so far.
 ///
 /// # Errors
-/// [`Error::Optimize`]: nothing to choose or to look for, or goals and requirements that no layout has.
+/// [`Error::Optimize`] if there is no parameter to vary, no goal, or a goal or requirement that no layout has.
 pub fn optimize(scene: &Scene, options: &Options, control: &Control) -> Result<Optimum, Error> {
     let template = parametric(scene)?;
     control.run(|| {
@@ -39,7 +39,7 @@ fn parametric(scene: &Scene) -> Result<ParametricScene, Error> {
     )?)
 }
 
-/// The front, or some of it from one end to the other.
+/// Returns the front, or a selection of it from one end to the other.
 pub fn shown_of_front(found: &Optimum) -> Vec<&Candidate> {
     let count = found.front.len();
     if count <= SHOWN {
@@ -50,13 +50,13 @@ pub fn shown_of_front(found: &Optimum) -> Vec<&Candidate> {
         .collect()
 }
 
-/// Name of the page about a search.
+/// File name of the page about a search.
 pub const OPTIMUM_PAGE: &str = "report.html";
-/// Name of the best layout's scene.
+/// File name of the scene of the best layout.
 pub const BEST_SCENE: &str = "best.toml";
 
-/// Writes what a search found into a folder: `optimum.json`, the front as table and picture, a page, and the best layouts
-/// as scenes.
+/// Writes the result of a search to a folder: `optimum.json`, the front as a table and a picture, a page, and the best
+/// layouts as scenes.
 ///
 /// # Errors
 /// [`Error::File`] if writing fails.
@@ -85,7 +85,7 @@ pub fn write_optimum(scene: &Scene, found: &Optimum, out: impl AsRef<Path>) -> R
     Ok(())
 }
 
-/// A layout as a scene, with the meshes that it names beside it.
+/// Writes a layout as a scene, along with the meshes it refers to.
 fn write_scene(path: &Path, template: &ParametricScene, candidate: &Candidate) -> Result<(), Error> {
     let choice = candidate.choice();
     let refused = |problems: Vec<String>| IoError::content(path, problems.join("; "));
@@ -116,7 +116,7 @@ fn write_scene(path: &Path, template: &ParametricScene, candidate: &Candidate) -
     Ok(())
 }
 
-/// The whole front as CSV.
+/// Returns the whole front as CSV.
 fn table(found: &Optimum) -> Result<Vec<u8>, Error> {
     let failed = |e: csv::Error| Error::invalid(format!("the front cannot be written: {e}"), None);
     let mut writer = csv::Writer::from_writer(Vec::new());

@@ -1,4 +1,4 @@
-//! Which board poses to record next: from a scene's drawing, or for what a dataset lacks.
+//! Planning of the board poses to record next: from the drawing of a scene, or for what a dataset lacks.
 
 use crate::{Control, Error, Scene};
 use catoptric_calib::CalibError;
@@ -10,17 +10,17 @@ use catoptric_model::place::nearest;
 use rayon::prelude::*;
 use std::path::Path;
 
-/// What planning starts from: what is known, and how long a board is recorded.
+/// Starting point of planning: what is known, and how many scans a board pose takes.
 #[derive(Debug)]
 pub struct PlanStart {
     /// What the experimenter knows.
     pub situation: Situation,
-    /// Scans of a board pose.
+    /// Scans per board pose.
     pub readings: usize,
 }
 
 impl PlanStart {
-    /// Before anything is recorded.
+    /// The situation before anything is recorded.
     ///
     /// # Errors
     /// [`Error::Setup`] if the scene cannot be set up, [`Error::Invalid`] if a facet has no plane.
@@ -35,12 +35,12 @@ impl PlanStart {
         })
     }
 
-    /// After what a dataset holds.
+    /// The situation after the recording of a dataset.
     ///
     /// # Errors
     /// [`Error::Calibration`] if it cannot be calibrated at all.
     pub fn of_dataset(dataset: &Dataset) -> Result<Self, Error> {
-        // What is recorded next is taken to be recorded as long as what there is: the median, for one odd stretch.
+        // New poses are assumed to have as many scans as the existing ones: the median is robust to an unusual stretch.
         let mut scans: Vec<usize> = dataset
             .poses
             .iter()
@@ -55,10 +55,10 @@ impl PlanStart {
         })
     }
 
-    /// The names of some facets in the order of the session; all of them if none is asked for.
+    /// Returns the names of the requested facets in the order of the session; all of them if none is requested.
     ///
     /// # Errors
-    /// [`Error::Invalid`] with the nearest name if there is no such facet, or none at all.
+    /// [`Error::Invalid`] with the most similar name if there is no such facet, or if there are no facets at all.
     pub fn facets(&self, asked: &[String]) -> Result<Vec<String>, Error> {
         let names: Vec<&str> = self
             .situation
@@ -68,13 +68,16 @@ impl PlanStart {
             .map(|f| f.name.as_str())
             .collect();
         if names.is_empty() {
-            return Err(Error::invalid("there is no facet that a beam meets", None));
+            return Err(Error::invalid("no facet is hit by a beam", None));
         }
         if let Some(unknown) = asked.iter().find(|f| !names.contains(&f.as_str())) {
             let near = nearest(unknown, names.iter().copied());
             return Err(Error::Invalid {
-                message: format!("no facet is called {unknown:?}; there are {}", names.join(", ")),
-                help: near.map(|near| format!("did you mean {near}?")),
+                message: format!(
+                    "there is no facet {unknown:?}; the facets are {}",
+                    names.join(", ")
+                ),
+                help: near.map(|near| format!("did you mean --facet {near}?")),
             });
         }
         let wanted = |name: &&str| asked.is_empty() || asked.iter().any(|f| f == name);
@@ -82,7 +85,7 @@ impl PlanStart {
     }
 }
 
-/// Plans the board poses to record next before some facets, each by itself.
+/// Plans the board poses to record next in front of some facets, each facet separately.
 ///
 /// ```
 /// use catoptric::calib::plan::Request;
@@ -98,7 +101,7 @@ impl PlanStart {
 /// ```
 ///
 /// # Errors
-/// [`Error::Invalid`] if no pose before a facet is possible, [`Error::Stopped`].
+/// [`Error::Invalid`] if no pose in front of a facet is possible, [`Error::Stopped`].
 pub fn plan(
     start: &PlanStart,
     facets: &[String],
@@ -126,7 +129,7 @@ pub fn plan(
     })
 }
 
-/// A scene that records planned poses instead of those of its own rules.
+/// Returns the scene with the planned poses instead of those of its own rules.
 ///
 /// # Errors
 /// [`Error::Setup`] if the scene cannot be set up.
@@ -134,12 +137,12 @@ pub fn planned_scene(scene: &Scene, plan: &Plan) -> Result<catoptric_sim::Scene,
     Ok(with_poses(scene.resolved(), plan)?)
 }
 
-/// A scene that records what a dataset recorded, and planned poses after it.
+/// Returns the scene with the poses recorded in a dataset, followed by the planned ones.
 pub fn completed_scene(scene: &Scene, dataset: &Dataset, plan: &Plan) -> catoptric_sim::Scene {
     completed(scene.resolved(), dataset, plan)
 }
 
-/// Writes a planned scene; meshes that it names from its folder get their whole path in another.
+/// Writes a planned scene; if it moves to another folder, its meshes are referred to by their absolute paths.
 ///
 /// # Errors
 /// [`Error::File`] if it has no TOML form or writing fails.

@@ -1,4 +1,4 @@
-//! What manufacturing errors do to a layout, and what a calibration leaves of them.
+//! The effect of manufacturing errors on a layout, before and after calibration.
 
 use crate::{Control, Error, Scene};
 use catoptric_design::layout::{self, Requirement};
@@ -7,21 +7,21 @@ use catoptric_sim::SimError;
 use rayon::prelude::*;
 use std::path::Path;
 
-/// Structures between two reports of progress.
+/// Number of structures between two progress reports.
 const CHUNK: usize = 16;
 
-/// How many structures are built, and what is done with them.
+/// How many structures are built, and how they are analyzed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ToleranceOptions {
-    /// Structures to build, one for each seed from `seed` on.
+    /// Number of structures to build, with consecutive seeds from `seed` on.
     pub draws: u32,
     /// Seed of the first structure; the scene's own by default.
     pub seed: Option<u64>,
-    /// Structures, the first of them, for which the accuracy that a calibration can reach is predicted.
+    /// Number of structures, from the first one on, whose attainable calibration accuracy is predicted.
     pub bounds: u32,
-    /// Structures, the first of them, whose experiment is simulated, calibrated by `joint` and scored.
+    /// Number of structures, from the first one on, whose experiment is simulated, calibrated by `joint` and scored.
     pub calibrate: u32,
-    /// Limits to keep; a name that is no figure's is refused before the work is done.
+    /// Limits to meet; an unknown figure is rejected before any work is done.
     pub requirements: Vec<Requirement>,
 }
 
@@ -37,10 +37,10 @@ impl Default for ToleranceOptions {
     }
 }
 
-/// Builds many structures from one drawing and says what they have in common, and which requirements they do not meet.
+/// Builds many structures from one drawing; returns their statistics, and the requirements that are not met.
 ///
 /// # Errors
-/// [`Error::Setup`] if the scene cannot be set up, [`Error::Requirement`] if no figure answers to a requirement,
+/// [`Error::Setup`] if the scene cannot be set up, [`Error::Requirement`] if a requirement names no existing figure,
 /// [`Error::Stopped`].
 pub fn tolerance(
     scene: &Scene,
@@ -77,7 +77,7 @@ pub fn tolerance(
     })
 }
 
-/// The requirements that are not met, each with the figure found.
+/// Returns the requirements that are not met, each with the value found.
 fn unmet(requirements: &[Requirement], found: &Tolerance) -> Result<Vec<String>, Error> {
     let mut unmet = Vec::new();
     for requirement in requirements {
@@ -90,7 +90,7 @@ fn unmet(requirements: &[Requirement], found: &Tolerance) -> Result<Vec<String>,
     Ok(unmet)
 }
 
-/// Does the same for every seed, some at a time, in order.
+/// Evaluates a function for every seed, a chunk at a time in parallel; the results are in order.
 fn each<T: Send>(
     control: &Control,
     doing: &'static str,
@@ -110,10 +110,10 @@ fn each<T: Send>(
     Ok(found)
 }
 
-/// Name of the page about tolerances.
+/// File name of the page about tolerances.
 pub const TOLERANCE_PAGE: &str = "report.html";
 
-/// Writes an analysis into a folder: `tolerance.json`, the plot and a page.
+/// Writes an analysis to a folder: `tolerance.json`, the plot and a page.
 ///
 /// # Errors
 /// [`Error::File`] if writing fails.

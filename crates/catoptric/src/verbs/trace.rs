@@ -1,4 +1,4 @@
-//! Any rays through a scene, from a file to a file.
+//! Tracing of arbitrary rays through a scene, from a file of rays to a file of paths.
 
 use crate::{Control, Error, Scene};
 use catoptric_files::rays::{PathWriter, RayReader, field, rows};
@@ -8,48 +8,48 @@ use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
 
-/// Rays in memory at a time: enough that no thread waits, few enough that millions need no more memory.
+/// Number of rays in memory at a time: enough to keep all threads busy, and independent of the number of rays.
 const WINDOW: usize = 1 << 16;
 
-/// Rays that one thread takes at a time.
+/// Number of rays that one thread takes at a time.
 const BATCH: usize = 1 << 10;
 
-/// Mirrors that a ray may meet unless something else is asked for.
+/// Default maximum number of reflections of a ray.
 pub const MAX_BOUNCES: u16 = 64;
 
-/// What became of the rays: `trace --json`.
+/// Statistics of the traced rays: `trace --json`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct TraceFigures {
     /// Rays read.
     pub rays: usize,
     /// Rays that end on a surface.
     pub hits: usize,
-    /// Rays that end between mirrors, after the last bounce allowed or in the rim of a glass.
+    /// Rays that end between mirrors, after the last bounce allowed, or in the rim of a glass plate.
     pub trapped: usize,
     /// Time to set up the scene, in seconds.
     pub build_s: f64,
     /// Time to read, trace and write, in seconds.
     pub trace_s: f64,
-    /// Threads it ran on.
+    /// Number of threads used.
     pub threads: usize,
-    /// Names of the surfaces by their number.
+    /// Names of the surfaces, by number.
     pub surfaces: Vec<String>,
 }
 
-/// What a thread made of some rays.
+/// Results of one thread for some rays.
 struct Traced {
     rows: Vec<u8>,
     hits: usize,
     trapped: usize,
 }
 
-/// Traces the rays of a file through a scene and writes their paths; the ends of the names say in which format.
+/// Traces the rays of a file through a scene and writes their paths; the file extensions select the formats.
 ///
-/// For rays in memory there is [`sim::trace::Tracer`](catoptric_sim::trace::Tracer).
+/// For rays in memory use [`sim::trace::Tracer`](catoptric_sim::trace::Tracer).
 ///
 /// # Errors
-/// [`Error::Setup`] if the scene cannot be set up, [`Error::File`] with the line of a ray that is none, or if writing
-/// fails, [`Error::Stopped`].
+/// [`Error::Setup`] if the scene cannot be set up, [`Error::File`] with the line of an invalid ray or if writing fails,
+/// [`Error::Stopped`].
 pub fn trace(
     scene: &Scene,
     rays: impl AsRef<Path>,

@@ -1,5 +1,5 @@
-//! An experiment simulated straight into a folder: excerpts are made in parallel and written in order, in memory that
-//! does not grow with their number.
+//! Simulation of an experiment directly into a dataset folder: excerpts are simulated in parallel and written in order,
+//! in memory that does not grow with their number.
 
 use super::stream::{Made, Stream, Table};
 use super::sub_rays;
@@ -14,24 +14,24 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// What is written beside the recording, and what may be replaced.
+/// What to write in addition to the recording, and whether to replace a dataset.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Recording {
-    /// Replace a dataset that is there already.
+    /// Replace an existing dataset.
     pub replace: bool,
-    /// Write no truth, so that the dataset is blind.
+    /// Write no truth: the dataset is blind.
     pub blind: bool,
-    /// Write also what every beam met, `truth/returns.csv`.
+    /// Also write what every beam hits, `truth/returns.csv`.
     pub returns: bool,
-    /// Write also every error of every reading, `truth/readings.csv`; large.
+    /// Also write every error of every reading, `truth/readings.csv`; large.
     pub readings: bool,
-    /// Write also the path of every sub-ray, `truth/sub_rays.csv`; large.
+    /// Also write the path of every sub-ray, `truth/sub_rays.csv`; large.
     pub sub_rays: bool,
-    /// The command that makes this dataset, for its manifest; `None` for the one of the program.
+    /// The command that creates this dataset, for its manifest; `None` for the equivalent `catoptric simulate`.
     pub command_line: Option<String>,
 }
 
-/// What a simulation took: `simulate --json`.
+/// Size and times of a simulation: `simulate --json`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Figures {
     /// Scans recorded.
@@ -40,7 +40,7 @@ pub struct Figures {
     pub beams: usize,
     /// Sub-rays of a beam.
     pub sub_rays: usize,
-    /// Straight pieces of sub-rays, counted by the path of each beam's first echo.
+    /// Legs of all sub-rays, counted by the path of each beam's first echo.
     pub segments: usize,
     /// Time to set up the laboratory, in seconds.
     pub build_s: f64,
@@ -50,18 +50,18 @@ pub struct Figures {
     pub sample_s: f64,
     /// Time to encode, summed over threads, and to write, in seconds.
     pub write_s: f64,
-    /// Most readings in memory at a time, between the sensor and the file.
+    /// Maximum number of readings in memory at a time, between the sensor and the file.
     #[serde(rename = "readings_held")]
     pub held: usize,
-    /// Size of the dataset.
+    /// Size of the dataset, in bytes.
     pub bytes: u64,
-    /// Threads it ran on.
+    /// Number of threads used.
     pub threads: usize,
 }
 
 /// Simulates the experiment of a scene and writes it as a dataset.
 ///
-/// The folder appears whole or not at all; an existing dataset is replaced on request only, anything else never.
+/// The folder appears complete or not at all; an existing dataset is replaced only on request, anything else never.
 ///
 /// ```
 /// use catoptric::{Control, Recording, Scene, Template, read_dataset, simulate_into};
@@ -77,8 +77,8 @@ pub struct Figures {
 /// ```
 ///
 /// # Errors
-/// [`Error::Setup`] if the scene cannot be set up, [`Error::File`] if writing fails or something stands in the way,
-/// [`Error::Stopped`]; nothing half-written is left behind.
+/// [`Error::Setup`] if the scene cannot be set up, [`Error::File`] if writing fails or something else exists there,
+/// [`Error::Stopped`]; no incomplete files are left behind.
 pub fn simulate_into(
     scene: &Scene,
     out: impl AsRef<Path>,
@@ -126,7 +126,7 @@ fn record(scene: &Scene, out: &Path, recording: &Recording, control: &Control) -
     let mut made: Vec<Made<'_>> = Vec::new();
     loop {
         control.check()?;
-        // What was made is written while the next is made.
+        // The previous excerpts are written while the next ones are simulated.
         let (written, next) = rayon::join(
             || write(&mut writer, &mut tables, &laboratory, made),
             || stream.next(figures.threads),
@@ -135,7 +135,7 @@ fn record(scene: &Scene, out: &Path, recording: &Recording, control: &Control) -
         write_time += time;
         control.report("simulating", scans, figures.scans);
         made = next?;
-        // Those just written were there while these were made.
+        // The excerpts just written were in memory while these were simulated.
         let made_now: usize = made.iter().map(|m| m.scans.len()).sum();
         figures.held = figures.held.max((scans + made_now) * figures.beams);
         for m in &made {
@@ -168,7 +168,7 @@ fn record(scene: &Scene, out: &Path, recording: &Recording, control: &Control) -
     Ok(figures)
 }
 
-/// The command without what differs between machines and changes nothing: folders, threads, what is printed.
+/// The command line without options that differ between machines and have no effect: folders, threads, printing.
 fn command_line(scene: &Scene, recording: &Recording) -> String {
     let file = Path::new(scene.name())
         .file_name()
@@ -191,10 +191,10 @@ fn command_line(scene: &Scene, recording: &Recording) -> String {
     line
 }
 
-/// A table of the truth that is written row by row: the file, its name in errors, and what it lists.
+/// A table of the truth that is written row by row: the file, its path for errors, and its kind.
 type TableFile = (StagedFile, PathBuf, Table);
 
-/// The tables that were asked for, with their first lines.
+/// Creates the requested tables, with their header lines.
 fn tables(out: &Path, recording: &Recording, writer: &mut DatasetWriter) -> Result<Vec<TableFile>, Error> {
     let mut tables = Vec::new();
     for (wanted, name, header, kind) in [
@@ -228,7 +228,7 @@ fn tables(out: &Path, recording: &Recording, writer: &mut DatasetWriter) -> Resu
     Ok(tables)
 }
 
-/// Writes what was made, in order; how many scans these were, and how long it took.
+/// Writes excerpts in order; returns the number of their scans and the time it took.
 fn write(
     writer: &mut DatasetWriter,
     tables: &mut [TableFile],
@@ -245,7 +245,7 @@ fn write(
                 written.map_err(|e| IoError::write(path.as_path(), e).into())
             };
             match kind {
-                // Too large to be kept: made where it is written.
+                // Too large to keep: generated as it is written.
                 Table::SubRays => {
                     sub_rays::rows(laboratory, m.number, m.scans.clone(), m.sight(), &mut append)?;
                 }

@@ -1,4 +1,4 @@
-//! From a scene to what a laboratory would have recorded, in memory or as a folder, with the truth beside it.
+//! Simulation of what a laboratory would have recorded, in memory or into a folder, along with the truth.
 
 #[cfg(feature = "recording")]
 mod folder;
@@ -17,10 +17,10 @@ use catoptric_model::{Dataset, PoseRecord};
 use catoptric_sim::{Laboratory, Truth};
 use rayon::prelude::*;
 
-/// Simulates the experiment of a scene: what would have been recorded, and the truth about it.
+/// Simulates the experiment of a scene: the recorded dataset, and the truth.
 ///
-/// The dataset holds nothing that leads to the truth. Experiments of many scans are better recorded with
-/// [`simulate_into`], which needs memory for a few of them only.
+/// The dataset does not contain the truth. For experiments of many scans use [`simulate_into`], which keeps only a few of
+/// them in memory.
 ///
 /// # Errors
 /// [`Error::Setup`] if the scene cannot be set up: a board that fits nowhere, no laboratory.
@@ -28,10 +28,10 @@ pub fn simulate(scene: &Scene) -> Result<(Dataset, Truth), Error> {
     simulate_with(scene, &Control::default())
 }
 
-/// As [`simulate`], with progress by stretches.
+/// Same as [`simulate`], with progress reported by stretches.
 ///
 /// # Errors
-/// As [`simulate`], and [`Error::Stopped`].
+/// Same as [`simulate`], and [`Error::Stopped`].
 pub fn simulate_with(scene: &Scene, control: &Control) -> Result<(Dataset, Truth), Error> {
     control.run(|| {
         let scene = scene.resolved();

@@ -1,7 +1,8 @@
-//! A recording in the making: excerpts of its stretches, so many at a time that every thread has work and no more.
+//! A recording as a stream: excerpts of its stretches, just enough at a time to keep every thread busy.
 //!
-//! A stretch is opened once: what its sensor sees while nothing moves is traced then. Its excerpts are drawn and recorded
-//! side by side, linked in order between the two, and encoded on the thread that recorded them.
+//! A stretch is opened once, and what its sensor sees while nothing moves is traced then. Random numbers of its
+//! excerpts are drawn in parallel, linked in order, and then the excerpts are recorded in parallel and encoded on the
+//! same thread.
 
 use super::tables::{ReturnRows, rows_of_readings};
 use crate::Error;
@@ -16,10 +17,10 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Scans of an excerpt: as many as make half a megabyte of readings.
+/// Scans per excerpt: about half a megabyte of readings.
 const SCANS: usize = 64;
 
-/// Excerpts that are made at a time for every thread.
+/// Number of excerpts in progress per thread.
 const PER_THREAD: usize = 2;
 
 /// A table of the truth that is written row by row.
@@ -36,31 +37,31 @@ pub(crate) struct Stream<'a> {
     encoder: &'a RecordingEncoder,
     tables: Vec<Table>,
     stop: &'a Stop,
-    /// The next excerpt: stretch and scan.
+    /// Stretch and first scan of the next excerpt.
     next: (usize, usize),
-    /// The stretch that the last excerpt was of.
+    /// The stretch of the last excerpt.
     open: Option<Arc<Open<'a>>>,
     memory: Memory,
 }
 
-/// A stretch of which excerpts are made.
+/// A stretch being recorded.
 struct Open<'a> {
     sight: Sight<'a>,
     first_seen: Vec<Option<(f64, Pose)>>,
-    /// What is seen from which scan on; empty of a flight, whose every scan sees something else.
+    /// What is seen, and from which scan on; empty for a flight, in which every scan sees something else.
     seen: Vec<(usize, Returns)>,
     trace: Duration,
 }
 
-/// An excerpt as it is to be written.
+/// An excerpt, ready to be written.
 pub(crate) struct Made<'a> {
     open: Arc<Open<'a>>,
     pub(crate) number: usize,
     pub(crate) scans: Range<usize>,
     pub(crate) encoded: Encoded,
-    /// Rows of the tables that are wanted, but those of sub-rays.
+    /// Rows of the requested tables except those of sub-rays.
     pub(crate) texts: Vec<String>,
-    /// Straight pieces of the beams that were traced for it.
+    /// Legs of the beams that were traced for it.
     pub(crate) segments: usize,
     pub(crate) trace: Duration,
     pub(crate) sample: Duration,
@@ -68,7 +69,7 @@ pub(crate) struct Made<'a> {
 }
 
 impl<'a> Stream<'a> {
-    /// The excerpts of a recording with the rows of some tables.
+    /// Creates the stream of a recording with the rows of some tables.
     pub(crate) fn new(
         laboratory: &'a Laboratory,
         encoder: &'a RecordingEncoder,
@@ -86,7 +87,7 @@ impl<'a> Stream<'a> {
         }
     }
 
-    /// The next excerpts, as many as keep so many threads at work; none after the last.
+    /// Returns the next excerpts, enough to keep a given number of threads busy; none after the last.
     pub(crate) fn next(&mut self, threads: usize) -> Result<Vec<Made<'a>>, Error> {
         let laboratory = self.laboratory;
         let excerpts: Vec<_> = std::iter::from_fn(|| self.step())
@@ -129,7 +130,7 @@ impl<'a> Stream<'a> {
         made.collect()
     }
 
-    /// Stretch and scans of the next excerpt.
+    /// Returns stretch and scans of the next excerpt.
     fn step(&mut self) -> Option<(usize, Range<usize>)> {
         let (number, scan) = self.next;
         if number == self.laboratory.stretches() {
@@ -157,7 +158,7 @@ impl<'a> Stream<'a> {
         let mut recorder = laboratory.excerpt_recorder(drawn);
         let mut return_rows = ReturnRows::new(laboratory);
         let (mut returns_text, mut readings_text) = (String::new(), String::new());
-        // What a scan of a flight sees is needed no longer than for that scan.
+        // What a scan of a flight sees is needed only during that scan.
         let mut flown = Returns::new();
         let mut clock = Clock::new();
         for scan in scans.clone() {
@@ -208,7 +209,7 @@ impl<'a> Stream<'a> {
     }
 }
 
-/// Tells how long each of some things that follow one another takes.
+/// A stopwatch that measures the durations of consecutive tasks.
 struct Clock(Instant);
 
 impl Clock {
@@ -216,7 +217,7 @@ impl Clock {
         Self(Instant::now())
     }
 
-    /// Adds what has passed since the last time.
+    /// Adds the time since the last call to `to`.
     fn add(&mut self, to: &mut Duration) {
         let now = Instant::now();
         *to += now - self.0;

@@ -1,6 +1,6 @@
 //! The table of the truth about every sub-ray: `truth/sub_rays.csv`.
 
-use super::tables::{Tell, field, mirror_names, role_name, way};
+use super::tables::{EmitRows, field, mirror_names, path_field, role_name};
 use crate::Error;
 use catoptric_sim::Laboratory;
 use catoptric_sim::laboratory::Sight;
@@ -9,38 +9,39 @@ use catoptric_sim::receive::{Stop, SubRayEnd, SubRayLight};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// First line of the table. `scan` is empty where a row holds for every scan of its pose; `weight` is the sub-ray's, over
-/// rows of `light` "beam" it sums to one; power is received from `name`, the point is in the sensor frame.
+/// Header of the table. `scan` is empty where a row holds for every scan of its pose; `weight` is the share of the
+/// sub-ray, which sums to one over the rows with `light` "beam"; the power is received from `name`, the point is in the
+/// sensor frame.
 pub(crate) const HEADER: &str = "pose,scan,beam,sub_ray,wide,narrow,weight,light,facets,end,surface,name,path_m,\
                                  cos_incidence,power_w,x_m,y_m,z_m\n";
 
-/// Beams whose rows are in memory at a time.
+/// Number of beams whose rows are in memory at a time.
 const BEAMS_AT_ONCE: usize = 64;
 
-/// Tells the rows of some scans of a stretch; where nothing moves, those of the first are the rows of all.
+/// Emits the rows of some scans of a stretch; where nothing moves, the rows of the first scan hold for all.
 pub(crate) fn rows(
     laboratory: &Laboratory,
     pose: usize,
     mut scans: Range<usize>,
     sight: &Sight<'_>,
-    tell: Tell<'_>,
+    emit: EmitRows<'_>,
 ) -> Result<(), Error> {
     if !sight.moves() {
         return match scans.start {
-            0 => rows_of_scan(laboratory, pose, sight, None, tell),
+            0 => rows_of_scan(laboratory, pose, sight, None, emit),
             _ => Ok(()),
         };
     }
-    scans.try_for_each(|scan| rows_of_scan(laboratory, pose, sight, Some(scan), tell))
+    scans.try_for_each(|scan| rows_of_scan(laboratory, pose, sight, Some(scan), emit))
 }
 
-/// Tells the rows of a scan, or of a stretch whose scans are all alike.
+/// Emits the rows of a scan, or of a stretch whose scans are all identical.
 fn rows_of_scan(
     laboratory: &Laboratory,
     pose: usize,
     sight: &Sight<'_>,
     scan: Option<usize>,
-    tell: Tell<'_>,
+    emit: EmitRows<'_>,
 ) -> Result<(), Error> {
     let setting = sight.setting();
     let mirrors = mirror_names(laboratory.scene());
@@ -58,20 +59,20 @@ fn rows_of_scan(
             })
             .collect();
         for text in &texts {
-            tell(text)?;
+            emit(text)?;
         }
     }
     Ok(())
 }
 
-/// A row from `sub_ray` on.
+/// The columns of a row from `sub_ray` on.
 fn row(setting: &Setting<'_>, names: &[&str], mirrors: &[&str], end: &SubRayEnd) -> String {
     let light = match end.light {
         SubRayLight::Beam => "beam",
         SubRayLight::Ghost => "ghost",
         SubRayLight::Mirror => "mirror",
     };
-    let facets = way(mirrors, &end.facets);
+    let facets = path_field(mirrors, &end.facets);
     let (sub_ray, number, path) = (&end.sub_ray, end.number, end.path);
     let (wide, narrow, weight) = (sub_ray.wide, sub_ray.narrow, sub_ray.weight);
     let stop = match &end.stop {

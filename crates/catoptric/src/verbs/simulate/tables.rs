@@ -1,4 +1,5 @@
-//! The tables of the truth: what every beam met, and every error of every reading.
+//! The tables of the truth: what every beam hits, `truth/returns.csv`, and every error of every reading,
+//! `truth/readings.csv`.
 
 use crate::Error;
 use catoptric_sim::laboratory::Returns;
@@ -8,24 +9,24 @@ use catoptric_sim::scene::ErrorModel;
 use catoptric_sim::{Laboratory, Scene};
 use std::fmt::Write as _;
 
-/// Takes rows on.
-pub(crate) type Tell<'a> = &'a mut dyn FnMut(&str) -> Result<(), Error>;
+/// A sink for the rows of a table.
+pub(crate) type EmitRows<'a> = &'a mut dyn FnMut(&str) -> Result<(), Error>;
 
-/// First line of truth/returns.csv. A reading is geometric + mixed + detection + the three biases, then what
-/// truth/readings.csv lists, rounded; a beam without an echo has no row, one with several has one for each. `scan` is
-/// empty where nothing moves and the row holds for every scan; the incidence on the facets is joined as they are.
+/// Header of truth/returns.csv. A reading is geometric + mixed + detection + the three biases, plus the errors listed in
+/// truth/readings.csv, rounded. A beam has one row per echo, and none without an echo. `scan` is empty where nothing
+/// moves and the row holds for every scan; the incidences on the facets are joined in the same way as their names.
 pub(crate) const RETURNS_HEADER: &str = "pose,beam,surface,facets,geometric_m,cos_incidence,power_w,share,mixed_m,detection_m,\
                               distance_bias_m,angle_bias_m,color_bias_m,noise_sd_m,echo,detection_probability,\
                               facet_cos_incidence,scan\n";
 
-/// The names of all mirrors, by their index.
+/// Returns the names of all mirrors, by index.
 pub(crate) fn mirror_names(scene: &Scene) -> Vec<&str> {
     let facets = scene.superstructure.facet.iter().map(|f| f.name.as_str());
     let mirrors = scene.room.mirror.iter().map(|m| m.name.as_str());
     facets.chain(mirrors).collect()
 }
 
-/// What a surface is, as the tables of the truth say it.
+/// Returns the role of a surface as written in the tables of the truth.
 pub(crate) fn role_name(role: Role) -> &'static str {
     match role {
         Role::Facet(_) => "facet",
@@ -36,18 +37,18 @@ pub(crate) fn role_name(role: Role) -> &'static str {
     }
 }
 
-/// A field of free text: a comma or a quote in a name must not end it.
+/// Quotes a field of free text, since a name may contain commas and quotes.
 pub(crate) fn field(text: &str) -> String {
     format!("\"{}\"", text.replace('"', "\"\""))
 }
 
-/// Names of the mirrors of a way, as one field.
-pub(crate) fn way(names: &[&str], facets: &[usize]) -> String {
+/// Returns the names of the mirrors on a path, as one field.
+pub(crate) fn path_field(names: &[&str], facets: &[usize]) -> String {
     let facets: Vec<&str> = facets.iter().map(|f| names[*f]).collect();
     field(&facets.join(">"))
 }
 
-/// A column of numbers as text: one that is that of the row before is not put in words again.
+/// A column of numbers as text: a number equal to that of the previous row is not formatted again.
 #[derive(Default)]
 struct Column {
     last: Option<f64>,
@@ -66,7 +67,7 @@ impl Column {
     }
 }
 
-/// The rows of what every beam met, in order of the beams.
+/// Formats the rows of truth/returns.csv, in the order of the beams.
 pub(crate) struct ReturnRows<'a> {
     names: Vec<&'a str>,
     before_echo: [Column; 10],
@@ -82,12 +83,12 @@ impl<'a> ReturnRows<'a> {
         }
     }
 
-    /// Appends the rows of a scan; `scan` is empty where they hold for every scan.
+    /// Appends the rows of a scan; `scan` is empty if they hold for every scan.
     pub(crate) fn add(&mut self, pose: usize, returns: &Returns, scan: &str, text: &mut String) {
         for (beam, found) in returns.iter().enumerate() {
             for (echo, r) in found.iter().flat_map(Return::echoes).enumerate() {
                 // Writing to a string never fails.
-                let facets = way(&self.names, &r.facets);
+                let facets = path_field(&self.names, &r.facets);
                 let _ = write!(text, "{pose},{beam},{},{facets},", role_name(r.role));
                 let numbers = [
                     r.geometric,
@@ -115,12 +116,12 @@ impl<'a> ReturnRows<'a> {
     }
 }
 
-/// First line of truth/readings.csv. `echo` is the one of truth/returns.csv that was reported, empty where none was
-/// detected; a reading is that echo's range plus the six errors, rounded, unless `lost` is 1.
+/// Header of truth/readings.csv. `echo` is the reported echo of truth/returns.csv, empty if none was detected; a
+/// reading is the range of that echo plus the six errors, rounded, unless `lost` is 1.
 pub(crate) const READINGS_HEADER: &str =
     "pose,scan,beam,echo,lost,drift_m,warm_up_m,noise_m,correlated_m,interference_m,reading_m,element_m\n";
 
-/// The rows of a scan from what it saw, what was by chance in it, and what was read.
+/// Formats the rows of a scan from its returns, its random effects and its readings.
 pub(crate) fn rows_of_readings(
     laboratory: &Laboratory,
     (pose, scan): (usize, usize),

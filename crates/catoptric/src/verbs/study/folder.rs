@@ -1,4 +1,4 @@
-//! A study in a folder, from which it goes on when it was stopped, and in shards that merge to the same bytes.
+//! A study in a folder, from which it resumes if it was stopped, and in shards that merge to the same bytes.
 
 use super::stoppable;
 use crate::{Control, Error};
@@ -9,13 +9,14 @@ use std::path::{Path, PathBuf};
 /// Name of the page of a study.
 pub const STUDY_PAGE: &str = "report.html";
 
-/// Runs a part of a study in a folder; called again, it goes on where it was stopped.
+/// Runs a part of a study in a folder; called again, it resumes where it was stopped.
 ///
-/// With `elements` the angles of every element are listed as well. The folder holds the tables, `study.json` and a page.
+/// With `elements`, the angles of every element are listed as well. The folder contains the tables, `study.json` and a
+/// page.
 ///
 /// # Errors
-/// [`Error::Study`] if the folder holds another study, [`Error::Setup`] if a scene cannot be set up, [`Error::File`] if
-/// writing fails, [`Error::Stopped`]; what was done is kept.
+/// [`Error::Study`] if the folder contains another study, [`Error::Setup`] if a scene cannot be set up, [`Error::File`]
+/// if writing fails, [`Error::Stopped`]; finished experiments are kept.
 pub fn study_into(
     study: &Study,
     part: Part,
@@ -31,7 +32,7 @@ pub fn study_into(
     })
 }
 
-/// Puts the shards of a study together: the same bytes as the study in one piece.
+/// Merges the shards of a study, to the same bytes as the study in one piece.
 ///
 /// # Errors
 /// [`Error::Study`] if the folders are not all the shards of one study, each finished; [`Error::File`] if reading or

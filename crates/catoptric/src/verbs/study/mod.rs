@@ -1,5 +1,5 @@
-//! Many experiments and what their errors have in common: in memory, in a folder that an interrupted study goes on from,
-//! in shards that merge to the same bytes.
+//! Studies of many experiments and the statistics of their errors: in memory, in a folder from which an interrupted study
+//! resumes, or in shards that merge to the same bytes.
 
 use crate::{Control, Error};
 use catoptric_assess::study::folder::{self, Found};
@@ -7,10 +7,10 @@ use catoptric_assess::study::{Part, Plan, Run, Study, Summary, gather, run, summ
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
-/// Name of the page of a study.
+/// File name of the page about a study.
 pub const STUDY_PAGE: &str = "report.html";
 
-/// Runs a study in memory: what its runs have in common, and the runs themselves.
+/// Runs a study in memory; returns its statistics and the runs themselves.
 ///
 /// ```
 /// use catoptric::study::{Contestant, Study};
@@ -44,19 +44,20 @@ pub fn study(study: &Study, control: &Control) -> Result<(Summary, Vec<Run>), Er
             runs.extend(found.into_iter().flatten());
             control.report("experiments", chunk.len(), jobs.len());
         }
-        // A calibrator that was stopped has failed, which says nothing about it.
+        // A calibrator that was stopped counts as failed, which is no result.
         study.stop.check()?;
         Ok((summarize(&study, &runs), runs))
     })
 }
 
-/// Runs a part of a study in a folder; called again, it goes on where it was stopped.
+/// Runs a part of a study in a folder; called again, it resumes where it was stopped.
 ///
-/// With `elements` the angles of every element are listed as well. The folder holds the tables, `study.json` and a page.
+/// With `elements`, the angles of every element are listed as well. The folder contains the tables, `study.json` and a
+/// page.
 ///
 /// # Errors
-/// [`Error::Study`] if the folder holds another study, [`Error::Setup`] if a scene cannot be set up, [`Error::File`] if
-/// writing fails, [`Error::Stopped`]; what was done is kept.
+/// [`Error::Study`] if the folder contains another study, [`Error::Setup`] if a scene cannot be set up, [`Error::File`]
+/// if writing fails, [`Error::Stopped`]; finished experiments are kept.
 pub fn study_into(
     study: &Study,
     part: Part,
@@ -72,10 +73,10 @@ pub fn study_into(
     })
 }
 
-/// Puts the shards of a study together: the same bytes as the study in one piece.
+/// Merges the shards of a study, to the same bytes as the study in one piece.
 ///
 /// # Errors
-/// [`Error::Study`] if the folders are not all the shards of one study, each finished; [`Error::File`] if reading or
+/// [`Error::Study`] unless the folders are all the shards of one study, each finished; [`Error::File`] if reading or
 /// writing fails.
 pub fn merge_studies(shards: &[PathBuf], out: impl AsRef<Path>) -> Result<Summary, Error> {
     let (plan, study, found) = gather(shards)?;
@@ -96,7 +97,7 @@ fn finish(out: &Path, plan: &Plan, study: &Study, found: &Found) -> Result<Summa
     Ok(folder::finish(out, study, found)?)
 }
 
-/// The study, stopped with the verb that runs it.
+/// Returns the study with the stop request of the verb that runs it.
 fn stoppable(study: &Study, control: &Control) -> Study {
     Study {
         stop: control.stop.clone(),
