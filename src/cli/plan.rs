@@ -68,8 +68,8 @@ enum CriterionName {
 
 /// Where the plan starts from.
 enum Source {
-    Drawing(Scene),
-    Recording(Dataset),
+    Drawing(Box<Scene>),
+    Recording(Box<Dataset>),
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
@@ -94,16 +94,14 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
 
 fn source(arguments: &Arguments) -> Result<Source, CliError> {
     if !arguments.input.is_dir() {
-        return Ok(Source::Drawing(Scene::load_with(
-            &arguments.input,
-            &arguments.set,
-        )?));
+        let scene = Scene::load_with(&arguments.input, &arguments.set)?;
+        return Ok(Source::Drawing(Box::new(scene)));
     }
     if !arguments.set.is_empty() {
         let message = "--set changes a scene; a dataset is what it is";
         return Err(CliError::invalid(message, None));
     }
-    Ok(Source::Recording(read_dataset(&arguments.input)?))
+    Ok(Source::Recording(Box::new(read_dataset(&arguments.input)?)))
 }
 
 fn request(arguments: &Arguments, readings: usize) -> Result<Request, CliError> {
