@@ -1,5 +1,5 @@
 """A complete custom calibrator: python calibrate.py DATASET calibration.json, with catoptric on the PATH."""
-import json, os, subprocess, sys, tomllib
+import hashlib, json, os, subprocess, sys, tomllib
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
@@ -10,13 +10,15 @@ subprocess.run([program, "export", folder, "--format", "csv", "--out", out + ".c
 rows = np.genfromtxt(out + ".csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
 session = tomllib.load(open(folder + "/session.toml", "rb"))
 believed, bare, drawn = session["believed"], session["bare_structure"], session["nominal_rig_from_sensor"]
-loose = session["mount_tolerance"]
+loose, scanner = session["mount_tolerance"], session["scanner"]
+around = scanner["beams"] if scanner["beams"] * scanner["step_deg"] > 359 else 1 << 20  # beams after which the scan closes
 white, drift, marker = (max(1e-3 * believed[k + "_sd_mm"], 1e-5) for k in ("range_noise", "drift", "marker"))
 rows = rows[rows["sd_m"] < 2.5 * white + 1e-3]  # the others alternate between two surfaces
 noise = lambda r: np.hypot(white / np.sqrt(r["readings"]), 3e-4)  # of a mean of whole millimeters
 ray = lambda a, e: np.stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e) + 0 * a], -1)
-served = {b for f in session["facets"] for b in range(f["beams"][0], f["beams"][1] + 1)}
-beside = {b + k for b in served for k in range(-12, 13)}  # mirrors are off their drawing
+runs = [f["beams"] for f in session["facets"]]
+served = {(first + k) % around for first, last in runs for k in range((last - first) % around + 1)}
+beside = {(b + k) % around for b in served for k in range(-12, 13)}  # mirrors are off their drawing
 
 def reading(r, mount, u, d, v):  # of beams d along u and then along v, sensor shifted and rotated by `mount`; |cos|
     turn = Rotation.from_quat(drawn["rotation_xyzw"])
@@ -66,5 +68,7 @@ def solve(beam):
 
 unsure, direct = {"status": "rejected", "reason": "next to a mirror as drawn"}, {"status": "direct"}
 beams = [{"beam": b, **(solve(b) if b in served else unsure if b in beside else direct)}
-         for b in range(session["scanner"]["beams"])]
-json.dump({"schema_version": 1, "method": "own", "frame": "sensor", "beams": beams}, open(out, "w"))
+         for b in range(scanner["beams"])]
+made_of = {"scanner": {k: scanner[k] for k in ("first_deg", "step_deg", "beams", "direction")},
+           "dataset": hashlib.sha256(open(folder + "/observations.mcap", "rb").read()).hexdigest()}
+json.dump({"schema_version": 2, "method": "own", "frame": "sensor", **made_of, "beams": beams}, open(out, "w"))

@@ -177,3 +177,35 @@ fn frames_without_markers_have_none() {
     let back = play(&session, &record(&session, std::slice::from_ref(&lab))).expect("read");
     assert!(same(&back, &[lab]));
 }
+
+#[test]
+fn a_clockwise_scan_has_a_negative_increment() {
+    let mut session = session(5);
+    let angles = ScanAngles {
+        first_deg: 60.0,
+        direction: ScanDirection::Cw,
+        ..ScanAngles::centered(0.5, 5)
+    };
+    session.scanner.scan = ScanGeometry::new(angles, 40.0, Some(12.5)).expect("a scanner can have it");
+    let stretches = [stretch(&session, 0, 2, 3, 5)];
+    let bytes = record(&session, &stretches);
+    assert!(same(&play(&session, &bytes).expect("read"), &stretches));
+    let scan = messages::encode_scan(0, &session.scanner, 0.025, &[1.0; 5]);
+    let number = |place: usize| {
+        // After the encapsulation, the stamp and the name of the frame with its length.
+        let at = 4 + 8 + (4 + messages::LASER_FRAME.len() + 1).next_multiple_of(4) + 4 * place;
+        f32::from_le_bytes(scan[at..at + 4].try_into().expect("four bytes"))
+    };
+    let expected = [60.0_f64, 58.0, -0.5].map(|degrees| messages::single(degrees.to_radians()));
+    assert_eq!([0, 1, 2].map(number), expected);
+    assert_eq!(number(3), 12.5e-6);
+    // The same azimuths the other way round are another scanner's.
+    let mut other = session.clone();
+    let angles = ScanAngles {
+        first_deg: 58.0,
+        ..ScanAngles::centered(0.5, 5)
+    };
+    other.scanner.scan = ScanGeometry::new(angles, 40.0, None).expect("a scanner can have it");
+    let error = play(&other, &bytes).expect_err("other angles").to_string();
+    assert!(error.contains("in steps of"), "{error}");
+}
