@@ -3,6 +3,7 @@
 
 mod datasets;
 mod recordings;
+mod surveys;
 
 use super::error::IoError;
 use super::playback::parse_recording;
@@ -11,7 +12,7 @@ use catoptric_model::frame::{PoseData, yaw_pitch_roll};
 use catoptric_model::session::*;
 use catoptric_model::{Pose, PoseKind, PoseLabel, RangeBias, Session, Stretch, Track, TrackedFrame};
 use nalgebra::{Point3, Translation3};
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::Path;
 
 const NAME: &str = "x.mcap";
