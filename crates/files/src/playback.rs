@@ -80,7 +80,7 @@ pub(super) fn survey(
             Err(error) => return Ok(Err(error)),
         };
         if !surveyed.unwatched.is_empty() {
-            record.watched = watch(&source, stretch, &surveyed.unwatched)?;
+            record.watched = watch(&source, stretch, surveyed.unwatched)?;
         }
         let recording: Arc<dyn ScanSource> = Arc::<Source>::clone(&source);
         record.readings = Readings::recorded(recording, stretch, record.label.scans, surveyed.statistics);

@@ -1,7 +1,7 @@
 //! What a calibration needs of a stretch, gathered while its messages pass by, in memory that does not grow with them.
 //!
-//! Of a stretch that is long for motion capture, the markers are averaged when their frames have been counted: by further
-//! passes over its messages.
+//! Of a stretch that is long for motion capture, the markers are averaged when their frames have been counted: by another
+//! pass over its messages.
 
 use super::capture::Capture;
 use super::error::IoError;
@@ -9,12 +9,17 @@ use super::gathering::{Gathering, Keep, Known, followed};
 use super::source::Source;
 use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::selection::Median;
-use catoptric_model::tracking::{MeanPose, Watching};
+use catoptric_model::tracking::{Jumping, MeanPose, Watching, median_jump};
 use catoptric_model::{BeamStatistics, Gathered, ModelError, Motion, Pose, PoseKind, PoseLabel, PoseRecord};
 use catoptric_model::{TrackedFrame, Watched};
 
 /// Messages of motion capture that wait to be frames, at most: of a stretch without more, they may come in any order.
-pub(super) const MOST_WAITING: usize = 1 << 13;
+///
+/// Tests come to both limits sooner.
+pub(super) const MOST_WAITING: usize = 1 << if cfg!(test) { 10 } else { 15 };
+
+/// Jumps of markers that are held for their median, at most; that of more takes passes of its own.
+const MOST_JUMPS: usize = 1 << if cfg!(test) { 12 } else { 20 };
 
 /// A stretch while it passes.
 pub(super) struct Survey {
@@ -31,8 +36,24 @@ struct Followed {
     frames: usize,
     markers: usize,
     is_seen: bool,
+    jumping: Jumping,
+    /// Squares of the jumps; `None` once they are too many.
+    jumps: Jumps,
     /// Of the rig in a flight: where it was.
     path: Vec<(f64, Pose)>,
+}
+
+/// Squares of jumps, or how it came that they are not held.
+#[derive(Debug, Clone)]
+enum Jumps {
+    Held(Vec<f64>),
+    TooMany,
+}
+
+impl Default for Jumps {
+    fn default() -> Self {
+        Self::Held(Vec::new())
+    }
 }
 
 /// What was gathered of a stretch; its readings are not in its record yet.
@@ -44,12 +65,53 @@ pub(super) struct Surveyed {
 }
 
 /// A body whose frames are known in number only.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(super) struct Unwatched {
     body: usize,
     subject: String,
     frames: usize,
     markers: usize,
+    median: Middle,
+}
+
+/// The median of squared jumps.
+#[derive(Debug, Clone)]
+enum Middle {
+    Known(Option<f64>),
+    /// To be found in further passes.
+    Sought(Median),
+}
+
+impl Middle {
+    fn value(&self) -> Option<f64> {
+        match self {
+            Self::Known(value) => *value,
+            Self::Sought(median) => median.value(),
+        }
+    }
+
+    fn is_known(&self) -> bool {
+        match self {
+            Self::Known(_) => true,
+            Self::Sought(median) => median.is_found(),
+        }
+    }
+}
+
+impl Jumps {
+    fn add(&mut self, square: f64) {
+        match self {
+            Self::Held(squares) if squares.len() < MOST_JUMPS => squares.push(square),
+            Self::Held(_) | Self::TooMany => *self = Self::TooMany,
+        }
+    }
+
+    fn median(self) -> Middle {
+        match self {
+            Self::Held(mut squares) => Middle::Known(median_jump(&mut squares)),
+            Self::TooMany => Middle::Sought(Median::default()),
+        }
+    }
 }
 
 impl Followed {
@@ -57,6 +119,8 @@ impl Followed {
         self.frames += 1;
         self.markers = self.markers.max(frame.markers.len());
         self.is_seen |= frame.pose.is_some() || frame.markers.iter().any(Option::is_some);
+        let jumps = &mut self.jumps;
+        self.jumping.add(&frame.markers, |square| jumps.add(square));
         if let Some(pose) = frame.pose {
             self.mean.add(&pose);
             if keeps_path {
@@ -124,17 +188,17 @@ impl Keep for Survey {
         });
         let mut unwatched = Vec::new();
         if motion.is_none() {
-            let seen = (0..all.len()).filter(|body| all[*body].is_seen);
-            let bodies = followed(&stretch.label, known.bodies, seen).into_iter();
-            unwatched = bodies
-                .filter(|body| all[*body].markers > 0)
-                .map(|body| Unwatched {
+            let seen: Vec<usize> = (0..all.len()).filter(|body| all[*body].is_seen).collect();
+            let bodies = followed(&stretch.label, known.bodies, seen.into_iter());
+            for body in bodies.into_iter().filter(|body| all[*body].markers > 0) {
+                unwatched.push(Unwatched {
                     body,
                     subject: known.bodies.all[body].subject.clone(),
                     frames: all[body].frames,
                     markers: all[body].markers,
-                })
-                .collect();
+                    median: std::mem::take(&mut all[body].jumps).median(),
+                });
+            }
         }
         let mean = |subject: &str| all[position(subject)?].mean.finish();
         let readings = catoptric_model::Readings::in_memory(stretch.beams, Vec::new());
@@ -150,23 +214,33 @@ impl Keep for Survey {
 pub(super) fn watch(
     source: &Source,
     stretch: usize,
-    unwatched: &[Unwatched],
+    mut unwatched: Vec<Unwatched>,
 ) -> Result<Vec<Watched>, IoError> {
     let bodies: Vec<usize> = unwatched.iter().map(|u| u.body).collect();
-    let mut medians = vec![Median::default(); unwatched.len()];
-    let begin = || unwatched.iter().map(|u| Watching::new(u.frames, u.markers));
-    let mut watching: Vec<Watching> = begin().collect();
-    while medians.iter().any(|m| !m.is_found()) {
-        watching = begin().collect();
+    let begun = unwatched.iter().map(|u| Watching::new(u.frames, u.markers));
+    let mut watching: Vec<Watching> = begun.collect();
+    let mut is_first = true;
+    while is_first || unwatched.iter().any(|u| !u.median.is_known()) {
+        let mut jumping = vec![Jumping::default(); bodies.len()];
         source.frames(stretch, &bodies, |body, frame| {
             let place = bodies.iter().position(|b| *b == body);
             let place = place.expect("only these were asked for");
-            watching[place].add(&frame.markers, |square| medians[place].add(square));
+            if is_first {
+                watching[place].add(&frame.markers);
+            }
+            if let Middle::Sought(median) = &mut unwatched[place].median {
+                jumping[place].add(&frame.markers, |square| median.add(square));
+            }
         })?;
-        medians.iter_mut().for_each(Median::end_pass);
+        for u in &mut unwatched {
+            if let Middle::Sought(median) = &mut u.median {
+                median.end_pass();
+            }
+        }
+        is_first = false;
     }
-    let all = watching.into_iter().zip(unwatched).zip(&medians);
+    let all = watching.into_iter().zip(unwatched);
     Ok(all
-        .map(|((watching, u), median)| watching.finish(u.subject.clone(), median.value()))
+        .map(|(watching, u)| watching.finish(u.subject, u.median.value()))
         .collect())
 }

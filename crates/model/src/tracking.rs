@@ -141,14 +141,13 @@ impl Watched {
         if markers == 0 {
             return None;
         }
-        let mut watching = Watching::new(track.frames.len(), markers);
+        let (mut watching, mut jumping) = (Watching::new(track.frames.len(), markers), Jumping::default());
         let mut jumps = Vec::new();
         for frame in &track.frames {
-            watching.add(&frame.markers, |square| jumps.push(square));
+            watching.add(&frame.markers);
+            jumping.add(&frame.markers, |square| jumps.push(square));
         }
-        let middle = jumps.len() / 2;
-        let median = (!jumps.is_empty()).then(|| *jumps.select_nth_unstable_by(middle, f64::total_cmp).1);
-        Some(watching.finish(track.subject.clone(), median))
+        Some(watching.finish(track.subject.clone(), median_jump(&mut jumps)))
     }
 
     /// The markers averaged over the parts `first` to `last − 1`.
@@ -181,7 +180,31 @@ pub struct Watching {
     passed: usize,
     /// In every part and of every marker: the sum of its places, and the frames in which it was seen.
     parts: Vec<Vec<(Vector3<f64>, usize)>>,
+}
+
+/// How far the markers of a body jump from one frame to the next.
+#[derive(Debug, Clone, Default)]
+pub struct Jumping {
     before: Vec<Option<Point3<f64>>>,
+}
+
+/// The median of squared jumps; `None` without any.
+pub fn median_jump(squares: &mut [f64]) -> Option<f64> {
+    let middle = squares.len() / 2;
+    (!squares.is_empty()).then(|| *squares.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+impl Jumping {
+    /// Takes the markers of a frame in; `jump` is given the square of how far each went since the frame before, in m².
+    pub fn add(&mut self, markers: &[Option<Point3<f64>>], mut jump: impl FnMut(f64)) {
+        for (from, to) in self.before.iter().zip(markers) {
+            if let (Some(from), Some(to)) = (from, to) {
+                jump((to - from).norm_squared());
+            }
+        }
+        self.before.clear();
+        self.before.extend_from_slice(markers);
+    }
 }
 
 impl Watching {
@@ -192,12 +215,11 @@ impl Watching {
             frames,
             passed: 0,
             parts: vec![vec![(Vector3::zeros(), 0); markers]; parts],
-            before: Vec::new(),
         }
     }
 
-    /// Takes the markers of a frame in; `jump` is given the square of how far each went since the frame before, in m².
-    pub fn add(&mut self, markers: &[Option<Point3<f64>>], mut jump: impl FnMut(f64)) {
+    /// Takes the markers of a frame in.
+    pub fn add(&mut self, markers: &[Option<Point3<f64>>]) {
         let parts = self.parts.len();
         let ends = |part: usize| (part + 1) * self.frames / parts;
         let part = (0..parts).find(|part| self.passed < ends(*part));
@@ -208,13 +230,6 @@ impl Watching {
                 *count += 1;
             }
         }
-        for (from, to) in self.before.iter().zip(markers) {
-            if let (Some(from), Some(to)) = (from, to) {
-                jump((to - from).norm_squared());
-            }
-        }
-        self.before.clear();
-        self.before.extend_from_slice(markers);
     }
 
     /// What was watched; jumps between successive frames have twice the variance of a frame, and the median of their

@@ -3,6 +3,7 @@
 
 mod datasets;
 mod recordings;
+mod surveys;
 
 use super::error::IoError;
 use super::playback::parse_recording;
@@ -13,7 +14,7 @@ use catoptric_model::{
     Pose, PoseKind, PoseLabel, RangeBias, ScanAngles, ScanDirection, ScanGeometry, Session, Stretch, Track, TrackedFrame,
 };
 use nalgebra::{Point3, Translation3};
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::Path;
 
 const NAME: &str = "x.mcap";

@@ -2,7 +2,6 @@
 
 use super::*;
 use proptest::prelude::*;
-use std::io;
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
