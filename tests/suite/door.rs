@@ -22,10 +22,10 @@ fn main() -> Result<(), catoptric::Error> {
     let scene = catoptric::Scene::load("mine.toml")?;
     let (dataset, truth) = catoptric::simulate(&scene)?;
     let calibration = catoptric::calibrate(&dataset)?;
-    let score = catoptric::score(&dataset, &calibration, &truth);
+    let score = catoptric::score(&dataset, &calibration, &truth)?;
     println!("{}: {:.4}° per axis, at best {:.4}°",
         score.verdict.word(), score.per_axis_rms_deg, score.crlb_per_axis_deg);
-    let blind = catoptric::score(&dataset, &calibration, None);
+    let blind = catoptric::score(&dataset, &calibration, None)?;
     println!("{}", blind.verdict.word());
     Ok(())
 }

@@ -190,7 +190,8 @@ impl Keep for Survey {
         if motion.is_none() {
             let seen: Vec<usize> = (0..all.len()).filter(|body| all[*body].is_seen).collect();
             let bodies = followed(&stretch.label, known.bodies, seen.into_iter());
-            for body in bodies.into_iter().filter(|body| all[*body].markers > 0) {
+            let marked: Vec<usize> = bodies.into_iter().filter(|body| all[*body].markers > 0).collect();
+            for body in marked {
                 unwatched.push(Unwatched {
                     body,
                     subject: known.bodies.all[body].subject.clone(),

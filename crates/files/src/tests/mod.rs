@@ -11,7 +11,8 @@ use super::*;
 use catoptric_model::frame::{PoseData, yaw_pitch_roll};
 use catoptric_model::session::*;
 use catoptric_model::{
-    Pose, PoseKind, PoseLabel, RangeBias, ScanAngles, ScanDirection, ScanGeometry, Session, Stretch, Track, TrackedFrame,
+    Pose, PoseKind, PoseLabel, RangeBias, ScanAngles, ScanDirection, ScanGeometry, Session, Stretch, Track,
+    TrackedFrame,
 };
 use nalgebra::{Point3, Translation3};
 use std::io::{self, Write};
