@@ -190,15 +190,17 @@ impl Keep for Survey {
         if motion.is_none() {
             let seen: Vec<usize> = (0..all.len()).filter(|body| all[*body].is_seen).collect();
             let bodies = followed(&stretch.label, known.bodies, seen.into_iter());
-            let marked: Vec<usize> = bodies.into_iter().filter(|body| all[*body].markers > 0).collect();
-            for body in marked {
-                unwatched.push(Unwatched {
-                    body,
-                    subject: known.bodies.all[body].subject.clone(),
-                    frames: all[body].frames,
-                    markers: all[body].markers,
-                    median: std::mem::take(&mut all[body].jumps).median(),
-                });
+            for body in bodies {
+                let of = &mut all[body];
+                if of.markers > 0 {
+                    unwatched.push(Unwatched {
+                        body,
+                        subject: known.bodies.all[body].subject.clone(),
+                        frames: of.frames,
+                        markers: of.markers,
+                        median: std::mem::take(&mut of.jumps).median(),
+                    });
+                }
             }
         }
         let mean = |subject: &str| all[position(subject)?].mean.finish();
