@@ -19,7 +19,7 @@ pub(crate) struct Arguments {
     /// The cloud to write; the extension selects the format.
     #[arg(long, value_name = "cloud.ply|cloud.pcd")]
     out: PathBuf,
-    /// Frame of the points; Eqs. 9 and 10 are in the sensor's.
+    /// Frame of the points; Eqs. (9) and (10) are in the sensor's.
     #[arg(
         long,
         value_parser = one_of(&CloudFrame::ALL, CloudFrame::word, CloudFrame::about),

@@ -401,7 +401,7 @@ fn codes_are_never_turned_into_ranges() {
     });
     let stretch = laboratory.stretch(BOARD).expect("it is recorded");
     let scans: Vec<&[f64]> = stretch.ranges.chunks(ust20lx::COUNT).collect();
-    // The walls are out of range; the board is nearer than the scanner can tell most of the time.
+    // The walls are out of range; the board is nearer than the minimum range most of the time.
     assert!(scans.iter().all(|scan| scan[0] == f64::INFINITY));
     assert!(
         scans

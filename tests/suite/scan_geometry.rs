@@ -216,7 +216,7 @@ fn the_seam_of_a_scan_all_around_is_nowhere_special() {
         }
         assert_eq!(dataset.session.facets.len(), 6);
     }
-    // Boards before undeflected beams are put up in six sectors wherever the seam is.
+    // Boards in front of undeflected beams stand in six sectors, wherever the seam is.
     let direct = |dataset: &Dataset| {
         let labels = dataset.poses.iter().map(|p| &p.label);
         labels.filter(|l| l.facet.is_none() && l.board.is_some()).count()

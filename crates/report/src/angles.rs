@@ -14,7 +14,7 @@ pub(super) const NAMES: [&str; 2] = ["θ_a", "φ"];
 /// Palette indices for angles with corrections, and without.
 const COLORS: [usize; 2] = [0, 1];
 
-/// Returns two plots for each contestant of a cell that also ran uncorrected. `single` tells whether to draw every
+/// Returns two plots for each contestant of a cell that also ran uncorrected. `single` selects whether to draw every
 /// trial.
 pub(super) fn angles(spreads: &[&Spread], elements: &[&ElementAngles], single: bool) -> String {
     let mut methods: Vec<&str> = spreads.iter().map(|s| s.method.as_str()).collect();

@@ -152,7 +152,7 @@ pub(super) fn laws(size: (u32, u32), axes: &Axes, title: &str, marks: &[Mark], s
 
 /// One dot for each element over its azimuth, each on its band.
 pub(super) fn per_beam(size: (u32, u32), axes: &Axes, title: &str, step_deg: f64, dots: &[Dot]) -> String {
-    // Half the step between beams, so that neighbouring bands touch.
+    // Half the step between beams, so that neighboring bands touch.
     let half_step = 0.5 * step_deg;
     draw(size, title, |area| {
         let mut chart = frame(area, axes, true)?;

@@ -6,7 +6,7 @@ use catoptric_assess::score::{Score, Verdict};
 use catoptric_model::{Calibration, ScanGeometry, beam};
 use std::collections::BTreeMap;
 
-/// The verdicts on all calibrations. One that says what the verdict above it says is told in a sentence.
+/// The verdicts on all calibrations. One that repeats the verdict above it is reported in one sentence.
 pub(super) fn verdicts(scan: &ScanGeometry, results: &[(Calibration, Score)]) -> String {
     let mut html = String::new();
     let mut above: Option<(&Calibration, Verdict, String)> = None;

@@ -218,7 +218,7 @@ proptest! {
         // One echo or no echo: both outputs say the same.
         let all = sensor.read_all(Some(&found), &effects);
         prop_assert_eq!(all.first().copied().unwrap_or(f64::NAN).to_bits(), reading.to_bits());
-        // Nothing by chance makes a range of what is none.
+        // No random effect turns an invalid reading into a range.
         prop_assert_eq!(sensor.read(None, &effects), f64::INFINITY);
         prop_assert!(sensor.read_all(None, &effects).is_empty());
     }

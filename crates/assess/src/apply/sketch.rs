@@ -8,9 +8,9 @@ use catoptric_model::{CloudPoint, Unreadable};
 pub struct Extent {
     /// Number of points.
     pub points: usize,
-    /// Least x, y and z, in metres; NaN without points.
+    /// Least x, y and z, in meters; NaN without points.
     pub low: [f64; 3],
-    /// Largest x, y and z, in metres.
+    /// Largest x, y and z, in meters.
     pub high: [f64; 3],
 }
 
@@ -19,7 +19,7 @@ pub struct Extent {
 pub struct CloudSketch {
     /// What is known of the cloud.
     pub sheet: CloudSheet,
-    /// One scan in so many is drawn: whole scans, as every n-th point would favor some beams.
+    /// One scan in this many is drawn: whole scans, as every n-th point would favor some beams.
     pub step: usize,
     /// The points of these scans.
     pub drawn: Vec<CloudPoint>,
@@ -50,7 +50,7 @@ impl Extent {
 }
 
 impl CloudSketch {
-    /// A sketch of the cloud of a stretch, in which about so many points are drawn at most.
+    /// A sketch of the cloud of a stretch, with about this many points at most.
     ///
     /// # Errors
     /// [`Unreadable`] if the readings are there no more.

@@ -11,7 +11,7 @@ fn scan(dataset: &Dataset) -> &[f64] {
     dataset.poses[0].readings.held().expect("in memory")
 }
 
-/// Distance of a point from the nearest wall, in metres.
+/// Distance of a point from the nearest wall, in meters.
 fn off_wall(dataset: &Dataset, p: &Point3<f64>) -> f64 {
     let room = dataset.session.room.as_ref().expect("the sample has walls");
     (0..3)

@@ -13,7 +13,7 @@ pub(super) struct Block {
     pub(super) wanted: Vec<Wanted>,
 }
 
-/// All elements, in blocks of at most so many bytes of readings, and of at least one element.
+/// All elements, in blocks of at most `most_bytes` of readings, and of at least one element.
 pub(super) fn blocks(
     work: &Workspace,
     solver: &Solver,
@@ -57,7 +57,7 @@ fn block(work: &Workspace, candidates: &[ScreenClass], beams: Range<usize>) -> B
     }
 }
 
-/// The stretches whose readings may take part in an estimate: those of boards before its facets.
+/// The stretches whose readings may take part in an estimate: those with boards in front of its facets.
 fn wanted_poses<'a>(work: &'a Workspace, candidate: &'a ScreenClass) -> impl Iterator<Item = usize> + 'a {
     let near: &[usize] = match candidate {
         ScreenClass::Deflected(near) => near,

@@ -1,6 +1,6 @@
 //! Readings beam by beam, for what needs their median or their order.
 //!
-//! A recording holds them scan by scan. So many beams are gathered at a time as fit in a fixed memory, and a long stretch is
+//! A recording holds them scan by scan. As many beams are gathered at a time as fit into a fixed amount of memory, and a long stretch is
 //! read several times instead of being held.
 
 use catoptric_model::{Dataset, PoseRecord, Unreadable};
@@ -40,8 +40,8 @@ impl Columns {
     }
 }
 
-/// What `make` makes of the readings of every wanted beam, with its stretch and its number, in their order; at most so many
-/// bytes of readings are held.
+/// Returns what `make` makes of the readings of every wanted beam, with its stretch and its number, in order of both. At most
+/// `most_bytes` of readings are in memory at a time.
 pub(crate) fn of_each<T: Send>(
     dataset: &Dataset,
     wanted: Vec<Wanted>,

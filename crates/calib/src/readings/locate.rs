@@ -23,7 +23,7 @@ const FREE_PART: f64 = 0.05;
 /// Statistics of every beam in every stretch: of its main body, where it has one beside outliers.
 ///
 /// # Errors
-/// [`Unreadable`] if the recording can no longer be read: beams with outliers are looked at once more.
+/// [`Unreadable`] if the recording can no longer be read: beams with outliers are read again.
 pub fn summaries(dataset: &Dataset) -> Result<Vec<Vec<Summary>>, Unreadable> {
     let noise = dataset.session.believed.range_noise_sd_mm * 1e-3;
     let plain: Vec<Vec<Summary>> = dataset.poses.par_iter().map(PoseRecord::summarize).collect();

@@ -5,7 +5,7 @@ use catoptric_model::session::NominalFacet;
 
 /// Number of beams beyond the drawn ones that a facet as built may serve.
 ///
-/// At 65 mm a millimetre is 0.9°: an optical center a millimetre off in its housing, a facet half a millimetre and
+/// At 65 mm a millimeter is 0.9°: an optical center a millimeter off in its housing, a facet half a millimeter and
 /// 1° off in its frame, and posts that hide an edge on the drawing add up to several. Being generous costs nothing:
 /// a beam that no mirror deflects is known by its readings, not by this.
 const EDGE_DEG: f64 = 2.5;

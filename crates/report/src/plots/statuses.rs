@@ -99,7 +99,7 @@ fn class_color(class: BeamClass) -> (RGBColor, &'static str) {
     }
 }
 
-/// One bar for each run of neighbouring elements of the same color.
+/// One bar for each run of neighboring elements of the same color.
 fn runs(dataset: &Dataset, row: usize, elements: impl Iterator<Item = (usize, RGBColor)>) -> Vec<Bar> {
     let half = 0.5 * dataset.session.scanner.scan.step().to_degrees();
     let mut bars: Vec<Bar> = Vec::new();

@@ -449,7 +449,7 @@ fn covers(scan: &ScanGeometry, first: f64, last: f64) -> bool {
     scan.closes() || [-360.0, 0.0, 360.0].into_iter().any(around)
 }
 
-/// How far a scan reaches, in words.
+/// The extent of a scan as text.
 pub(super) fn reach(scan: &ScanGeometry) -> String {
     let [low, high] = scan.range_deg().map(rounded);
     format!("the scan reaches from {low}° to {high}°")

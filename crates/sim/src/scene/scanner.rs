@@ -87,7 +87,7 @@ pub struct Limits {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.001, max = 1e6))]
     pub beam_time_us: Option<f64>,
-    /// Most echoes of one beam that can be reported.
+    /// Maximum number of echoes reported for one beam.
     #[schemars(range(min = 1, max = 8))]
     pub echoes: u32,
 }

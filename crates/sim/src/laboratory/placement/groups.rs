@@ -83,7 +83,7 @@ pub(super) fn direct_groups(
         return Vec::new();
     }
     // Centers evenly over the free beams laid end to end. Successive poses jump by a third of the way, so that
-    // neighbours in tilt are not neighbours in azimuth.
+    // neighbors in tilt are not neighbors in azimuth.
     let half = 0.5 * span_deg.to_radians() / scan.step();
     (0..count)
         .map(|k| {
