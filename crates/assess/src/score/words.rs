@@ -46,7 +46,7 @@ fn nothing_deflected(score: &Score) -> bool {
     score.beams.deflected == Some(0)
 }
 
-/// The ways in which a calibration states that it belongs to another scanner or dataset.
+/// The respects in which a calibration states that it belongs to another scanner or dataset.
 pub(crate) fn foreign(dataset: &Dataset, calibration: &Calibration) -> Vec<String> {
     let scanner = calibration.check_scanner(&dataset.session).err();
     let other = calibration.other_dataset(dataset).map(|[its, this]| {
