@@ -1,22 +1,23 @@
-//! A bundle of rays through the index over triangles: boxes against the bundle as a whole, triangles against its rays
-//! in lanes.
+//! Traversal of the triangle index by a packet of rays: boxes are tested against the packet's pyramid, triangles against
+//! its rays in lanes.
 //!
-//! A ray meets a triangle if it passes all three edges on the same side: with the corners A, B, C seen from the start,
-//! d·(B×(C−B)), d·(C×(A−C)) and d·(A×(B−A)) have one sign, and N·A/N·d is the way, N being the normal. From another
-//! start at δ an edge has (d×δ)·(B−C) on top, and the way loses N·δ/N·d. In f32 each of these has a bound on its error:
+//! A ray hits a triangle if it passes all three edges on the same side. With the corners A, B, C relative to the origin,
+//! the edge functions d·(B×(C−B)), d·(C×(A−C)) and d·(A×(B−A)) have one sign, and the distance is N·A/N·d, where N is
+//! the normal. For an origin at an offset δ, (d×δ)·(B−C) is added to an edge function and N·δ/N·d is subtracted from the
+//! distance. In f32 the error of each is bounded:
 //!
-//! - a corner is off by η = 3u(M + |O|) in each coordinate, u being half a unit in the last place, M the greatest
+//! - of a corner, by η = 3u(M + |O|) in each coordinate, where u is half a unit in the last place, M the largest
 //!   coordinate of the mesh and O the reference;
-//! - an edge by (4η + 20u(R + 2|δ|))(L + 4η), R being the way to the farthest corner and L the longest edge: a corner
-//!   that moves by η turns the edge seen from the start, but the ray is no farther from any corner than L if it meets
-//!   the triangle, and so d·(η×C) = η·(C×d) ≤ ηL;
-//! - N·d by 8ηL + 16uL²; below twice that nothing is known;
-//! - the way by 2((4η + 16u(R + |δ|))|N| + 16uL³)/|N·d|: moved corners move the point on the triangle, no lever is
-//!   longer than the triangle itself, and the factor 2 pays for N·d.
+//! - of an edge function, by (4η + 20u(R + 2|δ|))(L + 4η), where R is the distance to the farthest corner and L the
+//!   longest edge: a corner that moves by η turns the edge seen from the origin, but a ray that hits the triangle is
+//!   no farther than L from any corner, and so d·(η×C) = η·(C×d) ≤ ηL;
+//! - of N·d, by 8ηL + 16uL²; below twice that the result is undecided;
+//! - of the distance, by 2((4η + 16u(R + |δ|))|N| + 16uL³)/|N·d|: moved corners move the point on the triangle, no
+//!   lever is longer than the triangle, and the factor 2 covers the error of N·d.
 //!
-//! So each ray knows an interval that holds the nearest way in f64. What is surely hit and surely nearer takes its
-//! place; whatever overlaps is decided in f64 at once ([`Judge`]); the ways themselves are found at the
-//! end ([`finish`](super::finish)).
+//! So each ray has an interval that contains its nearest distance in f64. A certain hit that is certainly nearer replaces
+//! it; overlapping intervals are decided in f64 at once ([`Judge`]); the f64 distances are computed at the end
+//! ([`finish`](super::finish)).
 
 use crate::hit::NONE;
 use crate::index::wide::{Leaf, WIDTH, Walk, Wide};
@@ -30,20 +31,20 @@ use crate::rounding::{ROUNDING, around, downwards, upwards};
 use fearless_simd::{Simd, prelude::*};
 use fearless_simd::{f32x8, f32x16, u32x16};
 
-/// What a bundle has met so far.
+/// Nearest hits of a packet so far.
 pub(crate) struct Found<const R: usize> {
-    /// Bounds of the nearest way.
+    /// Bounds of the nearest distance.
     low: Rows<f32, R>,
     high: Rows<f32, R>,
     triangle: Rows<u32, R>,
-    /// Greatest of the upper bounds.
+    /// Maximum of the upper bounds.
     limit: f32,
 }
 
-/// What the rays need to know of eight triangles, in the order of [`At`].
+/// Precomputed numbers of eight triangles, indexed by [`At`].
 type Facts = [[f32; WIDTH]; 25];
 
-/// Places of a triangle's facts.
+/// Indices into [`Facts`].
 struct At;
 
 impl At {
@@ -68,14 +69,14 @@ impl<const R: usize> Found<R> {
             triangle: Rows::of(NONE),
             limit: farthest,
         };
-        // What a row is filled up with meets nothing.
+        // Padding hits nothing.
         for ray in count..R * LANES {
             found.high.set(ray, f32::NEG_INFINITY);
         }
         found
     }
 
-    /// Decides in f64 about a triangle that a ray may meet.
+    /// Decides in f64 whether a ray hits a triangle, nearer than before.
     #[cold]
     #[inline(never)]
     fn decide(&mut self, judge: &Judge<'_>, rays: &InRows<'_, R>, number: usize, triangle: u32) {
@@ -95,13 +96,13 @@ impl<const R: usize> Found<R> {
         }
     }
 
-    /// The nearest triangle of every ray, [`NONE`] where there is none.
+    /// Returns the nearest triangle of every ray, [`NONE`] for a miss.
     pub(crate) fn triangles(&self) -> &[[u32; LANES]; R] {
         &self.triangle.0
     }
 }
 
-/// Follows a bundle through the index.
+/// Traverses the index with a packet.
 #[inline(always)]
 pub(crate) fn follow<S: Simd, const R: usize>(
     simd: S,
@@ -240,7 +241,7 @@ fn facts<S: Simd, const R: usize>(
     facts
 }
 
-/// One triangle and all rays; whether a ray has met it.
+/// Tests one triangle against all rays. Returns whether any nearest hit changed.
 #[inline(always)]
 fn triangle<S: Simd, const R: usize>(
     simd: S,

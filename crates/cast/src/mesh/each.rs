@@ -1,4 +1,4 @@
-//! Rays through the index over triangles, each by itself. The ways to what they met are found in f64 eight at a time.
+//! Traversal of the triangle index by individual rays. The f64 distances to the triangles hit are computed eight at a time.
 
 use crate::index::wide::{Leaf, WIDTH, Walk, Wide};
 use crate::lanes::inlined;
@@ -11,12 +11,12 @@ use crate::ray::Ray;
 use crate::rounding::around;
 use fearless_simd::Simd;
 
-/// What a ray has met so far.
+/// Nearest hit of a ray so far.
 struct Nearest {
     low: f32,
     high: f32,
     triangle: Option<u32>,
-    /// In f64, if known.
+    /// The distance in f64, if already computed.
     way: Option<f64>,
 }
 
@@ -31,7 +31,7 @@ impl Nearest {
         }
     }
 
-    /// Decides in f64 about a triangle that the ray may meet.
+    /// Decides in f64 whether the ray hits a triangle, nearer than before.
     #[cold]
     #[inline(never)]
     fn decide(&mut self, judge: &Judge<'_>, ray: &Ray, triangle: u32) {
@@ -49,7 +49,7 @@ impl Nearest {
         }
     }
 
-    /// Takes what the ray meets of a leaf.
+    /// Updates the nearest hit from the triangles of a leaf.
     #[inline(always)]
     fn take(&mut self, leaf: &Leaf, outcome: &Outcome, judge: &Judge<'_>, ray: &Ray) {
         let mut may = outcome.may;
@@ -72,7 +72,7 @@ impl Nearest {
     }
 }
 
-/// Follows so many rays through the index and tells what each meets, in no order.
+/// Traverses the index with `count` rays and emits the nearest hit of each, in no particular order.
 #[inline(always)]
 pub(crate) fn follow<S: Simd, F: FnMut(usize, Option<Met>)>(
     simd: S,

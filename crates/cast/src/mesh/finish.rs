@@ -1,5 +1,5 @@
-//! Ways of a bundle's rays to the triangles that they are known to meet, in f64: rays of one triangle by its plane, rays that
-//! have one to themselves eight at a time.
+//! Exact (f64) hit distances for a packet once the f32 pass has fixed each ray's triangle: rays that share a triangle are
+//! computed together from its plane, the others eight at a time.
 
 use crate::hit::NONE;
 use crate::lanes::inlined;
@@ -10,43 +10,43 @@ use crate::packet::rows::{HALF, LANES, Rows, half};
 use fearless_simd::{Simd, prelude::*};
 use fearless_simd::{f64x8, mask32x16, mask64x8, u32x16};
 
-/// What sixteen rays in a row meet.
+/// Hits of one row of sixteen rays.
 pub(crate) struct MetInRow<'a> {
     pub(crate) row: usize,
-    /// A bit for every ray that meets anything; the others have any numbers.
+    /// One bit per ray, set for a hit; the numbers of the other rays are undefined.
     pub(crate) some: u64,
     pub(crate) triangle: &'a [u32; LANES],
     pub(crate) distance: &'a [f64; LANES],
-    /// Product of the ray's direction with the triangle's normal, if it was asked for.
+    /// Dot product of the ray's direction and the triangle's normal, if requested.
     pub(crate) closing: &'a [f64; LANES],
 }
 
-/// Where the normal counts too, fewer rays of a row with the same triangle are looked at each by itself.
+/// If the incidence is requested, rays of a row that share a triangle are computed individually below this count.
 const FEW: u32 = 5;
 
-/// What is known so far.
+/// State of the computation.
 struct Ways<'a, const R: usize> {
     rays: &'a InRows<'a, R>,
     judge: &'a Judge<'a>,
     distance: Rows<f64, R>,
     closing: Rows<f64, R>,
     pending: Pending,
-    /// As many as there are rows, each in the place that its number gives it.
+    /// A direct-mapped cache of recent triangles, indexed by triangle modulo `R`.
     kept: [Kept; R],
 }
 
-/// A triangle that was looked at: neighboring rows have some in common.
+/// A cached triangle: neighboring rows often share some.
 #[derive(Clone, Copy)]
 struct Kept {
     triangle: u32,
     plane: Plane,
-    /// One over the length of the plane's normal, if it was asked for.
+    /// 1/|N|, if the incidence is requested.
     inverse: f64,
-    /// Height of the plane over where all rays start, if they do.
+    /// Height of the plane above the common origin, if there is one.
     height: f64,
 }
 
-/// Tells, row by row, how far rays go to these triangles, and under which incidence if that is asked for.
+/// Emits, row by row, the distances of the rays to the triangles found, with the incidence if `CLOSING`.
 #[inline(always)]
 pub(crate) fn finish<S: Simd, const R: usize, const CLOSING: bool>(
     simd: S,
@@ -75,7 +75,7 @@ pub(crate) fn finish<S: Simd, const R: usize, const CLOSING: bool>(
         let triangles = u32x16::simd_from(simd, *numbers);
         *some = !triangles.simd_eq(u32x16::splat(simd, NONE)).to_bitmask();
         *some &= (1 << LANES.min(rays.count - row * LANES)) - 1;
-        // Rays of the same triangle, one triangle after the other.
+        // One triangle at a time, with all rays that hit it.
         let mut open = *some;
         while open != 0 {
             let triangle = numbers[open.trailing_zeros() as usize & (LANES - 1)];
@@ -104,7 +104,7 @@ pub(crate) fn finish<S: Simd, const R: usize, const CLOSING: bool>(
 }
 
 impl<const R: usize> Ways<'_, R> {
-    /// Leaves some rays of a row with one triangle for later.
+    /// Defers the rays in `lanes` to the individual computation.
     #[inline(always)]
     fn postpone<S: Simd>(&mut self, simd: S, row: usize, mut lanes: u64, triangle: u32) {
         while lanes != 0 {
@@ -133,7 +133,7 @@ impl<const R: usize> Ways<'_, R> {
         self.pending.settle::<S, true>(simd, self.judge, &ray, tell);
     }
 
-    /// Finds the ways of some rays of a row to one triangle.
+    /// Computes the distances of the rays in `lanes` to one triangle.
     #[inline(always)]
     fn meet<S: Simd, const CLOSING: bool>(
         &mut self,
@@ -183,7 +183,7 @@ impl<const R: usize> Ways<'_, R> {
     }
 }
 
-/// Puts numbers in a half of a row where they count.
+/// Stores the selected numbers in one half of a row.
 #[inline(always)]
 fn put<S: Simd>(simd: S, which: mask64x8<S>, numbers: f64x8<S>, row: &mut [f64; LANES], second: usize) {
     let place = &mut row[second * HALF..(second + 1) * HALF];

@@ -1,4 +1,5 @@
-//! Ways to triangles that are known to be met, each ray to one of its own: found in f64 eight at a time.
+//! Queue of rays whose triangle is known but not the f64 distance to it: computed eight at a time, each ray with its own
+//! triangle.
 
 use crate::lanes::{inlined, less, size, unfused};
 use crate::mesh::exact::{Judge, STEEP};
@@ -7,7 +8,7 @@ use fearless_simd::{Simd, f64x8, prelude::*};
 
 const LANES: usize = 8;
 
-/// Rays whose triangle is known, but not the way to it.
+/// Rays whose triangle is known, but not the distance to it.
 #[derive(Default)]
 pub(crate) struct Pending {
     count: usize,
@@ -15,18 +16,18 @@ pub(crate) struct Pending {
     found: [(usize, u32); LANES],
 }
 
-/// The way of a ray to its triangle.
+/// The computed hit of a ray on its triangle.
 pub(crate) struct Settled {
     pub(crate) ray: usize,
     pub(crate) triangle: u32,
-    /// What [`Judge::way`] gives, to the bit.
+    /// Bit-identical to [`Judge::distance`].
     pub(crate) way: f64,
-    /// [`Judge::closing`], if it was asked for.
+    /// [`Judge::closing`], if requested.
     pub(crate) closing: f64,
 }
 
 impl Pending {
-    /// Takes one more; whether that is all there is room for, and [`Pending::settle`] must be called.
+    /// Adds a ray. Returns whether the queue is full and [`Pending::settle`] must be called.
     #[inline(always)]
     pub(crate) fn add(&mut self, ray: usize, triangle: u32) -> bool {
         self.found[self.count] = (ray, triangle);
@@ -34,7 +35,7 @@ impl Pending {
         self.count == LANES
     }
 
-    /// Finds the ways and tells them.
+    /// Computes the distances and emits them.
     #[inline(always)]
     pub(crate) fn settle<S: Simd, const CLOSING: bool>(
         &mut self,

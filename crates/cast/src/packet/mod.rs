@@ -1,4 +1,4 @@
-//! Many rays side by side, and as packets in lanes.
+//! Rays in structure-of-arrays form, and packets of them in SIMD lanes.
 
 pub(crate) mod bundle;
 pub(crate) mod in_rows;
