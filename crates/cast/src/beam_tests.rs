@@ -4,7 +4,7 @@ use crate::mesh::data::Mesh;
 use crate::mesh::exact::Met;
 use crate::mesh::triangles::tests::random_star;
 use crate::mesh::triangles::{InMesh, Triangles};
-use crate::packet::bundle::{Caster, cast_all};
+use crate::packet::cast::{Caster, cast_all};
 use crate::packet::rays::Rays;
 use crate::random::Draws;
 use crate::ray::{FARTHEST, Ray};

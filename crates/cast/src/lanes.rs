@@ -12,7 +12,7 @@ pub(crate) fn inlined<F>(closure: F) -> F {
 }
 
 #[inline(always)]
-pub(crate) fn less<S: Simd, L: SimdFloat<S>>(a: &[L; 3], b: &[L; 3]) -> [L; 3] {
+pub(crate) fn minus<S: Simd, L: SimdFloat<S>>(a: &[L; 3], b: &[L; 3]) -> [L; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 

@@ -6,9 +6,9 @@
 
 use crate::hit::{Contact, NONE};
 use crate::index::wide::Walk;
-use crate::lanes::{inlined, less, unfused};
+use crate::lanes::{inlined, minus, unfused};
 use crate::mesh::finish::MetInRow;
-use crate::packet::bundle::{Bundle, Caster, cast_all};
+use crate::packet::cast::{Caster, Packet, cast_all};
 use crate::packet::in_rows::InRows;
 use crate::packet::rays::Rays;
 use crate::packet::rows::{HALF, LANES, Rows, half};
@@ -72,13 +72,13 @@ impl Caster<Option<Contact>> for InWorld<'_> {
         contacts: &mut [Option<Contact>],
     ) -> bool {
         dispatch!(self.level, simd => {
-            let mut bundle = Bundle::<R>::new(rays, which);
-            let narrow = bundle.surround(simd, self.world.reach);
+            let mut packet = Packet::<R>::new(rays, which);
+            let narrow = packet.surround(simd, self.world.reach);
             if narrow {
-                let mut nearest = Nearest::new(bundle.rays.count);
-                self.world.sweep(simd, &bundle, self.left, &mut nearest);
+                let mut nearest = Nearest::new(packet.rays.count);
+                self.world.sweep(simd, &packet, self.left, &mut nearest);
                 for (ray, contact) in contacts.iter_mut().enumerate() {
-                    *contact = nearest.contact(self.world, &bundle.rays, ray);
+                    *contact = nearest.contact(self.world, &packet.rays, ray);
                 }
             }
             narrow
@@ -112,7 +112,7 @@ impl World {
     fn sweep<S: Simd, const R: usize>(
         &self,
         simd: S,
-        bundle: &Bundle<'_, R>,
+        packet: &Packet<'_, R>,
         left: Option<usize>,
         nearest: &mut Nearest<R>,
     ) {
@@ -122,10 +122,10 @@ impl World {
             let mut nearer = None;
             if !child.is_leaf() {
                 let node = &self.nodes[child.number()];
-                let (met, near) = bundle.pyramid.boxes(simd, &node.bounds, nearest.limit);
+                let (met, near) = packet.pyramid.boxes(simd, &node.bounds, nearest.limit);
                 nearer = walk.enter(node, met, near);
             } else if left != Some(child.number()) {
-                self.meet(simd, bundle, child.number(), nearest);
+                self.meet(simd, packet, child.number(), nearest);
             }
             next = nearer.or_else(|| walk.next(nearest.limit));
         }
@@ -135,23 +135,23 @@ impl World {
     fn meet<S: Simd, const R: usize>(
         &self,
         simd: S,
-        bundle: &Bundle<'_, R>,
+        packet: &Packet<'_, R>,
         surface: usize,
         nearest: &mut Nearest<R>,
     ) {
         match &self.shapes[surface] {
-            Shape::Polygon(polygon) => nearest.polygon(simd, bundle, surface, polygon),
+            Shape::Polygon(polygon) => nearest.polygon(simd, packet, surface, polygon),
             Shape::Mesh(mesh) => {
                 let take = inlined(
                     #[inline(always)]
                     |met: &MetInRow<'_>| nearest.mesh(simd, numbered(surface), met),
                 );
-                mesh.nearest_of_bundle::<_, R, true>(simd, bundle, take);
+                mesh.nearest_of_packet::<_, R, true>(simd, packet, take);
                 nearest.set_limit(simd);
             }
             other => {
-                for ray in 0..bundle.rays.count {
-                    if let Some(distance) = other.distance(&bundle.rays.get(ray)) {
+                for ray in 0..packet.rays.count {
+                    if let Some(distance) = other.distance(&packet.rays.get(ray)) {
                         nearest.take(ray, distance, numbered(surface));
                     }
                 }
@@ -279,8 +279,8 @@ impl<const R: usize> Nearest<R> {
     }
 
     #[inline(always)]
-    fn polygon<S: Simd>(&mut self, simd: S, bundle: &Bundle<'_, R>, surface: usize, polygon: &Polygon) {
-        let passes = passes(simd, bundle, polygon);
+    fn polygon<S: Simd>(&mut self, simd: S, packet: &Packet<'_, R>, surface: usize, polygon: &Polygon) {
+        let passes = passes(simd, packet, polygon);
         if passes == Passes::Outside {
             return;
         }
@@ -289,7 +289,7 @@ impl<const R: usize> Nearest<R> {
             for second in 0..2 {
                 let candidates = Candidates {
                     surface: numbered(surface),
-                    distance: distances(simd, bundle, row, second, polygon, passes == Passes::Inside),
+                    distance: distances(simd, packet, row, second, polygon, passes == Passes::Inside),
                     of_mesh: None,
                 };
                 changed |= self.take_half(simd, row, second, &candidates);
@@ -311,14 +311,14 @@ fn numbered(surface: usize) -> u32 {
 #[inline(always)]
 fn distances<S: Simd, const R: usize>(
     simd: S,
-    bundle: &Bundle<'_, R>,
+    packet: &Packet<'_, R>,
     row: usize,
     second: usize,
     polygon: &Polygon,
     inside: bool,
 ) -> f64x8<S> {
-    let origin = bundle.rays.starts(simd, row, second);
-    let direction = half(simd, &bundle.rays.direction, row, second);
+    let origin = packet.rays.starts(simd, row, second);
+    let direction = half(simd, &packet.rays.direction, row, second);
     let splat = inlined(
         #[inline(always)]
         |v: &Vector3<f64>| {
@@ -330,7 +330,7 @@ fn distances<S: Simd, const R: usize>(
         },
     );
     let closing = unfused::product(simd, &polygon.normal, &direction);
-    let seen = less(&splat(&polygon.origin.coords), &origin);
+    let seen = minus(&splat(&polygon.origin.coords), &origin);
     let distance = unfused::product(simd, &polygon.normal, &seen) / closing;
     if inside {
         return distance;
@@ -352,7 +352,7 @@ fn distances<S: Simd, const R: usize>(
 /// The plane cuts the pyramid in a convex outline whose corners are on the pyramid's edges. Rays with origins up to δ from
 /// the apex deviate by at most δ(1 + 1/N·d) there.
 #[inline(always)]
-fn passes<S: Simd, const R: usize>(simd: S, bundle: &Bundle<'_, R>, polygon: &Polygon) -> Passes {
+fn passes<S: Simd, const R: usize>(simd: S, packet: &Packet<'_, R>, polygon: &Polygon) -> Passes {
     let splat = inlined(
         #[inline(always)]
         |x: f64| f64x4::splat(simd, x),
@@ -360,7 +360,7 @@ fn passes<S: Simd, const R: usize>(simd: S, bundle: &Bundle<'_, R>, polygon: &Po
     let corner = inlined(
         #[inline(always)]
         |k: usize| {
-            let [a, b, c, d] = bundle.pyramid.corners[k];
+            let [a, b, c, d] = packet.pyramid.corners[k];
             f64x4::simd_from(simd, [a.into(), b.into(), c.into(), d.into()])
         },
     );
@@ -369,15 +369,15 @@ fn passes<S: Simd, const R: usize>(simd: S, bundle: &Bundle<'_, R>, polygon: &Po
         #[inline(always)]
         |v: &Vector3<f64>| x * splat(v.x) + y * splat(v.y) + z * splat(v.z),
     );
-    let [sx, sy, sz] = bundle.start.reference.map(f64::from);
+    let [sx, sy, sz] = packet.start.reference.map(f64::from);
     let n = &polygon.normal;
     let height =
         n.x * (polygon.origin.x - sx) + n.y * (polygon.origin.y - sy) + n.z * (polygon.origin.z - sz);
     let closing = along(n);
-    let way = splat(height) / closing;
-    let (least, most) = (way.reduce_min(), way.reduce_max());
+    let distance = splat(height) / closing;
+    let (least, most) = (distance.reduce_min(), distance.reduce_max());
     // Covers the spread of the origins and all rounding.
-    let apart = f64::from(bundle.start.spread) + 1e-6 * (1.0 + f64::from(bundle.start.reach));
+    let apart = f64::from(packet.start.spread) + 1e-6 * (1.0 + f64::from(packet.start.reach));
     let flattest = closing.abs().reduce_min();
     let margin = apart * (1.0 + 2.0 / flattest);
     if !(least * flattest > 2.0 * apart && most < 0.5 * FARTHEST) {
@@ -386,7 +386,7 @@ fn passes<S: Simd, const R: usize>(simd: S, bundle: &Bundle<'_, R>, polygon: &Po
     let mut inside = true;
     for (inwards, edge) in &polygon.edges {
         let start = inwards.x * sx + inwards.y * sy + inwards.z * sz;
-        let over = along(inwards) * way + splat(start - edge);
+        let over = along(inwards) * distance + splat(start - edge);
         if over.reduce_max() < -margin {
             return Passes::Outside;
         }

@@ -4,7 +4,7 @@
 //! area × leaves over its two sides (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007). A node
 //! splits its largest part until it has eight. The result is the same on any number of threads.
 
-use crate::index::wide::{Child, Leaf, Node, WIDTH, Wide};
+use crate::index::wide::{Child, Leaf, Node, WIDTH, WideBvh};
 use crate::rounding::{ROUNDING, downwards, rounded, upwards};
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
@@ -212,7 +212,7 @@ fn over<T: Send>(items: &[Item], of_some: impl Fn(&[Item]) -> T + Sync, join: im
     join(a, b)
 }
 
-impl Wide {
+impl WideBvh {
     /// Builds the index over triangles; vertices are in meters.
     pub(crate) fn new(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Self {
         index(vertices, triangles)
@@ -220,7 +220,7 @@ impl Wide {
 }
 
 /// Builds the index over triangles.
-fn index(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Wide {
+fn index(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> WideBvh {
     let reach = upwards(vertices.iter().fold(0.0, |reach, v| v.coords.amax().max(reach)));
     let item = |(number, corners): (usize, &[u32; 3])| {
         let [a, b, c] = corners.map(|v| vertices[v as usize].coords);
@@ -256,7 +256,7 @@ fn index(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Wide {
         leaf
     };
     let leaves = found.par_iter().map(leaf).collect();
-    Wide { nodes, leaves, reach }
+    WideBvh { nodes, leaves, reach }
 }
 
 /// Builds the nodes over boxes, each given by its lowest and highest corner; a leaf's index is that of its box.

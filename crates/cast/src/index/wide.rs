@@ -39,7 +39,7 @@ pub(crate) struct Leaf {
 }
 
 /// The hierarchy.
-pub(crate) struct Wide {
+pub(crate) struct WideBvh {
     pub(crate) nodes: Vec<Node>,
     pub(crate) leaves: Vec<Leaf>,
     /// Largest absolute coordinate of a vertex: all rounding errors scale with it.

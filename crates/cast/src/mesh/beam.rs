@@ -20,10 +20,10 @@
 //! ([`finish`](super::finish)).
 
 use crate::hit::NONE;
-use crate::index::wide::{Leaf, WIDTH, Walk, Wide};
-use crate::lanes::{cross, dot, inlined, less, size};
+use crate::index::wide::{Leaf, WIDTH, Walk, WideBvh};
+use crate::lanes::{cross, dot, inlined, minus, size};
 use crate::mesh::exact::Judge;
-use crate::packet::bundle::Bundle;
+use crate::packet::cast::Packet;
 use crate::packet::in_rows::InRows;
 use crate::packet::rows::{LANES, Rows, Vectors, whole};
 use crate::ray::FARTHEST;
@@ -56,7 +56,7 @@ impl At {
     /// N·A.
     const HEIGHT: usize = 21;
     const EDGE_ERROR: usize = 22;
-    const WAY_ERROR: usize = 23;
+    const DISTANCE_ERROR: usize = 23;
     const LEAST_CLOSING: usize = 24;
 }
 
@@ -81,16 +81,16 @@ impl<const R: usize> Found<R> {
     #[inline(never)]
     fn decide(&mut self, judge: &Judge<'_>, rays: &InRows<'_, R>, number: usize, triangle: u32) {
         let ray = &rays.get(number);
-        let Some(way) = judge.meet(ray, triangle) else {
+        let Some(distance) = judge.meet(ray, triangle) else {
             return;
         };
         let present = match self.triangle.get(number) {
             NONE => FARTHEST,
-            triangle => judge.way(ray, triangle),
+            triangle => judge.distance(ray, triangle),
         };
-        if way < present || (way == present && triangle < self.triangle.get(number)) {
+        if distance < present || (distance == present && triangle < self.triangle.get(number)) {
             self.triangle.set(number, triangle);
-            let (low, high) = around(way);
+            let (low, high) = around(distance);
             self.low.set(number, low);
             self.high.set(number, high);
         }
@@ -106,8 +106,8 @@ impl<const R: usize> Found<R> {
 #[inline(always)]
 pub(crate) fn follow<S: Simd, const R: usize>(
     simd: S,
-    wide: &Wide,
-    bundle: &Bundle<'_, R>,
+    wide: &WideBvh,
+    packet: &Packet<'_, R>,
     judge: &Judge<'_>,
     found: &mut Found<R>,
 ) {
@@ -121,13 +121,13 @@ pub(crate) fn follow<S: Simd, const R: usize>(
                 &wide.leaves[child.number()],
                 child.count(),
                 wide.reach,
-                bundle,
+                packet,
                 judge,
                 found,
             );
         } else {
             let node = &wide.nodes[child.number()];
-            let (met, near) = bundle.pyramid.boxes(simd, &node.bounds, found.limit);
+            let (met, near) = packet.pyramid.boxes(simd, &node.bounds, found.limit);
             nearer = walk.enter(node, met, near);
         }
         next = nearer.or_else(|| walk.next(found.limit));
@@ -140,7 +140,7 @@ fn leaf<S: Simd, const R: usize>(
     leaf: &Leaf,
     count: usize,
     reach: f32,
-    bundle: &Bundle<'_, R>,
+    packet: &Packet<'_, R>,
     judge: &Judge<'_>,
     found: &mut Found<R>,
 ) {
@@ -153,16 +153,16 @@ fn leaf<S: Simd, const R: usize>(
         |corner: usize| [load(corner, 0), load(corner, 1), load(corner, 2)],
     );
     let corners = [corner(0), corner(1), corner(2)];
-    let mut met = bundle.pyramid.triangles(simd, &corners) & ((1 << count) - 1);
+    let mut met = packet.pyramid.triangles(simd, &corners) & ((1 << count) - 1);
     if met == 0 {
         return;
     }
-    let facts = facts(simd, &corners, reach, bundle);
+    let facts = facts(simd, &corners, reach, packet);
     let mut changed = false;
     while met != 0 {
         let lane = met.trailing_zeros() as usize & 7;
         met &= met - 1;
-        changed |= triangle(simd, &facts, lane, leaf.triangles[lane], bundle, judge, found);
+        changed |= triangle(simd, &facts, lane, leaf.triangles[lane], packet, judge, found);
     }
     if changed {
         let mut limit = f32x16::splat(simd, f32::NEG_INFINITY);
@@ -178,7 +178,7 @@ fn facts<S: Simd, const R: usize>(
     simd: S,
     corners: &[[f32x8<S>; 3]; 3],
     reach: f32,
-    bundle: &Bundle<'_, R>,
+    packet: &Packet<'_, R>,
 ) -> Facts {
     let splat = inlined(
         #[inline(always)]
@@ -188,28 +188,29 @@ fn facts<S: Simd, const R: usize>(
         #[inline(always)]
         |corner: &[f32x8<S>; 3]| {
             [
-                corner[0] - splat(bundle.start.reference[0]),
-                corner[1] - splat(bundle.start.reference[1]),
-                corner[2] - splat(bundle.start.reference[2]),
+                corner[0] - splat(packet.start.reference[0]),
+                corner[1] - splat(packet.start.reference[1]),
+                corner[2] - splat(packet.start.reference[2]),
             ]
         },
     );
     let [a, b, c] = [seen(&corners[0]), seen(&corners[1]), seen(&corners[2])];
-    let (bc, ca, ab) = (less(&b, &c), less(&c, &a), less(&a, &b));
+    let (bc, ca, ab) = (minus(&b, &c), minus(&c, &a), minus(&a, &b));
     // (B − A)×(C − A).
     let normal = cross(&ca, &ab);
     let height = dot(&normal, &a);
     let far = size(&a).max(size(&b)).max(size(&c));
     let long = size(&bc).max(size(&ca)).max(size(&ab));
-    let eta = splat(3.0 * ROUNDING * (reach + bundle.start.reach));
-    let spread = splat(bundle.start.spread);
+    let eta = splat(3.0 * ROUNDING * (reach + packet.start.reach));
+    let spread = splat(packet.start.spread);
     let u = inlined(
         #[inline(always)]
         |times: f32| splat(times * ROUNDING),
     );
     let edge_error = spread.mul_add(u(40.0), far.mul_add(u(20.0), eta * 4.0)) * eta.mul_add(splat(4.0), long);
     let cube = long * long * long;
-    let way_error = ((far + spread).mul_add(u(16.0), eta * 4.0)).mul_add(size(&normal), cube * u(16.0)) * 2.0;
+    let distance_error =
+        ((far + spread).mul_add(u(16.0), eta * 4.0)).mul_add(size(&normal), cube * u(16.0)) * 2.0;
     let least_closing = long * (long.mul_add(u(16.0), eta * 8.0)) * 2.0;
     let mut facts = [[0.0; WIDTH]; 25];
     let mut put = inlined(
@@ -224,7 +225,7 @@ fn facts<S: Simd, const R: usize>(
             put(At::CROSSES + 3 * i + k, *coordinate);
         }
     }
-    if bundle.apart() {
+    if packet.apart() {
         for (i, vector) in [bc, ca, ab].iter().enumerate() {
             for (k, coordinate) in vector.iter().enumerate() {
                 put(At::EDGES + 3 * i + k, *coordinate);
@@ -236,7 +237,7 @@ fn facts<S: Simd, const R: usize>(
     }
     put(At::HEIGHT, height);
     put(At::EDGE_ERROR, edge_error);
-    put(At::WAY_ERROR, way_error);
+    put(At::DISTANCE_ERROR, distance_error);
     put(At::LEAST_CLOSING, least_closing);
     facts
 }
@@ -248,7 +249,7 @@ fn triangle<S: Simd, const R: usize>(
     facts: &Facts,
     lane: usize,
     number: u32,
-    bundle: &Bundle<'_, R>,
+    packet: &Packet<'_, R>,
     judge: &Judge<'_>,
     found: &mut Found<R>,
 ) -> bool {
@@ -277,13 +278,13 @@ fn triangle<S: Simd, const R: usize>(
             #[inline(always)]
             |rows: &Vectors<f32, R>| whole(simd, rows, row),
         );
-        let direction = load(&bundle.direction);
+        let direction = load(&packet.direction);
         let edge = inlined(
             #[inline(always)]
             |i: usize| {
                 let about = product(&direction, At::CROSSES + 3 * i);
-                if bundle.apart() {
-                    more(&load(&bundle.moment), At::EDGES + 3 * i, about)
+                if packet.apart() {
+                    more(&load(&packet.moment), At::EDGES + 3 * i, about)
                 } else {
                     about
                 }
@@ -300,13 +301,13 @@ fn triangle<S: Simd, const R: usize>(
         let inside = least.simd_gt(error) | most.simd_lt(-error);
         let closing = product(&direction, At::NORMAL);
         let mut height = fact(At::HEIGHT);
-        if bundle.apart() {
-            height -= product(&load(&bundle.offset), At::NORMAL);
+        if packet.apart() {
+            height -= product(&load(&packet.offset), At::NORMAL);
         }
         let inverse = f32x16::splat(simd, 1.0) / closing;
-        let way = height * inverse;
-        let error = fact(At::WAY_ERROR) * inverse.abs();
-        let (low, high) = (way - error, way + error);
+        let distance = height * inverse;
+        let error = fact(At::DISTANCE_ERROR) * inverse.abs();
+        let (low, high) = (distance - error, distance + error);
         let sure = closing.abs().simd_gt(fact(At::LEAST_CLOSING));
         let (least, most) = (
             f32x16::simd_from(simd, found.low.0[row]),
@@ -330,8 +331,8 @@ fn triangle<S: Simd, const R: usize>(
         while open != 0 {
             let ray = row * LANES + open.trailing_zeros() as usize;
             open &= open - 1;
-            if ray < bundle.rays.count {
-                found.decide(judge, &bundle.rays, ray, number);
+            if ray < packet.rays.count {
+                found.decide(judge, &packet.rays, ray, number);
                 changed = true;
             }
         }

@@ -7,7 +7,7 @@
 //! f32 and falls back to f64 where an edge function is zero; here, a sign that rounding could have changed is taken
 //! from the exact products (fused multiply-add). The distance is that to the triangle's plane.
 
-use crate::lanes::{less, unfused};
+use crate::lanes::{minus, unfused};
 use crate::ray::FARTHEST;
 use crate::ray::Ray;
 use fearless_simd::{Simd, prelude::*};
@@ -50,11 +50,11 @@ impl Judge<'_> {
     }
 
     /// Returns the distance to a triangle that the ray is known to hit: bit-identical to [`Judge::meet`].
-    pub(crate) fn way(&self, ray: &Ray, triangle: u32) -> f64 {
+    pub(crate) fn distance(&self, ray: &Ray, triangle: u32) -> f64 {
         let corners = self.corners(triangle);
         let plane = Plane::new(&corners);
-        match plane.way(ray) {
-            Some(way) => way,
+        match plane.distance(ray) {
+            Some(distance) => distance,
             None => meet(ray, &corners).unwrap_or(FARTHEST),
         }
     }
@@ -107,7 +107,7 @@ impl Plane {
     }
 
     /// Returns the distance of a ray to the plane; `None` where it is not accurate ([`STEEP`]).
-    fn way(&self, ray: &Ray) -> Option<f64> {
+    fn distance(&self, ray: &Ray) -> Option<f64> {
         let closing = self.normal.dot(&ray.direction);
         (closing.abs() > self.least).then(|| self.height(&ray.origin) / closing)
     }
@@ -124,7 +124,7 @@ impl Plane {
 
     /// Returns [`Plane::distance`] of eight rays, N·d of each, and the mask of rays for which both are accurate.
     #[inline(always)]
-    pub(crate) fn ways<S: Simd>(
+    pub(crate) fn distances<S: Simd>(
         &self,
         simd: S,
         height: f64x8<S>,
@@ -143,7 +143,7 @@ impl Plane {
             f64x8::splat(simd, self.corner.y),
             f64x8::splat(simd, self.corner.z),
         ];
-        unfused::product(simd, &self.normal, &less(&corner, origin))
+        unfused::product(simd, &self.normal, &minus(&corner, origin))
     }
 }
 
@@ -165,7 +165,7 @@ fn meet(ray: &Ray, corners: &[Point3<f64>; 3]) -> Option<f64> {
         return None;
     }
     let distance = Plane::new(corners)
-        .way(ray)
+        .distance(ray)
         .unwrap_or_else(|| (u * a.z + v * b.z + w * c.z) / sum);
     (distance > 0.0 && distance < FARTHEST).then_some(distance)
 }

@@ -25,7 +25,7 @@ pub(crate) struct MetInRow<'a> {
 const FEW: u32 = 5;
 
 /// State of the computation.
-struct Ways<'a, const R: usize> {
+struct Distances<'a, const R: usize> {
     rays: &'a InRows<'a, R>,
     judge: &'a Judge<'a>,
     distance: Rows<f64, R>,
@@ -53,7 +53,7 @@ pub(crate) fn finish<S: Simd, const R: usize, const CLOSING: bool>(
     found: &[[u32; LANES]; R],
     rays: &InRows<'_, R>,
     judge: &Judge<'_>,
-    mut tell: impl FnMut(&MetInRow<'_>),
+    mut emit: impl FnMut(&MetInRow<'_>),
 ) {
     let none = Kept {
         triangle: NONE,
@@ -61,7 +61,7 @@ pub(crate) fn finish<S: Simd, const R: usize, const CLOSING: bool>(
         inverse: 0.0,
         height: 0.0,
     };
-    let mut ways = Ways {
+    let mut state = Distances {
         rays,
         judge,
         distance: Rows::of(0.0),
@@ -79,31 +79,31 @@ pub(crate) fn finish<S: Simd, const R: usize, const CLOSING: bool>(
         let mut open = *some;
         while open != 0 {
             let triangle = numbers[open.trailing_zeros() as usize & (LANES - 1)];
-            let alike = triangles.simd_eq(u32x16::splat(simd, triangle));
-            let lanes = alike.to_bitmask() & open;
+            let same = triangles.simd_eq(u32x16::splat(simd, triangle));
+            let lanes = same.to_bitmask() & open;
             open &= !lanes;
             if CLOSING && lanes.count_ones() < FEW {
-                ways.postpone(simd, row, lanes, triangle);
+                state.postpone(simd, row, lanes, triangle);
             } else {
-                ways.meet::<S, CLOSING>(simd, row, alike, lanes, triangle);
+                state.meet::<S, CLOSING>(simd, row, same, lanes, triangle);
             }
         }
     }
     if CLOSING {
-        ways.settle(simd);
+        state.settle(simd);
     }
     for (row, triangle) in found.iter().enumerate().take(rows) {
-        tell(&MetInRow {
+        emit(&MetInRow {
             row,
             some: somes[row],
             triangle,
-            distance: &ways.distance.0[row],
-            closing: &ways.closing.0[row],
+            distance: &state.distance.0[row],
+            closing: &state.closing.0[row],
         });
     }
 }
 
-impl<const R: usize> Ways<'_, R> {
+impl<const R: usize> Distances<'_, R> {
     /// Defers the rays in `lanes` to the individual computation.
     #[inline(always)]
     fn postpone<S: Simd>(&mut self, simd: S, row: usize, mut lanes: u64, triangle: u32) {
@@ -123,14 +123,14 @@ impl<const R: usize> Ways<'_, R> {
             #[inline(always)]
             |ray: usize| rays.get(ray),
         );
-        let tell = inlined(
+        let emit = inlined(
             #[inline(always)]
             |settled: Settled| {
-                distance.set(settled.ray, settled.way);
+                distance.set(settled.ray, settled.distance);
                 closing.set(settled.ray, settled.closing);
             },
         );
-        self.pending.settle::<S, true>(simd, self.judge, &ray, tell);
+        self.pending.settle::<S, true>(simd, self.judge, &ray, emit);
     }
 
     /// Computes the distances of the rays in `lanes` to one triangle.
@@ -139,7 +139,7 @@ impl<const R: usize> Ways<'_, R> {
         &mut self,
         simd: S,
         row: usize,
-        alike: mask32x16<S>,
+        same: mask32x16<S>,
         lanes: u64,
         triangle: u32,
     ) {
@@ -156,26 +156,26 @@ impl<const R: usize> Ways<'_, R> {
             }
         }
         let mut unsure = lanes;
-        let (low, high) = alike.widen();
-        for (second, alike) in [low, high].into_iter().enumerate() {
+        let (low, high) = same.widen();
+        for (second, same) in [low, high].into_iter().enumerate() {
             let height = match &rays.common {
                 Some(_) => f64x8::splat(simd, kept.height),
                 None => kept.plane.heights(simd, &half(simd, &rays.origin, row, second)),
             };
             let direction = half(simd, &rays.direction, row, second);
-            let (way, closing, steep) = kept.plane.ways(simd, height, &direction);
-            put(simd, alike, way, &mut self.distance.0[row], second);
+            let (distance, closing, steep) = kept.plane.distances(simd, height, &direction);
+            put(simd, same, distance, &mut self.distance.0[row], second);
             if CLOSING {
                 let closing = closing * f64x8::splat(simd, kept.inverse);
-                put(simd, alike, closing, &mut self.closing.0[row], second);
+                put(simd, same, closing, &mut self.closing.0[row], second);
             }
-            unsure &= !((steep & alike).to_bitmask() << (second * HALF));
+            unsure &= !((steep & same).to_bitmask() << (second * HALF));
         }
         while unsure != 0 {
             let number = row * LANES + unsure.trailing_zeros() as usize;
             unsure &= unsure - 1;
             let ray = rays.get(number);
-            self.distance.set(number, judge.way(&ray, triangle));
+            self.distance.set(number, judge.distance(&ray, triangle));
             if CLOSING {
                 self.closing.set(number, judge.closing(triangle, &ray));
             }

@@ -1,7 +1,7 @@
 //! Queue of rays whose triangle is known but not the f64 distance to it: computed eight at a time, each ray with its own
 //! triangle.
 
-use crate::lanes::{inlined, less, size, unfused};
+use crate::lanes::{inlined, minus, size, unfused};
 use crate::mesh::exact::{Judge, STEEP};
 use crate::ray::Ray;
 use fearless_simd::{Simd, f64x8, prelude::*};
@@ -21,7 +21,7 @@ pub(crate) struct Settled {
     pub(crate) ray: usize,
     pub(crate) triangle: u32,
     /// Bit-identical to [`Judge::distance`].
-    pub(crate) way: f64,
+    pub(crate) distance: f64,
     /// [`Judge::closing`], if requested.
     pub(crate) closing: f64,
 }
@@ -42,7 +42,7 @@ impl Pending {
         simd: S,
         judge: &Judge<'_>,
         rays: &impl Fn(usize) -> Ray,
-        mut tell: impl FnMut(Settled),
+        mut emit: impl FnMut(Settled),
     ) {
         let count = std::mem::take(&mut self.count);
         if count == 0 {
@@ -73,14 +73,14 @@ impl Pending {
             },
         );
         let (a, direction) = (load(&a), load(&direction));
-        let (p, q) = (less(&load(&b), &a), less(&load(&c), &a));
+        let (p, q) = (minus(&load(&b), &a), minus(&load(&c), &a));
         let long = size(&p).max(size(&q));
         let normal = unfused::cross(&p, &q);
         let closing = unfused::dot(&normal, &direction);
         let least = f64x8::splat(simd, STEEP) * long * long;
         let sure = closing.abs().simd_gt(least).to_bitmask();
-        let (mut ways, mut closings) = ([0.0; LANES], [0.0; LANES]);
-        (unfused::dot(&normal, &less(&a, &load(&origin))) / closing).store_slice(&mut ways);
+        let (mut distances, mut closings) = ([0.0; LANES], [0.0; LANES]);
+        (unfused::dot(&normal, &minus(&a, &load(&origin))) / closing).store_slice(&mut distances);
         if CLOSING {
             let inverse = f64x8::splat(simd, 1.0) / unfused::dot(&normal, &normal).sqrt();
             (closing * inverse).store_slice(&mut closings);
@@ -89,15 +89,15 @@ impl Pending {
             let mut settled = Settled {
                 ray: number,
                 triangle,
-                way: ways[lane],
+                distance: distances[lane],
                 closing: closings[lane],
             };
             if sure >> lane & 1 == 0 {
                 let ray = rays(number);
-                settled.way = judge.way(&ray, triangle);
+                settled.distance = judge.distance(&ray, triangle);
                 settled.closing = judge.closing(triangle, &ray);
             }
-            tell(settled);
+            emit(settled);
         }
     }
 }

@@ -5,7 +5,7 @@
 //! function is N·d minus the other two, and carries the errors of all three.
 
 use crate::index::wide::{Leaf, Node, WIDTH};
-use crate::lanes::{cross, dot, inlined, less, size};
+use crate::lanes::{cross, dot, inlined, minus, size};
 use crate::ray::Ray;
 use crate::rounding::ROUNDING;
 use crate::rounding::rounded;
@@ -80,17 +80,17 @@ impl Line {
             #[inline(always)]
             |k: usize, far: usize| f32x8::simd_from(simd, node.bounds[k][(self.entry[k] ^ far) & 1]),
         );
-        let way = inlined(
+        let distance = inlined(
             #[inline(always)]
-            |side: f32x8<S>, [factor, less]: [f32; 2]| side.mul_sub(splat(factor), splat(less)),
+            |side: f32x8<S>, [factor, subtrahend]: [f32; 2]| side.mul_sub(splat(factor), splat(subtrahend)),
         );
         let enter = inlined(
             #[inline(always)]
-            |k: usize| way(side(k, 0), self.early[k]),
+            |k: usize| distance(side(k, 0), self.early[k]),
         );
         let leave = inlined(
             #[inline(always)]
-            |k: usize| way(side(k, 1), self.late[k]),
+            |k: usize| distance(side(k, 1), self.late[k]),
         );
         let near = enter(0).max(enter(1)).max(enter(2).max(splat(0.0)));
         let far = leave(0).min(leave(1)).min(leave(2));
@@ -129,8 +129,8 @@ impl Line {
         );
         let d = three(&self.direction);
         let a = corner(0);
-        let (b, c) = (less(&corner(1), &a), less(&corner(2), &a));
-        let a = less(&a, &three(&self.start));
+        let (b, c) = (minus(&corner(1), &a), minus(&corner(2), &a));
+        let a = minus(&a, &three(&self.start));
         let normal = cross(&b, &c);
         let closing = dot(&normal, &d);
         let moment = cross(&a, &d);
@@ -151,9 +151,9 @@ impl Line {
         let error = error.mul_add(size(&normal), cube * splat(128.0 * ROUNDING)) * 2.0;
         let least = long * long.mul_add(splat(128.0 * ROUNDING), eta * 32.0);
         let inverse = splat(1.0) / closing;
-        let way = dot(&normal, &a) * inverse;
+        let distance = dot(&normal, &a) * inverse;
         let error = error * inverse.abs();
-        let (low, high) = (way - error, way + error);
+        let (low, high) = (distance - error, distance + error);
         let sure = closing.abs().simd_gt(least);
         let aside = sure & (low.simd_gt(splat(limit)) | high.simd_lt(splat(0.0)));
         low.store_slice(&mut outcome.low);

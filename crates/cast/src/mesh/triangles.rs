@@ -4,14 +4,14 @@
 //! bit-identical with any instruction set, for a single ray or in a beam. Of triangles hit at exactly the same distance,
 //! the one with the lowest index counts.
 
-use crate::index::wide::Wide;
+use crate::index::wide::WideBvh;
 use crate::lanes::inlined;
 use crate::mesh::beam::{self, Found};
 use crate::mesh::data::Mesh;
 use crate::mesh::each;
 use crate::mesh::exact::{Judge, Met};
 use crate::mesh::finish::{MetInRow, finish};
-use crate::packet::bundle::{Bundle, Caster, cast_all};
+use crate::packet::cast::{Caster, Packet, cast_all};
 use crate::packet::rays::Rays;
 use crate::packet::rows::LANES;
 use crate::ray::Ray;
@@ -24,7 +24,7 @@ use std::ops::Range;
 pub struct Triangles {
     vertices: Vec<Point3<f64>>,
     triangles: Vec<[u32; 3]>,
-    wide: Wide,
+    wide: WideBvh,
 }
 
 impl std::fmt::Debug for Triangles {
@@ -40,7 +40,7 @@ impl Triangles {
         let vertices: Vec<Point3<f64>> = mesh.vertices().iter().map(place).collect();
         let triangles = mesh.triangles().to_vec();
         Self {
-            wide: Wide::new(&vertices, &triangles),
+            wide: WideBvh::new(&vertices, &triangles),
             vertices,
             triangles,
         }
@@ -98,24 +98,24 @@ impl Triangles {
     fn follow_each(&self, level: Level, rays: impl Fn(usize) -> Ray, met: &mut [Option<Met>]) {
         let (judge, count) = (self.judge(), met.len());
         dispatch!(level, simd => {
-            let tell = inlined(#[inline(always)] |ray: usize, of_ray| met[ray] = of_ray);
-            each::follow(simd, &self.wide, &judge, count, &rays, tell);
+            let emit = inlined(#[inline(always)] |ray: usize, of_ray| met[ray] = of_ray);
+            each::follow(simd, &self.wide, &judge, count, &rays, emit);
         });
     }
 
     /// Emits the nearest hits of a packet, row by row, with the incidence if `CLOSING`. The packet's reach may exceed that
     /// of the mesh.
     #[inline(always)]
-    pub(crate) fn nearest_of_bundle<S: Simd, const R: usize, const CLOSING: bool>(
+    pub(crate) fn nearest_of_packet<S: Simd, const R: usize, const CLOSING: bool>(
         &self,
         simd: S,
-        bundle: &Bundle<'_, R>,
-        tell: impl FnMut(&MetInRow<'_>),
+        packet: &Packet<'_, R>,
+        emit: impl FnMut(&MetInRow<'_>),
     ) {
         let judge = self.judge();
-        let mut found = Found::new(bundle.rays.count);
-        beam::follow(simd, &self.wide, bundle, &judge, &mut found);
-        finish::<S, R, CLOSING>(simd, found.triangles(), &bundle.rays, &judge, tell);
+        let mut found = Found::new(packet.rays.count);
+        beam::follow(simd, &self.wide, packet, &judge, &mut found);
+        finish::<S, R, CLOSING>(simd, found.triangles(), &packet.rays, &judge, emit);
     }
 
     /// Returns the normal of a triangle, for a ray that hits it.
@@ -159,10 +159,10 @@ impl Caster<Option<Met>> for InMesh<'_> {
 
     fn cast_rows<const R: usize>(&self, rays: &Rays, which: Range<usize>, met: &mut [Option<Met>]) -> bool {
         dispatch!(self.level, simd => {
-            let mut bundle = Bundle::<R>::new(rays, which);
-            let narrow = bundle.surround(simd, self.mesh.wide.reach);
+            let mut packet = Packet::<R>::new(rays, which);
+            let narrow = packet.surround(simd, self.mesh.wide.reach);
             if narrow {
-                self.mesh.nearest_of_bundle::<_, R, false>(simd, &bundle, inlined(#[inline(always)] |row: &MetInRow<'_>| {
+                self.mesh.nearest_of_packet::<_, R, false>(simd, &packet, inlined(#[inline(always)] |row: &MetInRow<'_>| {
                     let places = met.chunks_mut(LANES).nth(row.row).unwrap_or_default();
                     for (lane, place) in places.iter_mut().enumerate() {
                         let found = Met { triangle: row.triangle[lane], distance: row.distance[lane] };

@@ -1,7 +1,7 @@
 //! A range of rays, viewed in rows of lanes in f64.
 
 use crate::packet::rays::Rays;
-use crate::packet::rows::{LANES, Vectors, Wide, half, halves};
+use crate::packet::rows::{F64Rows, LANES, Vectors, half, halves};
 use crate::ray::Ray;
 use crate::rounding::rounded;
 use fearless_simd::{Simd, f64x8, prelude::*};
@@ -11,8 +11,8 @@ use std::ops::Range;
 /// Rays in f64. The lanes after the last ray are padding, never read as data.
 pub(crate) struct InRows<'a, const R: usize> {
     pub(crate) count: usize,
-    pub(crate) direction: Wide<'a, R>,
-    pub(crate) origin: Wide<'a, R>,
+    pub(crate) direction: F64Rows<'a, R>,
+    pub(crate) origin: F64Rows<'a, R>,
     /// The common origin, if all origins are bit-identical.
     pub(crate) common: Option<Point3<f64>>,
 }
@@ -40,7 +40,7 @@ impl<'a, const R: usize> InRows<'a, R> {
 
     /// Returns one ray.
     pub(crate) fn get(&self, ray: usize) -> Ray {
-        let of = |[x, y, z]: &Wide<'_, R>| {
+        let of = |[x, y, z]: &F64Rows<'_, R>| {
             let at = |row: &[[f64; LANES]; R]| row[ray / LANES][ray % LANES];
             Vector3::new(at(x), at(y), at(z))
         };

@@ -120,7 +120,7 @@ impl Pyramid {
                 f32x16::splat(simd, forward[1]),
                 f32x16::splat(simd, forward[2]),
             ];
-            let off = lanes::less(&d, &middle);
+            let off = lanes::minus(&d, &middle);
             let square = lanes::dot(&off, &off);
             let greatest = square.reduce_max();
             if greatest > most {

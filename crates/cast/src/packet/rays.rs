@@ -2,7 +2,7 @@
 //! same order as for a single ray.
 
 use crate::lanes::{inlined, unfused};
-use crate::packet::rows::{HALF, LANES as ROW, MOST, Wide};
+use crate::packet::rows::{F64Rows, HALF, LANES as ROW, MOST};
 use crate::ray::Ray;
 use catoptric_model::Pose;
 use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
@@ -134,14 +134,14 @@ impl Rays {
 
     /// Returns the origins and the directions, by axis: `R` rows from ray `from` on.
     #[inline(always)]
-    pub(crate) fn rows<'a, const R: usize>(&'a self, from: usize) -> [Wide<'a, R>; 2] {
+    pub(crate) fn rows<'a, const R: usize>(&'a self, from: usize) -> [F64Rows<'a, R>; 2] {
         let three = inlined(
             #[inline(always)]
             |of: &'a [Vec<f64>; 3]| {
                 [
-                    bundle(&of[0][from..]),
-                    bundle(&of[1][from..]),
-                    bundle(&of[2][from..]),
+                    first_rows(&of[0][from..]),
+                    first_rows(&of[1][from..]),
+                    first_rows(&of[2][from..]),
                 ]
             },
         );
@@ -151,7 +151,7 @@ impl Rays {
 
 /// Returns the first `R` rows.
 #[inline(always)]
-fn bundle<const R: usize>(of: &[f64]) -> &[[f64; ROW]; R] {
+fn first_rows<const R: usize>(of: &[f64]) -> &[[f64; ROW]; R] {
     match of.as_chunks().0.first_chunk() {
         Some(rows) => rows,
         None => unreachable!("the arrays are one packet longer than the rays"),

@@ -28,7 +28,7 @@ pub(crate) struct Rows<T, const R: usize>(pub(crate) [[T; LANES]; R]);
 pub(crate) type Vectors<T, const R: usize> = [Rows<T, R>; 3];
 
 /// Coordinates in f64 of `R` rows of rays, by axis.
-pub(crate) type Wide<'a, const R: usize> = [&'a [[f64; LANES]; R]; 3];
+pub(crate) type F64Rows<'a, const R: usize> = [&'a [[f64; LANES]; R]; 3];
 
 impl<T: Copy, const R: usize> Rows<T, R> {
     pub(crate) fn of(value: T) -> Self {
@@ -64,7 +64,7 @@ pub(crate) fn halves<S: Simd>(simd: S, row: &[f64; LANES]) -> [f64x8<S>; 2] {
 #[inline(always)]
 pub(crate) fn half<S: Simd, const R: usize>(
     simd: S,
-    [x, y, z]: &Wide<'_, R>,
+    [x, y, z]: &F64Rows<'_, R>,
     row: usize,
     second: usize,
 ) -> [f64x8<S>; 3] {

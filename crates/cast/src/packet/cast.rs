@@ -13,7 +13,7 @@ use std::ops::Range;
 const TOGETHER: f32 = 0.02;
 
 /// Rays cast together, in `R` rows of lanes.
-pub(crate) struct Bundle<'a, const R: usize> {
+pub(crate) struct Packet<'a, const R: usize> {
     pub(crate) rays: InRows<'a, R>,
     pub(crate) start: Start,
     pub(crate) direction: Vectors<f32, R>,
@@ -24,7 +24,7 @@ pub(crate) struct Bundle<'a, const R: usize> {
     pub(crate) pyramid: Pyramid,
 }
 
-impl<'a, const R: usize> Bundle<'a, R> {
+impl<'a, const R: usize> Packet<'a, R> {
     pub(crate) fn new(rays: &'a Rays, which: Range<usize>) -> Self {
         Self {
             rays: InRows::of(rays, which),
