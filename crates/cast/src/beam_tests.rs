@@ -1,10 +1,10 @@
-//! Beams against rays alone, against every triangle by itself, and against parry.
+//! Compares packets with single rays, with a brute-force test of every triangle, and with parry.
 
 use crate::mesh::data::Mesh;
 use crate::mesh::exact::Met;
 use crate::mesh::triangles::tests::random_star;
 use crate::mesh::triangles::{InMesh, Triangles};
-use crate::packet::bundle::{Caster, cast_all};
+use crate::packet::cast::{Caster, cast_all};
 use crate::packet::rays::Rays;
 use crate::random::Draws;
 use crate::ray::{FARTHEST, Ray};
@@ -18,7 +18,7 @@ use nalgebra::{Point3, Unit, Vector3};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// The widest lanes of this machine, every narrower kind that it has, and the one that is always there.
+/// The widest instruction set of this machine, every narrower one that it supports, and the fallback.
 fn levels() -> Vec<Level> {
     let best = Level::new();
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
@@ -38,7 +38,7 @@ fn vector(draws: &mut Draws, size: f64) -> Vector3<f64> {
     Vector3::from_fn(|_, _| size * (2.0 * draws.uniform() - 1.0))
 }
 
-/// A narrow cone of rays from starts that are so far apart.
+/// A narrow cone of rays with origins up to `apart` from each other.
 fn cone(draws: &mut Draws, from: Point3<f64>, towards: Point3<f64>, count: usize, apart: f64) -> Rays {
     let middle = (towards - from).normalize();
     let width = 0.03 * draws.uniform();
@@ -54,7 +54,7 @@ fn cone(draws: &mut Draws, from: Point3<f64>, towards: Point3<f64>, count: usize
         .collect()
 }
 
-/// The nearest triangle by trying all.
+/// The nearest hit by brute force.
 fn tried(mesh: &Triangles, ray: &Ray, count: u32) -> Option<Met> {
     let judge = mesh.judge();
     let met = (0..count).filter_map(|triangle| {
@@ -68,7 +68,7 @@ fn tried(mesh: &Triangles, ray: &Ray, count: u32) -> Option<Met> {
     })
 }
 
-/// Triangles of all sizes, needles and doubles among them, some on a common grid.
+/// Triangles of all sizes, including needles and duplicates, some on a common grid.
 fn soup(seed: u64, count: u32) -> Mesh {
     let mut draws = Draws::new(seed, 0);
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
@@ -92,22 +92,22 @@ fn soup(seed: u64, count: u32) -> Mesh {
             triangles.push([first + 1, first + 2, first]);
         }
     }
-    Mesh::new(vertices, triangles).expect("it is a mesh")
+    Mesh::new(vertices, triangles).expect("a valid mesh")
 }
 
 #[test]
-fn beams_and_rays_find_what_trying_all_finds_with_any_lanes() {
+fn beams_and_rays_agree_with_brute_force_on_every_instruction_set() {
     let of_seed = |number: usize| {
         let seed = number as u64;
         let source = soup(seed, [3, 8, 60, 700][number % 4]);
-        // Far away all that f32 rounds is greater.
+        // Far away, every rounding error of f32 is larger.
         let place = if number % 3 == 2 { 300.0 } else { 0.3 };
         let mesh = Triangles::new(&source, 1.0, &Pose::translation(place, -0.2 * place, 0.4 * place));
         let count = u32::try_from(source.triangles().len()).expect("a small mesh");
         let mut draws = Draws::new(seed, 1);
         let mut hits = 0;
         for shot in 0..60 {
-            // Some rays start or aim exactly at a vertex, or at the middle of an edge.
+            // Some rays start exactly at, or aim exactly at, a vertex or the middle of an edge.
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             let [a, b, _] = mesh.corners((draws.uniform() * f64::from(count)) as usize);
             let towards = if shot % 2 == 0 {
@@ -162,12 +162,12 @@ fn no_beam_leaks_out_of_a_closed_mesh() {
 }
 
 #[test]
-fn parry_agrees() {
+fn hits_agree_with_parry() {
     const BEAMS: u64 = 8_000;
     let source = random_star(3, 5);
     let mesh = Triangles::new(&source, 1.0, &Pose::identity());
     let points = source.vertices().iter().map(|p| to_glam(&p.coords)).collect();
-    let parry = parry3d::shape::TriMesh::new(points, source.triangles().to_vec()).expect("it is a mesh");
+    let parry = parry3d::shape::TriMesh::new(points, source.triangles().to_vec()).expect("a valid mesh");
     let off: usize = (0..BEAMS)
         .into_par_iter()
         .map(|beam| {
@@ -199,7 +199,7 @@ fn parry_agrees() {
 }
 
 #[test]
-fn a_world_answers_a_beam_as_it_answers_its_rays() {
+fn a_world_casts_a_beam_as_it_casts_single_rays() {
     let star = Arc::new(Triangles::new(
         &random_star(4, 3),
         0.7,
@@ -251,7 +251,7 @@ fn a_world_answers_a_beam_as_it_answers_its_rays() {
 }
 
 #[test]
-fn nothing_is_met_in_an_empty_world_and_by_no_rays() {
+fn an_empty_world_and_an_empty_beam_have_no_hits() {
     let world = World::new(Vec::new());
     let mut draws = Draws::new(1, 0);
     let rays = cone(&mut draws, Point3::origin(), Point3::new(1.0, 0.0, 0.0), 16, 0.0);

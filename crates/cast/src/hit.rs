@@ -1,40 +1,40 @@
-//! Where a ray meets a surface.
+//! Hits of rays on surfaces, and their compact record.
 
 use nalgebra::{Point3, Unit, Vector3};
 
-/// Where a ray meets a surface.
+/// Where a ray hits a surface.
 #[derive(Debug, Clone, Copy)]
 pub struct Hit {
     /// Index of the surface.
     pub surface: usize,
-    /// Distance from the ray's origin, in metres.
+    /// Distance from the ray's origin, in meters.
     pub distance: f64,
-    /// The point.
+    /// The hit point.
     pub point: Point3<f64>,
-    /// Normal of the surface, on the side of its front.
+    /// Normal of the surface's front.
     pub normal: Unit<Vector3<f64>>,
-    /// Product of the ray's direction with the normal: the cosine of the incidence, less than zero where the front was met.
+    /// Dot product of the ray's direction and the normal: the cosine of the incidence, negative for a hit on the front.
     pub closing: f64,
 }
 
-/// Where a ray meets a surface, without what follows from that.
+/// Compact record of a hit; [`World::hit`](crate::World::hit) completes it with the point and the normal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
     /// Index of the surface.
     pub surface: u32,
-    /// Number of its triangle, if it is a mesh.
+    /// Index of the triangle, if the surface is a mesh.
     pub(crate) triangle: u32,
-    /// Distance from the ray's origin, in metres.
+    /// Distance from the ray's origin, in meters.
     pub distance: f64,
-    /// Product of the ray's direction with the normal of the surface's front, as of a [`Hit`].
+    /// Dot product of the ray's direction and the normal of the surface's front, as in [`Hit`].
     pub closing: f64,
 }
 
-/// Number of a surface or a triangle that is none.
+/// Index that stands for no surface or no triangle.
 pub(crate) const NONE: u32 = u32::MAX;
 
 impl Hit {
-    /// Whether the front was met.
+    /// Whether the front was hit.
     pub fn front(&self) -> bool {
         self.closing < 0.0
     }
@@ -46,7 +46,7 @@ impl Hit {
 }
 
 impl Contact {
-    /// Whether the front was met.
+    /// Whether the front was hit.
     pub fn front(&self) -> bool {
         self.closing < 0.0
     }

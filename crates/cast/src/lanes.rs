@@ -1,18 +1,18 @@
-//! Small arithmetic in lanes.
+//! Vector arithmetic in SIMD lanes.
 //!
-//! An instruction set that is found at run time holds for one function and what is inlined into it. So all that works
-//! in lanes is always inlined, closures too ([`inlined`]), and arrays are not mapped.
+//! An instruction set that is detected at run time applies to one function and whatever is inlined into it. So every
+//! function on lanes is always inlined, closures included ([`inlined`]), and `array::map` is avoided.
 
 use fearless_simd::{Simd, SimdFloat, f64x8};
 
-/// A closure that is inlined wherever it is called: write `inlined(#[inline(always)] |x| …)`.
+/// Returns the closure itself, as the place for an attribute: `inlined(#[inline(always)] |x| …)`.
 #[inline(always)]
 pub(crate) fn inlined<F>(closure: F) -> F {
     closure
 }
 
 #[inline(always)]
-pub(crate) fn less<S: Simd, L: SimdFloat<S>>(a: &[L; 3], b: &[L; 3]) -> [L; 3] {
+pub(crate) fn minus<S: Simd, L: SimdFloat<S>>(a: &[L; 3], b: &[L; 3]) -> [L; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
@@ -30,14 +30,13 @@ pub(crate) fn cross<S: Simd, L: SimdFloat<S>>(a: &[L; 3], b: &[L; 3]) -> [L; 3] 
     ]
 }
 
-/// Sum of the coordinates' sizes: not less than the length.
+/// Returns the L1 norm, an upper bound on the length.
 #[inline(always)]
 pub(crate) fn size<S: Simd, L: SimdFloat<S>>(a: &[L; 3]) -> L {
     a[0].abs() + a[1].abs() + a[2].abs()
 }
 
-/// Products and sums each rounded by itself, in the order of a vector alone: what is worked out in lanes is then the same to
-/// the bit.
+/// Arithmetic without fused multiply-add, in the order of the scalar code: results in lanes are bit-identical to it.
 pub(crate) mod unfused {
     use super::{Simd, SimdFloat, f64x8};
     use fearless_simd::prelude::*;
@@ -48,7 +47,7 @@ pub(crate) mod unfused {
         a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     }
 
-    /// Of one vector and eight.
+    /// Returns the dot products of one vector with eight.
     #[inline(always)]
     pub(crate) fn product<S: Simd>(simd: S, a: &Vector3<f64>, b: &[f64x8<S>; 3]) -> f64x8<S> {
         let a = [

@@ -1,18 +1,18 @@
 //! Rays against surfaces: polygons, boxes, cylinders and triangle meshes, one ray at a time or many in lanes.
 //!
-//! Facets, boards and walls are exact plane polygons, posts and housing exact boxes and cylinders, all in one bounding
-//! volume hierarchy; a mesh has one of its own below it. A ray that leaves a mirror excludes that mirror by its index,
-//! never by an epsilon.
+//! Facets, boards and walls are exact plane polygons; posts and the housing are exact boxes and cylinders. All are in one
+//! bounding volume hierarchy; a mesh has its own below it. A ray that leaves a mirror excludes that mirror by index, never
+//! by an epsilon.
 //!
 //! ```
 //! use catoptric_cast::{Polygon, Ray, Shape, World};
 //! use nalgebra::{Point3, Vector3};
 //!
 //! let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)].map(|(y, z)| Point3::new(2.0, y, z));
-//! let wall = Polygon::new(corners.to_vec()).expect("it has an area");
+//! let wall = Polygon::new(corners.to_vec()).expect("a nonzero area");
 //! let world = World::new(vec![Shape::Polygon(wall)]);
 //! let ray = Ray { origin: Point3::origin(), direction: Vector3::x_axis() };
-//! let hit = world.cast(&ray, None).expect("the wall is in the way");
+//! let hit = world.cast(&ray, None).expect("a hit on the wall");
 //! assert_eq!((hit.surface, hit.distance), (0, 2.0));
 //! ```
 

@@ -1,15 +1,15 @@
-//! Numbers by chance for the tests, the same in every run.
+//! Random numbers for the tests, the same in every run.
 
 use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand::rand_core::Rng;
 use rand::rngs::ChaCha8Rng;
 
-/// A stream of draws.
+/// A stream of random numbers.
 pub(crate) struct Draws(ChaCha8Rng);
 
 impl Draws {
-    /// The stream of a seed and a row.
+    /// The stream of a seed and a noise row.
     pub(crate) fn new(seed: u64, row: u64) -> Self {
         const PURPOSE: u64 = 4;
         let mut key = [0; 32];
@@ -20,12 +20,12 @@ impl Draws {
         Self(ChaCha8Rng::from_seed(key))
     }
 
-    /// Uniform on the open interval (0, 1).
+    /// Draws uniformly from the open interval (0, 1).
     pub(crate) fn uniform(&mut self) -> f64 {
         ((self.0.next_u64() >> 11) as f64 + 0.5) * (1.0 / (1_u64 << 53) as f64)
     }
 
-    /// Three standard normal draws.
+    /// Draws three standard normal numbers.
     pub(crate) fn normal3(&mut self) -> Vector3<f64> {
         Vector3::from_fn(|_, _| {
             let radius = (-2.0 * libm::log(self.uniform())).sqrt();

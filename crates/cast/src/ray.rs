@@ -1,21 +1,21 @@
-//! A ray.
+//! A ray, and its transformation into another frame.
 
 use catoptric_model::Pose;
 use nalgebra::{Point3, Unit, Vector3};
 
-/// A ray.
+/// A ray: a half-line from an origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
-    /// Where it starts.
+    /// Starting point.
     pub origin: Point3<f64>,
-    /// Where it goes.
+    /// Direction, of unit length.
     pub direction: Unit<Vector3<f64>>,
 }
 
-/// Farthest distance at which anything is looked for, in metres: beyond any scanner's range.
+/// Search limit for hits, in meters: beyond any scanner's range.
 pub(crate) const FARTHEST: f64 = 1e4;
 
-/// A ray moved into another frame.
+/// Transforms a ray into another frame.
 pub fn placed(ray: &Ray, other_from_ray: &Pose) -> Ray {
     Ray {
         origin: other_from_ray * ray.origin,

@@ -1,4 +1,4 @@
-//! A shape that light can meet.
+//! The surfaces that a ray can hit: polygon, box, cylinder or mesh.
 
 use crate::mesh::Triangles;
 use crate::ray::Ray;
@@ -9,7 +9,7 @@ use parry3d::bounding_volume::Aabb;
 use parry3d::math::Vector;
 use std::sync::Arc;
 
-/// A shape that light can meet.
+/// A surface or body that a ray can hit.
 #[derive(Debug, Clone)]
 pub enum Shape {
     /// A polygon.
@@ -22,7 +22,7 @@ pub enum Shape {
     Mesh(Arc<Triangles>),
 }
 
-/// Slack of a bounding box, in metres: a plane polygon's box is flat, and rounding must not push a ray past it.
+/// Padding of a bounding box, in meters: a plane polygon's box is flat, and rounding must not make a ray miss it.
 const BOX_SLACK: f64 = 1e-9;
 
 impl Shape {
@@ -35,7 +35,7 @@ impl Shape {
         }
     }
 
-    /// Distance at which a ray meets it, and its normal there.
+    /// Returns the distance at which a ray hits the shape, and the normal there.
     pub(crate) fn cast(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
         match self {
             Self::Polygon(polygon) => Some((polygon.cast(ray)?, polygon.normal)),
@@ -45,14 +45,14 @@ impl Shape {
         }
     }
 
-    /// Two corners of a box that holds it.
+    /// Returns the lowest and highest corner of the bounding box.
     pub fn corners_of_box(&self) -> (Point3<f64>, Point3<f64>) {
         let bounds = self.bounds();
         let corner = |v: Vector| Point3::new(v.x, v.y, v.z);
         (corner(bounds.mins), corner(bounds.maxs))
     }
 
-    /// Whether another is the very same shape in the same place. Meshes are, where they are one.
+    /// Whether another shape is identical, in the same pose. Meshes are compared by reference.
     pub fn is_same(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Polygon(a), Self::Polygon(b)) => a.corners == b.corners,
@@ -68,7 +68,7 @@ impl Shape {
         }
     }
 
-    /// Whether a point is inside a closed body: what a ray from there meets first is a back.
+    /// Whether a point is inside a closed body: a ray from there first hits a back face.
     pub fn holds(&self, point: &Point3<f64>) -> bool {
         let ray = Ray {
             origin: *point,
@@ -78,13 +78,13 @@ impl Shape {
             .is_some_and(|(_, normal)| normal.dot(&ray.direction) > 0.0)
     }
 
-    /// Distance at which a ray meets it.
+    /// Returns the distance at which a ray hits the shape.
     pub fn distance(&self, ray: &Ray) -> Option<f64> {
         Some(self.cast(ray)?.0)
     }
 }
 
-/// A box around points, a little larger than they need.
+/// Returns the bounding box of points, padded by [`BOX_SLACK`].
 fn padded(points: impl Iterator<Item = Point3<f64>>) -> Aabb {
     let mut aabb = Aabb::from_points(points.map(|p| to_glam(&p.coords)));
     aabb.mins -= Vector::splat(BOX_SLACK);

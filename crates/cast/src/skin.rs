@@ -1,16 +1,16 @@
-//! The surface of a shape as triangles: for pictures, for volumes, for files that others read.
+//! The surface of a shape as triangles, for pictures, volumes and exported files.
 
 use crate::shape::Shape;
 use crate::solid::{Block, Cylinder, Polygon};
 use nalgebra::{Point3, Vector3};
 
-/// A triangle; its corners run counter-clockwise seen from outside.
+/// A triangle; its corners are counterclockwise seen from outside.
 pub type Triangle = [Point3<f64>; 3];
 
-/// Flat faces that a cylinder is drawn with: they depart from the round by 0.2 % of the radius.
+/// Flat faces that approximate a cylinder: they deviate from it by 0.2 % of the radius.
 pub const CYLINDER_FACES: usize = 48;
 
-/// Faces of a box over its corners as [`Block::corners`] numbers them, counter-clockwise seen from outside.
+/// Faces of a box as indices into [`Block::corners`], counterclockwise seen from outside.
 const BOX_FACES: [[usize; 4]; 6] = [
     [0, 4, 6, 2],
     [1, 3, 7, 5],
@@ -21,7 +21,7 @@ const BOX_FACES: [[usize; 4]; 6] = [
 ];
 
 impl Shape {
-    /// Its surface, in metres: closed for a body, one sheet for a polygon.
+    /// Returns the surface as triangles, in meters: closed for a body, a single sheet for a polygon.
     pub fn triangles(&self) -> Vec<Triangle> {
         match self {
             Self::Polygon(polygon) => polygon.triangles(),
@@ -33,7 +33,7 @@ impl Shape {
 }
 
 impl Polygon {
-    /// The polygon as a fan of triangles around its first corner.
+    /// Returns the polygon as a fan of triangles around its first corner.
     pub fn triangles(&self) -> Vec<Triangle> {
         fan(&self.corners)
     }
@@ -52,7 +52,7 @@ impl Block {
 impl Cylinder {
     fn triangles(&self) -> Vec<Triangle> {
         let rim = |step: usize, z: f64| {
-            // The last corner is the first again, to the bit.
+            // The last corner is bit-identical to the first.
             let turn = std::f64::consts::TAU * (step % CYLINDER_FACES) as f64 / CYLINDER_FACES as f64;
             let (sin, cos) = libm::sincos(turn);
             self.frame_from_cylinder * Point3::new(self.radius * cos, self.radius * sin, z)
@@ -75,8 +75,8 @@ fn fan(corners: &[Point3<f64>]) -> Vec<Triangle> {
     rest.windows(2).map(|pair| [*first, pair[0], pair[1]]).collect()
 }
 
-/// Volume inside a closed surface, in cubic metres: the signed volumes of the tetrahedra between its triangles and the
-/// origin.
+/// Returns the volume inside a closed surface, in cubic meters: the sum of the signed volumes of the tetrahedra between its
+/// triangles and the origin.
 pub fn volume(triangles: &[Triangle]) -> f64 {
     let of_one = |[a, b, c]: &Triangle| a.coords.dot(&b.coords.cross(&c.coords)) / 6.0;
     triangles.iter().map(of_one).sum()
@@ -95,7 +95,7 @@ mod tests {
         )
     }
 
-    /// Every edge is walked once in each direction.
+    /// Whether every edge is traversed once in each direction.
     fn is_closed(triangles: &[Triangle]) -> bool {
         let key = |p: &Point3<f64>| p.coords.map(f64::to_bits).data.0[0];
         let edges = triangles
@@ -110,13 +110,13 @@ mod tests {
     }
 
     #[test]
-    fn bodies_are_closed_and_hold_their_volume() {
+    fn bodies_are_closed_and_have_the_expected_volume() {
         let block = Shape::Block(Block::new(place(), Vector3::new(0.1, 0.2, 0.05))).triangles();
         assert!(is_closed(&block));
         assert!((volume(&block) / (0.1 * 0.2 * 0.05) - 1.0).abs() < 1e-12);
         let rod = Shape::Cylinder(Cylinder::new(place(), 0.1, 0.3)).triangles();
         assert!(is_closed(&rod));
-        // A prism over a regular polygon in the circle.
+        // A prism over a regular polygon inscribed in the circle.
         let n = CYLINDER_FACES as f64;
         let prism = 0.5 * n * 0.05 * 0.05 * libm::sin(std::f64::consts::TAU / n) * 0.3;
         assert!((volume(&rod) / prism - 1.0).abs() < 1e-12);
@@ -126,7 +126,7 @@ mod tests {
     fn a_polygon_keeps_its_front() {
         let corners = [(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 2.0), (0.0, 1.0)];
         let polygon =
-            Polygon::new(corners.map(|(x, y)| Point3::new(x, y, 0.5)).to_vec()).expect("it has an area");
+            Polygon::new(corners.map(|(x, y)| Point3::new(x, y, 0.5)).to_vec()).expect("a nonzero area");
         let sheet = Shape::Polygon(polygon).triangles();
         let normals: Vec<Vector3<f64>> = sheet.iter().map(|[a, b, c]| (b - a).cross(&(c - a))).collect();
         assert_eq!(sheet.len(), 3);

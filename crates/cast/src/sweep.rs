@@ -1,13 +1,14 @@
-//! A beam against all surfaces: whole shapes are left out by their boxes, polygons are met eight rays at a time.
+//! Packets against all surfaces of a world: whole shapes are culled by their boxes, polygons are intersected with eight
+//! rays at a time.
 //!
-//! A polygon's plane and edges are computed in f64 as for a ray alone, in the same order: the answer is the same to the
-//! bit. Where the whole pyramid around the rays passes inside the polygon, or outside, its edges need not be tried.
+//! A polygon's plane and edges are computed in f64 in the same order as for a single ray, so the results are
+//! bit-identical. Where the whole pyramid around the rays passes inside or outside the polygon, no edges are tested.
 
 use crate::hit::{Contact, NONE};
 use crate::index::wide::Walk;
-use crate::lanes::{inlined, less, unfused};
+use crate::lanes::{inlined, minus, unfused};
 use crate::mesh::finish::MetInRow;
-use crate::packet::bundle::{Bundle, Caster, cast_all};
+use crate::packet::cast::{Caster, Packet, cast_all};
 use crate::packet::in_rows::InRows;
 use crate::packet::rays::Rays;
 use crate::packet::rows::{HALF, LANES, Rows, half};
@@ -21,36 +22,36 @@ use fearless_simd::{f64x4, f64x8, mask32x8, mask64x8, u32x8};
 use nalgebra::Vector3;
 use std::ops::Range;
 
-/// Where the corners of a pyramid meet a polygon's plane, as seen from the polygon.
+/// Where a packet's pyramid crosses a polygon's plane, relative to the polygon.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Passes {
     Inside,
     Outside,
-    /// Or nothing is known.
+    /// On both sides of an edge, or undecided.
     Partly,
 }
 
-/// The nearest surface of every ray.
+/// Nearest hit of every ray so far.
 struct Nearest<const R: usize> {
     distance: Rows<f64, R>,
     surface: Rows<u32, R>,
-    /// Its triangle, if it is a mesh, and the product of the direction with the normal there.
+    /// For a mesh, the triangle and the dot product of the direction and its normal.
     triangle: Rows<u32, R>,
     closing: Rows<f64, R>,
-    /// Not less than the greatest distance.
+    /// Upper bound on the distances.
     limit: f32,
 }
 
-/// What eight rays meet of a surface.
+/// Hits of eight rays on one surface.
 struct Candidates<S: Simd> {
     surface: u32,
-    /// Infinite where it is not met.
+    /// Infinite for a miss.
     distance: f64x8<S>,
-    /// Of a mesh the triangle, and the product of the direction with the normal.
+    /// For a mesh, the triangle and the dot product of the direction and its normal.
     of_mesh: Option<(u32x8<S>, f64x8<S>)>,
 }
 
-/// A world without the surface that the rays left, with what the machine has.
+/// A world without the surface that the rays left, and the instruction set to cast with.
 struct InWorld<'a> {
     world: &'a World,
     level: Level,
@@ -71,13 +72,13 @@ impl Caster<Option<Contact>> for InWorld<'_> {
         contacts: &mut [Option<Contact>],
     ) -> bool {
         dispatch!(self.level, simd => {
-            let mut bundle = Bundle::<R>::new(rays, which);
-            let narrow = bundle.surround(simd, self.world.reach);
+            let mut packet = Packet::<R>::new(rays, which);
+            let narrow = packet.surround(simd, self.world.reach);
             if narrow {
-                let mut nearest = Nearest::new(bundle.rays.count);
-                self.world.sweep(simd, &bundle, self.left, &mut nearest);
+                let mut nearest = Nearest::new(packet.rays.count);
+                self.world.sweep(simd, &packet, self.left, &mut nearest);
                 for (ray, contact) in contacts.iter_mut().enumerate() {
-                    *contact = nearest.contact(self.world, &bundle.rays, ray);
+                    *contact = nearest.contact(self.world, &packet.rays, ray);
                 }
             }
             narrow
@@ -86,12 +87,12 @@ impl Caster<Option<Contact>> for InWorld<'_> {
 }
 
 impl World {
-    /// The nearest surface along each of some rays, `left` aside: what [`World::cast`] says of each of them but for the point
-    /// and the normal, which [`World::hit`] adds; faster if they are a narrow cone from nearly one point. Of surfaces at
-    /// the very same distance the first counts.
+    /// Finds the nearest hit of each ray, ignoring the surface `left`. Equals [`World::cast`] without the point and the
+    /// normal, which [`World::hit`] adds; faster for coherent rays, a narrow cone with nearly one origin. Of surfaces at
+    /// exactly the same distance, the one with the lowest index counts.
     ///
     /// # Panics
-    /// If there are not as many places for what they meet.
+    /// If the numbers of rays and result slots differ.
     pub fn cast_beam(&self, rays: &Rays, left: Option<usize>, contacts: &mut [Option<Contact>]) {
         self.cast_beam_at(Level::new(), rays, left, contacts);
     }
@@ -111,7 +112,7 @@ impl World {
     fn sweep<S: Simd, const R: usize>(
         &self,
         simd: S,
-        bundle: &Bundle<'_, R>,
+        packet: &Packet<'_, R>,
         left: Option<usize>,
         nearest: &mut Nearest<R>,
     ) {
@@ -121,10 +122,10 @@ impl World {
             let mut nearer = None;
             if !child.is_leaf() {
                 let node = &self.nodes[child.number()];
-                let (met, near) = bundle.pyramid.boxes(simd, &node.bounds, nearest.limit);
+                let (met, near) = packet.pyramid.boxes(simd, &node.bounds, nearest.limit);
                 nearer = walk.enter(node, met, near);
             } else if left != Some(child.number()) {
-                self.meet(simd, bundle, child.number(), nearest);
+                self.meet(simd, packet, child.number(), nearest);
             }
             next = nearer.or_else(|| walk.next(nearest.limit));
         }
@@ -134,23 +135,23 @@ impl World {
     fn meet<S: Simd, const R: usize>(
         &self,
         simd: S,
-        bundle: &Bundle<'_, R>,
+        packet: &Packet<'_, R>,
         surface: usize,
         nearest: &mut Nearest<R>,
     ) {
         match &self.shapes[surface] {
-            Shape::Polygon(polygon) => nearest.polygon(simd, bundle, surface, polygon),
+            Shape::Polygon(polygon) => nearest.polygon(simd, packet, surface, polygon),
             Shape::Mesh(mesh) => {
                 let take = inlined(
                     #[inline(always)]
                     |met: &MetInRow<'_>| nearest.mesh(simd, numbered(surface), met),
                 );
-                mesh.nearest_of_bundle::<_, R, true>(simd, bundle, take);
+                mesh.nearest_of_packet::<_, R, true>(simd, packet, take);
                 nearest.set_limit(simd);
             }
             other => {
-                for ray in 0..bundle.rays.count {
-                    if let Some(distance) = other.distance(&bundle.rays.get(ray)) {
+                for ray in 0..packet.rays.count {
+                    if let Some(distance) = other.distance(&packet.rays.get(ray)) {
                         nearest.take(ray, distance, numbered(surface));
                     }
                 }
@@ -170,14 +171,14 @@ impl<const R: usize> Nearest<R> {
             closing: Rows::of(0.0),
             limit: upwards(FARTHEST),
         };
-        // What a row is filled up with meets nothing.
+        // Padding hits nothing.
         for ray in count..R * LANES {
             nearest.distance.set(ray, f64::NEG_INFINITY);
         }
         nearest
     }
 
-    /// What there is to know of the surface that a ray meets.
+    /// Returns the contact of a ray with its nearest surface.
     #[inline(always)]
     fn contact(&self, world: &World, rays: &InRows<'_, R>, number: usize) -> Option<Contact> {
         let surface = self.surface.get(number);
@@ -199,7 +200,7 @@ impl<const R: usize> Nearest<R> {
         })
     }
 
-    /// A surface that is no mesh at some distance; of surfaces at the same distance the first counts. Whether it does.
+    /// Records a hit on a surface other than a mesh, if it is nearer, or as near with a lower index. Returns whether it is.
     fn take(&mut self, ray: usize, distance: f64, surface: u32) -> bool {
         let nearer = (distance, surface) < (self.distance.get(ray), self.surface.get(ray));
         if nearer {
@@ -220,7 +221,7 @@ impl<const R: usize> Nearest<R> {
         self.limit = upwards(most.reduce_max().min(FARTHEST));
     }
 
-    /// Takes those of a half of a row that are nearer than what is known, or as near and before it; whether any is.
+    /// Records the hits of one half of a row that are nearer, or as near with a lower index. Returns whether any is.
     #[inline(always)]
     fn take_half<S: Simd>(&mut self, simd: S, row: usize, second: usize, of: &Candidates<S>) -> bool {
         let places = second * HALF..(second + 1) * HALF;
@@ -278,8 +279,8 @@ impl<const R: usize> Nearest<R> {
     }
 
     #[inline(always)]
-    fn polygon<S: Simd>(&mut self, simd: S, bundle: &Bundle<'_, R>, surface: usize, polygon: &Polygon) {
-        let passes = passes(simd, bundle, polygon);
+    fn polygon<S: Simd>(&mut self, simd: S, packet: &Packet<'_, R>, surface: usize, polygon: &Polygon) {
+        let passes = passes(simd, packet, polygon);
         if passes == Passes::Outside {
             return;
         }
@@ -288,7 +289,7 @@ impl<const R: usize> Nearest<R> {
             for second in 0..2 {
                 let candidates = Candidates {
                     surface: numbered(surface),
-                    distance: distances(simd, bundle, row, second, polygon, passes == Passes::Inside),
+                    distance: distances(simd, packet, row, second, polygon, passes == Passes::Inside),
                     of_mesh: None,
                 };
                 changed |= self.take_half(simd, row, second, &candidates);
@@ -300,24 +301,24 @@ impl<const R: usize> Nearest<R> {
     }
 }
 
-/// A surface's number; those of shapes in a node of the index are as small.
+/// Returns a surface's index as u32; nodes of the index limit it to fewer bits.
 #[allow(clippy::cast_possible_truncation)]
 fn numbered(surface: usize) -> u32 {
     surface as u32
 }
 
-/// Distances at which eight rays meet a polygon, infinite where they do not: `Polygon::cast`.
+/// Returns the distances at which eight rays hit a polygon, infinite for a miss: `Polygon::cast` in lanes.
 #[inline(always)]
 fn distances<S: Simd, const R: usize>(
     simd: S,
-    bundle: &Bundle<'_, R>,
+    packet: &Packet<'_, R>,
     row: usize,
     second: usize,
     polygon: &Polygon,
     inside: bool,
 ) -> f64x8<S> {
-    let origin = bundle.rays.starts(simd, row, second);
-    let direction = half(simd, &bundle.rays.direction, row, second);
+    let origin = packet.rays.starts(simd, row, second);
+    let direction = half(simd, &packet.rays.direction, row, second);
     let splat = inlined(
         #[inline(always)]
         |v: &Vector3<f64>| {
@@ -329,7 +330,7 @@ fn distances<S: Simd, const R: usize>(
         },
     );
     let closing = unfused::product(simd, &polygon.normal, &direction);
-    let seen = less(&splat(&polygon.origin.coords), &origin);
+    let seen = minus(&splat(&polygon.origin.coords), &origin);
     let distance = unfused::product(simd, &polygon.normal, &seen) / closing;
     if inside {
         return distance;
@@ -346,12 +347,12 @@ fn distances<S: Simd, const R: usize>(
     met.select(distance, f64x8::splat(simd, f64::INFINITY))
 }
 
-/// How the pyramid around the rays passes a polygon.
+/// Returns where the pyramid around the rays crosses a polygon's plane.
 ///
-/// The plane cuts it in a convex outline whose corners are where the pyramid's do. Rays that start elsewhere than at its
-/// tip, by δ at most, are off by δ(1 + 1/N·d) there.
+/// The plane cuts the pyramid in a convex outline whose corners are on the pyramid's edges. Rays with origins up to δ from
+/// the apex deviate by at most δ(1 + 1/N·d) there.
 #[inline(always)]
-fn passes<S: Simd, const R: usize>(simd: S, bundle: &Bundle<'_, R>, polygon: &Polygon) -> Passes {
+fn passes<S: Simd, const R: usize>(simd: S, packet: &Packet<'_, R>, polygon: &Polygon) -> Passes {
     let splat = inlined(
         #[inline(always)]
         |x: f64| f64x4::splat(simd, x),
@@ -359,7 +360,7 @@ fn passes<S: Simd, const R: usize>(simd: S, bundle: &Bundle<'_, R>, polygon: &Po
     let corner = inlined(
         #[inline(always)]
         |k: usize| {
-            let [a, b, c, d] = bundle.pyramid.corners[k];
+            let [a, b, c, d] = packet.pyramid.corners[k];
             f64x4::simd_from(simd, [a.into(), b.into(), c.into(), d.into()])
         },
     );
@@ -368,15 +369,15 @@ fn passes<S: Simd, const R: usize>(simd: S, bundle: &Bundle<'_, R>, polygon: &Po
         #[inline(always)]
         |v: &Vector3<f64>| x * splat(v.x) + y * splat(v.y) + z * splat(v.z),
     );
-    let [sx, sy, sz] = bundle.start.reference.map(f64::from);
+    let [sx, sy, sz] = packet.start.reference.map(f64::from);
     let n = &polygon.normal;
     let height =
         n.x * (polygon.origin.x - sx) + n.y * (polygon.origin.y - sy) + n.z * (polygon.origin.z - sz);
     let closing = along(n);
-    let way = splat(height) / closing;
-    let (least, most) = (way.reduce_min(), way.reduce_max());
-    // The rounding of the tip, and of everything.
-    let apart = f64::from(bundle.start.spread) + 1e-6 * (1.0 + f64::from(bundle.start.reach));
+    let distance = splat(height) / closing;
+    let (least, most) = (distance.reduce_min(), distance.reduce_max());
+    // Covers the spread of the origins and all rounding.
+    let apart = f64::from(packet.start.spread) + 1e-6 * (1.0 + f64::from(packet.start.reach));
     let flattest = closing.abs().reduce_min();
     let margin = apart * (1.0 + 2.0 / flattest);
     if !(least * flattest > 2.0 * apart && most < 0.5 * FARTHEST) {
@@ -385,7 +386,7 @@ fn passes<S: Simd, const R: usize>(simd: S, bundle: &Bundle<'_, R>, polygon: &Po
     let mut inside = true;
     for (inwards, edge) in &polygon.edges {
         let start = inwards.x * sx + inwards.y * sy + inwards.z * sz;
-        let over = along(inwards) * way + splat(start - edge);
+        let over = along(inwards) * distance + splat(start - edge);
         if over.reduce_max() < -margin {
             return Passes::Outside;
         }

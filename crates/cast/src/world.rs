@@ -1,4 +1,4 @@
-//! Surfaces with an index over them, and what a ray meets of them.
+//! A world: surfaces with an index over them, into which rays are cast.
 
 use crate::hit::{Contact, Hit, NONE};
 use crate::index::build::over_boxes;
@@ -16,13 +16,13 @@ use parry3d::partitioning::{Bvh, BvhBuildStrategy};
 pub struct World {
     pub(crate) shapes: Vec<Shape>,
     bvh: Bvh,
-    /// The same boxes for beams.
+    /// The same boxes as an eight-wide index, for packets.
     pub(crate) nodes: Vec<Node>,
     pub(crate) reach: f32,
 }
 
 impl World {
-    /// Indexes the shapes; a hit names a shape by its place in this list.
+    /// Builds the index; a hit refers to a shape by its index in this list.
     pub fn new(shapes: Vec<Shape>) -> Self {
         let boxes: Vec<Aabb> = shapes.iter().map(Shape::bounds).collect();
         let corner = |v: Vector| Vector3::new(v.x, v.y, v.z);
@@ -39,12 +39,12 @@ impl World {
         }
     }
 
-    /// The shapes, in the order in which hits name them.
+    /// Returns the shapes, in the order of the hits' indices.
     pub fn shapes(&self) -> &[Shape] {
         &self.shapes
     }
 
-    /// The nearest surface along a ray, `left` (the mirror it just left) aside.
+    /// Returns the nearest hit of a ray, ignoring `left`, the mirror that it just left.
     pub fn cast(&self, ray: &Ray, left: Option<usize>) -> Option<Hit> {
         Some(self.hit(&self.contact(ray, left)?, ray))
     }
@@ -70,7 +70,7 @@ impl World {
         })
     }
 
-    /// Product of the direction of a ray with the normal of a surface where it meets it, if it is a mesh on a triangle.
+    /// Returns the dot product of a ray's direction and the normal of the surface at the hit; `triangle` matters for a mesh.
     pub(crate) fn closing(&self, surface: u32, triangle: u32, ray: &Ray) -> f64 {
         match &self.shapes[surface as usize] {
             Shape::Mesh(mesh) => mesh.closing(triangle, ray),
@@ -78,17 +78,17 @@ impl World {
         }
     }
 
-    /// Normal of a surface where a ray meets it, if it is a mesh on a triangle.
+    /// Returns the normal of the surface at the hit; `triangle` matters for a mesh.
     fn normal(&self, surface: u32, triangle: u32, ray: &Ray) -> Unit<Vector3<f64>> {
         match &self.shapes[surface as usize] {
             Shape::Polygon(polygon) => polygon.normal,
             Shape::Mesh(mesh) => mesh.normal(triangle, ray),
-            // It is met.
+            // The ray is known to hit it, so the fallback is never used.
             other => other.cast(ray).map_or(-ray.direction, |(_, normal)| normal),
         }
     }
 
-    /// All there is to know of where a ray meets a surface.
+    /// Completes a contact with the hit point and the normal.
     pub fn hit(&self, contact: &Contact, ray: &Ray) -> Hit {
         Hit {
             surface: contact.surface as usize,
@@ -110,7 +110,7 @@ mod tests {
     fn square(x: f64) -> Shape {
         let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)];
         Shape::Polygon(
-            Polygon::new(corners.map(|(y, z)| Point3::new(x, y, z)).to_vec()).expect("it has an area"),
+            Polygon::new(corners.map(|(y, z)| Point3::new(x, y, z)).to_vec()).expect("a nonzero area"),
         )
     }
 
@@ -125,7 +125,7 @@ mod tests {
     fn the_nearest_surface_is_found_whatever_the_order() {
         for order in [[1.0, 2.0, 3.0], [3.0, 1.0, 2.0], [2.0, 3.0, 1.0]] {
             let world = World::new(order.map(square).to_vec());
-            let hit = world.cast(&towards(0.1, 0.2), None).expect("something is there");
+            let hit = world.cast(&towards(0.1, 0.2), None).expect("a hit");
             assert_eq!(order[hit.surface], 1.0);
             assert!((hit.point.x - 1.0).abs() < 1e-15);
         }
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mirror_just_left_is_not_met_again() {
+    fn the_mirror_just_left_is_not_hit_again() {
         let world = World::new(vec![square(1.0), square(2.0)]);
         assert_eq!(
             world.cast(&towards(0.0, 0.0), Some(0)).map(|h| h.surface),
@@ -149,13 +149,13 @@ mod tests {
     }
 
     #[test]
-    fn a_box_is_met_on_its_near_face() {
+    fn a_box_is_hit_on_its_near_face() {
         let pose = Pose::translation(3.0, 0.0, 0.0);
         let world = World::new(vec![
             Shape::Block(Block::new(pose, Vector3::new(0.5, 1.0, 1.0))),
             square(9.0),
         ]);
-        let hit = world.cast(&towards(0.0, 0.0), None).expect("it is in the way");
+        let hit = world.cast(&towards(0.0, 0.0), None).expect("a hit");
         assert!((hit.distance - 2.75).abs() < 1e-12 && hit.front());
         assert!((hit.normal.into_inner() + Vector3::x()).norm() < 1e-12);
     }

@@ -1,31 +1,31 @@
-//! Building the index: from the top, by the surface area heuristic over bins.
+//! Top-down construction of the index by the binned surface area heuristic (SAH).
 //!
-//! A ray meets a box with a chance that grows with the box's surface; a split is the better the less surface it leaves
-//! for how many leaves (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007). A node splits the
-//! greatest of its parts until it has eight. The order of everything is the same on any number of threads.
+//! The probability that a ray hits a box is proportional to the box's surface area, so the cost of a split is the sum of
+//! area × leaves over its two sides (Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007). A node
+//! splits its largest part until it has eight. The result is the same on any number of threads.
 
-use crate::index::wide::{Child, Leaf, Node, WIDTH, Wide};
+use crate::index::wide::{Child, Leaf, Node, WIDTH, WideBvh};
 use crate::rounding::{ROUNDING, downwards, rounded, upwards};
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
-/// Levels of nodes before parts are halved by number whatever that costs, so that the deepest is bounded: 2²⁸ triangles
-/// are 2²⁵ leaves, nine levels more.
+/// Levels built by SAH. Below them, parts are halved by count regardless of cost, which bounds the depth: 2²⁸ triangles
+/// are 2²⁵ leaves, nine more levels.
 const SORTED: usize = 10;
 
 const BINS: usize = 16;
 
-/// Fewest triangles that are worth a thread of their own.
+/// Minimum number of triangles worth a separate task.
 const PARALLEL: usize = 4096;
 
-/// A box in f32 that holds what it is told to.
+/// A bounding box in f32.
 #[derive(Debug, Clone, Copy)]
 struct Bounds {
     low: [f32; 4],
     high: [f32; 4],
 }
 
-/// A triangle to be sorted into the index.
+/// A triangle or box to be sorted into the index.
 #[derive(Debug, Clone, Copy)]
 struct Item {
     low: [f32; 3],
@@ -33,7 +33,7 @@ struct Item {
     high: [f32; 3],
 }
 
-/// Items of one part of a node, by their place in the order, with their box.
+/// A range of the sorted items, with their bounding box.
 #[derive(Debug, Clone, Copy)]
 struct Part {
     first: usize,
@@ -41,14 +41,14 @@ struct Part {
     bounds: Bounds,
 }
 
-/// For three axes the bins of items by their middles.
+/// For each axis, the items binned by their centers.
 #[derive(Clone, Copy)]
 struct Bins {
     bounds: [[Bounds; BINS]; 3],
     counts: [[u32; BINS]; 3],
 }
 
-/// How middles become bins.
+/// Mapping from centers to bins.
 struct Scale {
     low: [f32; 3],
     factor: [f32; 3],
@@ -72,7 +72,7 @@ impl Bounds {
         self
     }
 
-    /// Half of its surface; nothing has none.
+    /// Returns half the surface area; 0 for an empty box.
     fn area(&self) -> f32 {
         let [x, y, z, _] = std::array::from_fn::<_, 4, _>(|k| (self.high[k] - self.low[k]).max(0.0));
         x * y + y * z + z * x
@@ -80,13 +80,13 @@ impl Bounds {
 }
 
 impl Item {
-    /// What is between two corners, among coordinates that reach so far.
+    /// The item between two corners; `reach` is the largest coordinate of all.
     fn new(number: usize, low: &Vector3<f64>, high: &Vector3<f64>, reach: f32) -> Self {
-        // More than the judge in f64 can be off by.
+        // Exceeds the error of the decision in f64.
         let slack = reach * ROUNDING;
         Self {
             low: std::array::from_fn(|k| downwards(low[k]) - slack),
-            // The number of a triangle is below 2²⁸.
+            // Indices of triangles are below 2²⁸.
             #[allow(clippy::cast_possible_truncation)]
             number: number as u32,
             high: std::array::from_fn(|k| upwards(high[k]) + slack),
@@ -101,7 +101,7 @@ impl Item {
         }
     }
 
-    /// Twice its middle.
+    /// Returns twice the center.
     fn middle(&self, axis: usize) -> f32 {
         self.low[axis] + self.high[axis]
     }
@@ -131,7 +131,7 @@ impl Scale {
         }
     }
 
-    /// Truncation of a number from 0 to the number of bins.
+    /// Returns the bin of an item, by truncation of a number between 0 and the number of bins.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     fn bin(&self, item: &Item, axis: usize) -> usize {
         (((item.middle(axis) - self.low[axis]) * self.factor[axis]) as usize).min(BINS - 1)
@@ -167,8 +167,8 @@ impl Bins {
         self
     }
 
-    /// The axis and the first bin of the right side with the least cost, and the two boxes.
-    // A bin is a place in three lists.
+    /// Returns the split of minimum cost: the axis, the first bin of the right side, and the two boxes.
+    // A bin indexes three arrays.
     #[allow(clippy::needless_range_loop)]
     fn best(&self, scale: &Scale) -> Option<(usize, usize, [Bounds; 2])> {
         let mut best = None;
@@ -197,12 +197,12 @@ impl Bins {
     }
 }
 
-/// Leaves that hold so many triangles.
+/// Returns the number of leaves that `count` triangles need.
 fn leaves(count: u32) -> f32 {
     (count as usize).div_ceil(WIDTH) as f32
 }
 
-/// Something over all items, in parallel if there are many; the order of sums does not matter to the callers.
+/// Reduces all items, in parallel if there are many; for the callers, the order of reduction does not matter.
 fn over<T: Send>(items: &[Item], of_some: impl Fn(&[Item]) -> T + Sync, join: impl Fn(T, T) -> T) -> T {
     if items.len() <= 4 * PARALLEL {
         return of_some(items);
@@ -212,15 +212,15 @@ fn over<T: Send>(items: &[Item], of_some: impl Fn(&[Item]) -> T + Sync, join: im
     join(a, b)
 }
 
-impl Wide {
-    /// Indexes triangles over vertices, in metres.
+impl WideBvh {
+    /// Builds the index over triangles; vertices are in meters.
     pub(crate) fn new(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Self {
         index(vertices, triangles)
     }
 }
 
-/// The index over triangles.
-fn index(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Wide {
+/// Builds the index over triangles.
+fn index(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> WideBvh {
     let reach = upwards(vertices.iter().fold(0.0, |reach, v| v.coords.amax().max(reach)));
     let item = |(number, corners): (usize, &[u32; 3])| {
         let [a, b, c] = corners.map(|v| vertices[v as usize].coords);
@@ -228,7 +228,7 @@ fn index(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Wide {
     };
     let mut items: Vec<Item> = triangles.par_iter().enumerate().map(item).collect();
     let mut nodes = sorted(&mut items, WIDTH);
-    // Leaves are named by their first item so far.
+    // So far, a leaf's index is that of its first item.
     let mut found = Vec::new();
     for child in nodes.iter_mut().flat_map(|node: &mut Node| &mut node.children) {
         if child.is_leaf() {
@@ -237,7 +237,7 @@ fn index(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Wide {
             found.push((first, count));
         }
     }
-    // All that is left of the items is their order.
+    // From here on, only the order of the items is needed.
     let numbers: Vec<u32> = items.iter().map(|item| item.number).collect();
     drop(items);
     let leaf = |&(first, count): &(usize, usize)| {
@@ -256,10 +256,10 @@ fn index(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Wide {
         leaf
     };
     let leaves = found.par_iter().map(leaf).collect();
-    Wide { nodes, leaves, reach }
+    WideBvh { nodes, leaves, reach }
 }
 
-/// The nodes over boxes, each given by its lowest and highest corner; a leaf's number is that of its box.
+/// Builds the nodes over boxes, each given by its lowest and highest corner; a leaf's index is that of its box.
 pub(crate) fn over_boxes(boxes: &[(Vector3<f64>, Vector3<f64>)], reach: f32) -> Vec<Node> {
     let item =
         |(number, (low, high)): (usize, &(Vector3<f64>, Vector3<f64>))| Item::new(number, low, high, reach);
@@ -273,7 +273,7 @@ pub(crate) fn over_boxes(boxes: &[(Vector3<f64>, Vector3<f64>)], reach: f32) -> 
     nodes
 }
 
-/// Sorts items, and the nodes over them; leaves of at most so many are named by their first item.
+/// Sorts the items and builds the nodes over them. A leaf has at most `leaf` items, and the index of its first item.
 fn sorted(items: &mut [Item], leaf: usize) -> Vec<Node> {
     let bounds = over(
         items,
@@ -294,11 +294,11 @@ fn sorted(items: &mut [Item], leaf: usize) -> Vec<Node> {
     nodes
 }
 
-/// Appends the node of a part and all below it; `items` are those of the part, of which a leaf has at most so many.
+/// Appends the node of a part and all nodes below it; `items` are those of the part, `leaf` is the maximum per leaf.
 fn node(items: &mut [Item], part: Part, (level, leaf): (usize, usize), nodes: &mut Vec<Node>) {
     let mut parts = vec![part];
     while parts.len() < WIDTH {
-        // The greatest of those that are more than a leaf.
+        // The largest part that does not fit in a leaf.
         let splittable = parts.iter().enumerate().filter(|(_, p)| p.count > leaf);
         let greatest = splittable.max_by(|(_, a), (_, b)| {
             if level < SORTED {
@@ -371,7 +371,7 @@ fn node(items: &mut [Item], part: Part, (level, leaf): (usize, usize), nodes: &m
     }
 }
 
-/// Sorts a part into two.
+/// Splits a part into two, sorting its items.
 fn split(items: &mut [Item], part: Part, level: usize) -> [Part; 2] {
     let halves = |count: usize, [left, right]: [Bounds; 2]| {
         [
@@ -400,7 +400,7 @@ fn split(items: &mut [Item], part: Part, level: usize) -> [Part; 2] {
     halves(middle, [around(&items[..middle]), around(&items[middle..])])
 }
 
-/// Brings what fits to the front and says how much that is.
+/// Moves the items that fit to the front and returns their number.
 fn partition(items: &mut [Item], fits: impl Fn(&Item) -> bool) -> usize {
     let (mut low, mut high) = (0, items.len());
     loop {

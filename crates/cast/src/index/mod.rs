@@ -1,4 +1,4 @@
-//! An index over boxes and triangles for lanes.
+//! An eight-wide BVH over boxes and triangles, and its construction.
 
 pub(crate) mod build;
 pub(crate) mod wide;

@@ -1,30 +1,30 @@
-//! An index over triangles for lanes: eight boxes a node, up to eight triangles a leaf, each number in a row of its own.
+//! An eight-wide BVH for SIMD: eight child boxes per node, up to eight triangles per leaf, as structures of arrays.
 //!
-//! Everything is in f32 and errs outwards: a box holds its triangles whatever was rounded. What is found here is a
-//! candidate that f64 decides about.
+//! Everything is in f32 and rounded outward: a box contains its triangles in spite of rounding. A hit found here is a
+//! candidate, decided in f64.
 
 use fearless_simd::f32x8;
 use fearless_simd::{Simd, prelude::*};
 
-/// Children of a node and triangles of a leaf.
+/// Children per node and triangles per leaf.
 pub(crate) const WIDTH: usize = 8;
 
-/// Levels of nodes at most that the builder makes: below its `SORTED` parts are halved by number.
+/// Maximum depth that the builder reaches: below its `SORTED` levels, parts are halved by count.
 pub(crate) const DEEPEST: usize = 20;
 
-/// Most entries that a walk through the index holds: seven siblings on each of the levels that the builder allows.
+/// Maximum number of entries on the traversal stack: seven siblings on each level.
 const STACK: usize = (WIDTH - 1) * DEEPEST + 1;
 
-/// Eight boxes and what is in them.
+/// Eight child boxes and the children.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
 pub(crate) struct Node {
-    /// By axis: the low sides and the high sides. A child that is none has them exchanged, far apart.
+    /// By axis: the low sides and the high sides. An empty slot has them inverted and far apart, so it is never hit.
     pub(crate) bounds: [[[f32; WIDTH]; 2]; 3],
     pub(crate) children: [Child; WIDTH],
 }
 
-/// A node or a leaf by its number; a leaf also has its number of triangles.
+/// Index of a node or of a leaf; for a leaf, also its number of triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Child(u32);
 
@@ -34,23 +34,23 @@ pub(crate) struct Child(u32);
 pub(crate) struct Leaf {
     /// By corner and axis.
     pub(crate) corners: [[[f32; WIDTH]; 3]; 3],
-    /// Their numbers in the mesh.
+    /// Their indices in the mesh.
     pub(crate) triangles: [u32; WIDTH],
 }
 
-/// The index.
-pub(crate) struct Wide {
+/// The hierarchy.
+pub(crate) struct WideBvh {
     pub(crate) nodes: Vec<Node>,
     pub(crate) leaves: Vec<Leaf>,
-    /// Greatest coordinate of a vertex, whatever its sign: the measure of all rounding.
+    /// Largest absolute coordinate of a vertex: all rounding errors scale with it.
     pub(crate) reach: f32,
 }
 
-/// Bits of a child's number.
+/// Bits of a child's index.
 const NUMBER_BITS: u32 = 28;
 
 impl Child {
-    /// No child: behind a box that nothing meets.
+    /// An empty slot: its box is never hit.
     pub(crate) const NONE: Self = Self(0);
 
     pub(crate) fn node(number: usize) -> Self {
@@ -70,13 +70,13 @@ impl Child {
         (self.0 & ((1 << NUMBER_BITS) - 1)) as usize
     }
 
-    /// Triangles of a leaf.
+    /// Returns the number of triangles of a leaf.
     pub(crate) fn count(self) -> usize {
         (self.0 >> NUMBER_BITS & 7) as usize + 1
     }
 }
 
-/// A number of triangles is less than 2²⁸: their vertices alone would fill a gigabyte.
+/// Triangle counts are below 2²⁸: their vertices alone would fill a gigabyte.
 fn narrow(number: usize) -> u32 {
     let number = u32::try_from(number).unwrap_or(u32::MAX);
     assert!(number < 1 << NUMBER_BITS, "more than 268 million triangles");
@@ -84,9 +84,9 @@ fn narrow(number: usize) -> u32 {
 }
 
 impl Node {
-    /// Without children.
+    /// A node without children.
     pub(crate) fn empty() -> Self {
-        // Finite, so that a product with zero is none that is not a number.
+        // Finite, so that a product with zero is not NaN.
         const FAR: f32 = 1e30;
         Self {
             bounds: [[[FAR; WIDTH], [-FAR; WIDTH]]; 3],
@@ -95,13 +95,13 @@ impl Node {
     }
 }
 
-/// What is still to be looked into, the nearest on top.
+/// Traversal stack: the nodes and leaves still to be visited, the nearest on top.
 pub(crate) struct Walk {
     stack: [Entry; STACK],
     height: usize,
 }
 
-/// A node or a leaf, and a way that is shorter than that to it.
+/// A node or a leaf, with a lower bound on the distance to it.
 type Entry = (f32, Child);
 
 impl Walk {
@@ -113,14 +113,14 @@ impl Walk {
         }
     }
 
-    /// The root; nothing else is left.
+    /// Clears the stack and returns the root.
     #[inline(always)]
     pub(crate) fn start(&mut self) -> Child {
         self.height = 0;
         Child::node(0)
     }
 
-    /// The nearest thing before `limit` that is left.
+    /// Pops the nearest entry that is within `limit`.
     #[inline(always)]
     pub(crate) fn next(&mut self, limit: f32) -> Option<Child> {
         loop {
@@ -132,14 +132,14 @@ impl Walk {
         }
     }
 
-    /// The nearest of the children that are met; the others are left for later.
+    /// Returns the nearest of the children hit, and pushes the others.
     #[inline(always)]
     pub(crate) fn enter<S: Simd>(&mut self, node: &Node, mut met: u32, near: f32x8<S>) -> Option<Child> {
         const LANE: usize = WIDTH - 1;
         if met == 0 {
             return None;
         }
-        // Most nodes have one.
+        // The usual case: a single child is hit.
         if met & (met - 1) == 0 {
             return Some(node.children[met.trailing_zeros() as usize & LANE]);
         }

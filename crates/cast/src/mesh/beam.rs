@@ -1,28 +1,29 @@
-//! A bundle of rays through the index over triangles: boxes against the bundle as a whole, triangles against its rays
-//! in lanes.
+//! Traversal of the triangle index by a packet of rays: boxes are tested against the packet's pyramid, triangles against
+//! its rays in lanes.
 //!
-//! A ray meets a triangle if it passes all three edges on the same side: with the corners A, B, C seen from the start,
-//! d·(B×(C−B)), d·(C×(A−C)) and d·(A×(B−A)) have one sign, and N·A/N·d is the way, N being the normal. From another
-//! start at δ an edge has (d×δ)·(B−C) on top, and the way loses N·δ/N·d. In f32 each of these has a bound on its error:
+//! A ray hits a triangle if it passes all three edges on the same side. With the corners A, B, C relative to the origin,
+//! the edge functions d·(B×(C−B)), d·(C×(A−C)) and d·(A×(B−A)) have one sign, and the distance is N·A/N·d, where N is
+//! the normal. For an origin at an offset δ, (d×δ)·(B−C) is added to an edge function and N·δ/N·d is subtracted from the
+//! distance. In f32 the error of each is bounded:
 //!
-//! - a corner is off by η = 3u(M + |O|) in each coordinate, u being half a unit in the last place, M the greatest
+//! - of a corner, by η = 3u(M + |O|) in each coordinate, where u is half a unit in the last place, M the largest
 //!   coordinate of the mesh and O the reference;
-//! - an edge by (4η + 20u(R + 2|δ|))(L + 4η), R being the way to the farthest corner and L the longest edge: a corner
-//!   that moves by η turns the edge seen from the start, but the ray is no farther from any corner than L if it meets
-//!   the triangle, and so d·(η×C) = η·(C×d) ≤ ηL;
-//! - N·d by 8ηL + 16uL²; below twice that nothing is known;
-//! - the way by 2((4η + 16u(R + |δ|))|N| + 16uL³)/|N·d|: moved corners move the point on the triangle, no lever is
-//!   longer than the triangle itself, and the factor 2 pays for N·d.
+//! - of an edge function, by (4η + 20u(R + 2|δ|))(L + 4η), where R is the distance to the farthest corner and L the
+//!   longest edge: a corner that moves by η turns the edge seen from the origin, but a ray that hits the triangle is
+//!   no farther than L from any corner, and so d·(η×C) = η·(C×d) ≤ ηL;
+//! - of N·d, by 8ηL + 16uL²; below twice that the result is undecided;
+//! - of the distance, by 2((4η + 16u(R + |δ|))|N| + 16uL³)/|N·d|: moved corners move the point on the triangle, no
+//!   lever is longer than the triangle, and the factor 2 covers the error of N·d.
 //!
-//! So each ray knows an interval that holds the nearest way in f64. What is surely hit and surely nearer takes its
-//! place; whatever overlaps is decided in f64 at once ([`Judge`]); the ways themselves are found at the
-//! end ([`finish`](super::finish)).
+//! So each ray has an interval that contains its nearest distance in f64. A certain hit that is certainly nearer replaces
+//! it; overlapping intervals are decided in f64 at once ([`Judge`]); the f64 distances are computed at the end
+//! ([`finish`](super::finish)).
 
 use crate::hit::NONE;
-use crate::index::wide::{Leaf, WIDTH, Walk, Wide};
-use crate::lanes::{cross, dot, inlined, less, size};
+use crate::index::wide::{Leaf, WIDTH, Walk, WideBvh};
+use crate::lanes::{cross, dot, inlined, minus, size};
 use crate::mesh::exact::Judge;
-use crate::packet::bundle::Bundle;
+use crate::packet::cast::Packet;
 use crate::packet::in_rows::InRows;
 use crate::packet::rows::{LANES, Rows, Vectors, whole};
 use crate::ray::FARTHEST;
@@ -30,20 +31,20 @@ use crate::rounding::{ROUNDING, around, downwards, upwards};
 use fearless_simd::{Simd, prelude::*};
 use fearless_simd::{f32x8, f32x16, u32x16};
 
-/// What a bundle has met so far.
+/// Nearest hits of a packet so far.
 pub(crate) struct Found<const R: usize> {
-    /// Bounds of the nearest way.
+    /// Bounds of the nearest distance.
     low: Rows<f32, R>,
     high: Rows<f32, R>,
     triangle: Rows<u32, R>,
-    /// Greatest of the upper bounds.
+    /// Maximum of the upper bounds.
     limit: f32,
 }
 
-/// What the rays need to know of eight triangles, in the order of [`At`].
+/// Precomputed numbers of eight triangles, indexed by [`At`].
 type Facts = [[f32; WIDTH]; 25];
 
-/// Places of a triangle's facts.
+/// Indices into [`Facts`].
 struct At;
 
 impl At {
@@ -55,7 +56,7 @@ impl At {
     /// N·A.
     const HEIGHT: usize = 21;
     const EDGE_ERROR: usize = 22;
-    const WAY_ERROR: usize = 23;
+    const DISTANCE_ERROR: usize = 23;
     const LEAST_CLOSING: usize = 24;
 }
 
@@ -68,45 +69,45 @@ impl<const R: usize> Found<R> {
             triangle: Rows::of(NONE),
             limit: farthest,
         };
-        // What a row is filled up with meets nothing.
+        // Padding hits nothing.
         for ray in count..R * LANES {
             found.high.set(ray, f32::NEG_INFINITY);
         }
         found
     }
 
-    /// Decides in f64 about a triangle that a ray may meet.
+    /// Decides in f64 whether a ray hits a triangle, nearer than before.
     #[cold]
     #[inline(never)]
     fn decide(&mut self, judge: &Judge<'_>, rays: &InRows<'_, R>, number: usize, triangle: u32) {
         let ray = &rays.get(number);
-        let Some(way) = judge.meet(ray, triangle) else {
+        let Some(distance) = judge.meet(ray, triangle) else {
             return;
         };
         let present = match self.triangle.get(number) {
             NONE => FARTHEST,
-            triangle => judge.way(ray, triangle),
+            triangle => judge.distance(ray, triangle),
         };
-        if way < present || (way == present && triangle < self.triangle.get(number)) {
+        if distance < present || (distance == present && triangle < self.triangle.get(number)) {
             self.triangle.set(number, triangle);
-            let (low, high) = around(way);
+            let (low, high) = around(distance);
             self.low.set(number, low);
             self.high.set(number, high);
         }
     }
 
-    /// The nearest triangle of every ray, [`NONE`] where there is none.
+    /// Returns the nearest triangle of every ray, [`NONE`] for a miss.
     pub(crate) fn triangles(&self) -> &[[u32; LANES]; R] {
         &self.triangle.0
     }
 }
 
-/// Follows a bundle through the index.
+/// Traverses the index with a packet.
 #[inline(always)]
 pub(crate) fn follow<S: Simd, const R: usize>(
     simd: S,
-    wide: &Wide,
-    bundle: &Bundle<'_, R>,
+    wide: &WideBvh,
+    packet: &Packet<'_, R>,
     judge: &Judge<'_>,
     found: &mut Found<R>,
 ) {
@@ -120,13 +121,13 @@ pub(crate) fn follow<S: Simd, const R: usize>(
                 &wide.leaves[child.number()],
                 child.count(),
                 wide.reach,
-                bundle,
+                packet,
                 judge,
                 found,
             );
         } else {
             let node = &wide.nodes[child.number()];
-            let (met, near) = bundle.pyramid.boxes(simd, &node.bounds, found.limit);
+            let (met, near) = packet.pyramid.boxes(simd, &node.bounds, found.limit);
             nearer = walk.enter(node, met, near);
         }
         next = nearer.or_else(|| walk.next(found.limit));
@@ -139,7 +140,7 @@ fn leaf<S: Simd, const R: usize>(
     leaf: &Leaf,
     count: usize,
     reach: f32,
-    bundle: &Bundle<'_, R>,
+    packet: &Packet<'_, R>,
     judge: &Judge<'_>,
     found: &mut Found<R>,
 ) {
@@ -152,16 +153,16 @@ fn leaf<S: Simd, const R: usize>(
         |corner: usize| [load(corner, 0), load(corner, 1), load(corner, 2)],
     );
     let corners = [corner(0), corner(1), corner(2)];
-    let mut met = bundle.pyramid.triangles(simd, &corners) & ((1 << count) - 1);
+    let mut met = packet.pyramid.triangles(simd, &corners) & ((1 << count) - 1);
     if met == 0 {
         return;
     }
-    let facts = facts(simd, &corners, reach, bundle);
+    let facts = facts(simd, &corners, reach, packet);
     let mut changed = false;
     while met != 0 {
         let lane = met.trailing_zeros() as usize & 7;
         met &= met - 1;
-        changed |= triangle(simd, &facts, lane, leaf.triangles[lane], bundle, judge, found);
+        changed |= triangle(simd, &facts, lane, leaf.triangles[lane], packet, judge, found);
     }
     if changed {
         let mut limit = f32x16::splat(simd, f32::NEG_INFINITY);
@@ -177,7 +178,7 @@ fn facts<S: Simd, const R: usize>(
     simd: S,
     corners: &[[f32x8<S>; 3]; 3],
     reach: f32,
-    bundle: &Bundle<'_, R>,
+    packet: &Packet<'_, R>,
 ) -> Facts {
     let splat = inlined(
         #[inline(always)]
@@ -187,28 +188,29 @@ fn facts<S: Simd, const R: usize>(
         #[inline(always)]
         |corner: &[f32x8<S>; 3]| {
             [
-                corner[0] - splat(bundle.start.reference[0]),
-                corner[1] - splat(bundle.start.reference[1]),
-                corner[2] - splat(bundle.start.reference[2]),
+                corner[0] - splat(packet.start.reference[0]),
+                corner[1] - splat(packet.start.reference[1]),
+                corner[2] - splat(packet.start.reference[2]),
             ]
         },
     );
     let [a, b, c] = [seen(&corners[0]), seen(&corners[1]), seen(&corners[2])];
-    let (bc, ca, ab) = (less(&b, &c), less(&c, &a), less(&a, &b));
+    let (bc, ca, ab) = (minus(&b, &c), minus(&c, &a), minus(&a, &b));
     // (B − A)×(C − A).
     let normal = cross(&ca, &ab);
     let height = dot(&normal, &a);
     let far = size(&a).max(size(&b)).max(size(&c));
     let long = size(&bc).max(size(&ca)).max(size(&ab));
-    let eta = splat(3.0 * ROUNDING * (reach + bundle.start.reach));
-    let spread = splat(bundle.start.spread);
+    let eta = splat(3.0 * ROUNDING * (reach + packet.start.reach));
+    let spread = splat(packet.start.spread);
     let u = inlined(
         #[inline(always)]
         |times: f32| splat(times * ROUNDING),
     );
     let edge_error = spread.mul_add(u(40.0), far.mul_add(u(20.0), eta * 4.0)) * eta.mul_add(splat(4.0), long);
     let cube = long * long * long;
-    let way_error = ((far + spread).mul_add(u(16.0), eta * 4.0)).mul_add(size(&normal), cube * u(16.0)) * 2.0;
+    let distance_error =
+        ((far + spread).mul_add(u(16.0), eta * 4.0)).mul_add(size(&normal), cube * u(16.0)) * 2.0;
     let least_closing = long * (long.mul_add(u(16.0), eta * 8.0)) * 2.0;
     let mut facts = [[0.0; WIDTH]; 25];
     let mut put = inlined(
@@ -223,7 +225,7 @@ fn facts<S: Simd, const R: usize>(
             put(At::CROSSES + 3 * i + k, *coordinate);
         }
     }
-    if bundle.apart() {
+    if packet.apart() {
         for (i, vector) in [bc, ca, ab].iter().enumerate() {
             for (k, coordinate) in vector.iter().enumerate() {
                 put(At::EDGES + 3 * i + k, *coordinate);
@@ -235,19 +237,19 @@ fn facts<S: Simd, const R: usize>(
     }
     put(At::HEIGHT, height);
     put(At::EDGE_ERROR, edge_error);
-    put(At::WAY_ERROR, way_error);
+    put(At::DISTANCE_ERROR, distance_error);
     put(At::LEAST_CLOSING, least_closing);
     facts
 }
 
-/// One triangle and all rays; whether a ray has met it.
+/// Tests one triangle against all rays. Returns whether any nearest hit changed.
 #[inline(always)]
 fn triangle<S: Simd, const R: usize>(
     simd: S,
     facts: &Facts,
     lane: usize,
     number: u32,
-    bundle: &Bundle<'_, R>,
+    packet: &Packet<'_, R>,
     judge: &Judge<'_>,
     found: &mut Found<R>,
 ) -> bool {
@@ -276,13 +278,13 @@ fn triangle<S: Simd, const R: usize>(
             #[inline(always)]
             |rows: &Vectors<f32, R>| whole(simd, rows, row),
         );
-        let direction = load(&bundle.direction);
+        let direction = load(&packet.direction);
         let edge = inlined(
             #[inline(always)]
             |i: usize| {
                 let about = product(&direction, At::CROSSES + 3 * i);
-                if bundle.apart() {
-                    more(&load(&bundle.moment), At::EDGES + 3 * i, about)
+                if packet.apart() {
+                    more(&load(&packet.moment), At::EDGES + 3 * i, about)
                 } else {
                     about
                 }
@@ -299,13 +301,13 @@ fn triangle<S: Simd, const R: usize>(
         let inside = least.simd_gt(error) | most.simd_lt(-error);
         let closing = product(&direction, At::NORMAL);
         let mut height = fact(At::HEIGHT);
-        if bundle.apart() {
-            height -= product(&load(&bundle.offset), At::NORMAL);
+        if packet.apart() {
+            height -= product(&load(&packet.offset), At::NORMAL);
         }
         let inverse = f32x16::splat(simd, 1.0) / closing;
-        let way = height * inverse;
-        let error = fact(At::WAY_ERROR) * inverse.abs();
-        let (low, high) = (way - error, way + error);
+        let distance = height * inverse;
+        let error = fact(At::DISTANCE_ERROR) * inverse.abs();
+        let (low, high) = (distance - error, distance + error);
         let sure = closing.abs().simd_gt(fact(At::LEAST_CLOSING));
         let (least, most) = (
             f32x16::simd_from(simd, found.low.0[row]),
@@ -329,8 +331,8 @@ fn triangle<S: Simd, const R: usize>(
         while open != 0 {
             let ray = row * LANES + open.trailing_zeros() as usize;
             open &= open - 1;
-            if ray < bundle.rays.count {
-                found.decide(judge, &bundle.rays, ray, number);
+            if ray < packet.rays.count {
+                found.decide(judge, &packet.rays, ray, number);
                 changed = true;
             }
         }

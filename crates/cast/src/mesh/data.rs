@@ -1,33 +1,33 @@
-//! Triangle meshes as data: what a file describes, before it is placed anywhere.
+//! Triangle meshes as data: the content of a mesh file, before it is placed.
 
 use nalgebra::Point3;
 
-/// Triangles over shared vertices, in the unit of its file. The front of a triangle is the side from which its
-/// vertices run counter-clockwise.
+/// Triangles over shared vertices, in the unit of the file. The front of a triangle is the side from which its vertices
+/// are counterclockwise.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Mesh {
     vertices: Vec<Point3<f64>>,
     triangles: Vec<[u32; 3]>,
 }
 
-/// Why numbers are no mesh.
+/// Why vertices and triangles do not form a valid mesh.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MeshError {
-    /// Nothing to meet.
+    /// No triangles.
     #[error("it has no triangles")]
     Empty,
-    /// A vertex that is nowhere.
+    /// A vertex with an infinite or NaN coordinate.
     #[error("vertex {vertex} is not finite")]
     NotFinite {
-        /// Its number, from 0.
+        /// Index of the vertex, from 0.
         vertex: usize,
     },
-    /// A triangle over a vertex that there is not.
+    /// A triangle that uses a nonexistent vertex.
     #[error("triangle {triangle} uses vertex {vertex}; there are {count}, numbered from 0")]
     NoVertex {
-        /// The triangle's number, from 0.
+        /// Index of the triangle, from 0.
         triangle: usize,
-        /// The vertex it uses.
+        /// Index of the missing vertex.
         vertex: u32,
         /// Number of vertices.
         count: usize,
@@ -35,10 +35,10 @@ pub enum MeshError {
 }
 
 impl Mesh {
-    /// A mesh of finite vertices, each triangle over three of them.
+    /// Builds a mesh and checks that all vertices are finite and all indices valid.
     ///
     /// # Errors
-    /// [`MeshError`] says which vertex or triangle is wrong.
+    /// [`MeshError`] names the invalid vertex or triangle.
     pub fn new(vertices: Vec<Point3<f64>>, triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
         if triangles.is_empty() {
             return Err(MeshError::Empty);
@@ -60,12 +60,12 @@ impl Mesh {
         Ok(Self { vertices, triangles })
     }
 
-    /// The vertices.
+    /// Returns the vertices.
     pub fn vertices(&self) -> &[Point3<f64>] {
         &self.vertices
     }
 
-    /// The triangles, each three numbers of vertices.
+    /// Returns the triangles, each as three vertex indices.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }

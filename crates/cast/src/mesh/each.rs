@@ -1,6 +1,6 @@
-//! Rays through the index over triangles, each by itself. The ways to what they met are found in f64 eight at a time.
+//! Traversal of the triangle index by individual rays. The f64 distances to the triangles hit are computed eight at a time.
 
-use crate::index::wide::{Leaf, WIDTH, Walk, Wide};
+use crate::index::wide::{Leaf, WIDTH, Walk, WideBvh};
 use crate::lanes::inlined;
 use crate::mesh::exact::Judge;
 use crate::mesh::exact::Met;
@@ -11,13 +11,13 @@ use crate::ray::Ray;
 use crate::rounding::around;
 use fearless_simd::Simd;
 
-/// What a ray has met so far.
+/// Nearest hit of a ray so far.
 struct Nearest {
     low: f32,
     high: f32,
     triangle: Option<u32>,
-    /// In f64, if known.
-    way: Option<f64>,
+    /// The distance in f64, if already computed.
+    distance: Option<f64>,
 }
 
 impl Nearest {
@@ -27,29 +27,29 @@ impl Nearest {
             low,
             high,
             triangle: None,
-            way: None,
+            distance: None,
         }
     }
 
-    /// Decides in f64 about a triangle that the ray may meet.
+    /// Decides in f64 whether the ray hits a triangle, nearer than before.
     #[cold]
     #[inline(never)]
     fn decide(&mut self, judge: &Judge<'_>, ray: &Ray, triangle: u32) {
-        let Some(way) = judge.meet(ray, triangle) else {
+        let Some(distance) = judge.meet(ray, triangle) else {
             return;
         };
         let present = match self.triangle {
             None => FARTHEST,
-            Some(triangle) => *self.way.get_or_insert_with(|| judge.way(ray, triangle)),
+            Some(triangle) => *self.distance.get_or_insert_with(|| judge.distance(ray, triangle)),
         };
-        if way < present || (way == present && self.triangle.is_some_and(|t| triangle < t)) {
+        if distance < present || (distance == present && self.triangle.is_some_and(|t| triangle < t)) {
             self.triangle = Some(triangle);
-            self.way = Some(way);
-            (self.low, self.high) = around(way);
+            self.distance = Some(distance);
+            (self.low, self.high) = around(distance);
         }
     }
 
-    /// Takes what the ray meets of a leaf.
+    /// Updates the nearest hit from the triangles of a leaf.
     #[inline(always)]
     fn take(&mut self, leaf: &Leaf, outcome: &Outcome, judge: &Judge<'_>, ray: &Ray) {
         let mut may = outcome.may;
@@ -63,7 +63,7 @@ impl Nearest {
                     low,
                     high,
                     triangle: Some(leaf.triangles[lane]),
-                    way: None,
+                    distance: None,
                 };
             } else if !(surely && low > self.high) {
                 self.decide(judge, ray, leaf.triangles[lane]);
@@ -72,30 +72,30 @@ impl Nearest {
     }
 }
 
-/// Follows so many rays through the index and tells what each meets, in no order.
+/// Traverses the index with `count` rays and emits the nearest hit of each, in no particular order.
 #[inline(always)]
 pub(crate) fn follow<S: Simd, F: FnMut(usize, Option<Met>)>(
     simd: S,
-    wide: &Wide,
+    wide: &WideBvh,
     judge: &Judge<'_>,
     count: usize,
     rays: impl Fn(usize) -> Ray,
-    mut tell: F,
+    mut emit: F,
 ) {
     let mut walk = Walk::new();
     let mut outcome = Outcome::default();
     let mut pending = Pending::default();
     let settle = inlined(
         #[inline(always)]
-        |pending: &mut Pending, tell: &mut F| {
-            let told = inlined(
+        |pending: &mut Pending, emit: &mut F| {
+            let emit_settled = inlined(
                 #[inline(always)]
                 |found: Settled| {
-                    let (triangle, distance) = (found.triangle, found.way);
-                    tell(found.ray, Some(Met { triangle, distance }));
+                    let (triangle, distance) = (found.triangle, found.distance);
+                    emit(found.ray, Some(Met { triangle, distance }));
                 },
             );
-            pending.settle::<_, false>(simd, judge, &rays, told);
+            pending.settle::<_, false>(simd, judge, &rays, emit_settled);
         },
     );
     for number in 0..count {
@@ -116,15 +116,15 @@ pub(crate) fn follow<S: Simd, F: FnMut(usize, Option<Met>)>(
             }
             next = nearer.or_else(|| walk.next(nearest.high));
         }
-        match (nearest.triangle, nearest.way) {
-            (None, _) => tell(number, None),
-            (Some(triangle), Some(distance)) => tell(number, Some(Met { triangle, distance })),
+        match (nearest.triangle, nearest.distance) {
+            (None, _) => emit(number, None),
+            (Some(triangle), Some(distance)) => emit(number, Some(Met { triangle, distance })),
             (Some(triangle), None) => {
                 if pending.add(number, triangle) {
-                    settle(&mut pending, &mut tell);
+                    settle(&mut pending, &mut emit);
                 }
             }
         }
     }
-    settle(&mut pending, &mut tell);
+    settle(&mut pending, &mut emit);
 }

@@ -1,78 +1,79 @@
-//! A ray against a triangle mesh, without a gap between triangles that share an edge.
+//! Watertight ray–triangle intersection in f64.
 //!
 //! Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", Journal of Computer Graphics Techniques 2(1), 2013:
-//! space is sheared so that the ray becomes the z axis, and three edge functions in the x–y plane decide. A vertex
-//! is sheared alike for every triangle that holds it, and an edge's function only changes its sign when the edge is
-//! walked the other way; so two triangles never both disown a ray at the edge between them. Unlike the paper, which
-//! computes in f32 and falls back to f64 where a function is zero, the sign of a function that rounding could have
-//! changed is found from the exact products (fused multiply-add). The distance is that to the triangle's plane.
+//! space is sheared so that the ray becomes the z axis, and three edge functions in the x–y plane decide. A vertex is
+//! sheared identically for every triangle that uses it, and an edge function only changes its sign when the edge is
+//! traversed in the opposite direction, so a ray at a shared edge never misses both triangles. The paper computes in
+//! f32 and falls back to f64 where an edge function is zero; here, a sign that rounding could have changed is taken
+//! from the exact products (fused multiply-add). The distance is that to the triangle's plane.
 
-use crate::lanes::{less, unfused};
+use crate::lanes::{minus, unfused};
 use crate::ray::FARTHEST;
 use crate::ray::Ray;
 use fearless_simd::{Simd, prelude::*};
 use fearless_simd::{f64x8, mask64x8};
 use nalgebra::{Point3, Unit, Vector3};
 
-/// Where a ray meets a mesh.
+/// Hit of a ray on a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Met {
-    /// Number of the triangle.
+    /// Index of the triangle.
     pub triangle: u32,
-    /// Distance from the ray's origin, in metres.
+    /// Distance from the ray's origin, in meters.
     pub distance: f64,
 }
 
-/// Decides in f64 which triangles of a mesh rays meet.
+/// Exact (f64) hit tests against the triangles of a mesh.
 pub(crate) struct Judge<'a> {
     pub(crate) vertices: &'a [Point3<f64>],
     pub(crate) triangles: &'a [[u32; 3]],
 }
 
-/// A triangle's plane.
+/// The plane of a triangle.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Plane {
     corner: Point3<f64>,
     /// (B − A)×(C − A).
     normal: Vector3<f64>,
-    /// Least product of the normal and a direction with which the way is good.
+    /// Minimum |N·d| at which the distance to the plane is accurate.
     least: f64,
 }
 
-/// Least part of a triangle's greatest extent squared that its normal along a ray has where the way is that to the plane:
-/// of slivers, and for rays along the plane, it is the mean of the corners' ways.
+/// Minimum |N·d|, as a fraction of the triangle's largest extent squared, at which the distance is that to the plane. Below
+/// it (slivers, and rays nearly in the plane) the distance is the weighted mean of the corners' distances.
 pub(crate) const STEEP: f64 = 1e-7;
 
 impl Judge<'_> {
-    /// Distance at which a ray meets a triangle.
+    /// Returns the distance at which a ray hits a triangle.
     pub(crate) fn meet(&self, ray: &Ray, triangle: u32) -> Option<f64> {
         meet(ray, &self.corners(triangle))
     }
 
-    /// Distance to a triangle that the ray surely meets: what [`Judge::meet`] gives, to the bit.
-    pub(crate) fn way(&self, ray: &Ray, triangle: u32) -> f64 {
+    /// Returns the distance to a triangle that the ray is known to hit: bit-identical to [`Judge::meet`].
+    pub(crate) fn distance(&self, ray: &Ray, triangle: u32) -> f64 {
         let corners = self.corners(triangle);
         let plane = Plane::new(&corners);
-        match plane.way(ray) {
-            Some(way) => way,
+        match plane.distance(ray) {
+            Some(distance) => distance,
             None => meet(ray, &corners).unwrap_or(FARTHEST),
         }
     }
 
-    /// Normal of a triangle, for a ray that meets it.
+    /// Returns the normal of a triangle, for a ray that hits it.
     pub(crate) fn normal(&self, triangle: u32, ray: &Ray) -> Unit<Vector3<f64>> {
-        // A sliver without an area has no normal; any that looks back does.
+        // A triangle of zero area has no normal; one that faces the ray is used.
         Unit::try_new(self.plane(triangle).normal, f64::MIN_POSITIVE).unwrap_or(-ray.direction)
     }
 
-    /// Product of a ray's direction with the normal of a triangle that it meets: the cosine of the incidence, with a sign.
+    /// Returns the dot product of a ray's direction and the normal of a triangle that it hits: the signed cosine of the
+    /// incidence.
     pub(crate) fn closing(&self, triangle: u32, ray: &Ray) -> f64 {
         let plane = self.plane(triangle);
         let inverse = plane.inverse();
         if inverse.is_finite() {
             plane.normal.dot(&ray.direction) * inverse
         } else {
-            // Of a sliver without an area any normal that looks back does.
+            // A triangle of zero area: its normal faces the ray.
             -1.0
         }
     }
@@ -105,13 +106,13 @@ impl Plane {
         }
     }
 
-    /// How far a ray goes to the plane; `None` where that is not good ([`STEEP`]).
-    fn way(&self, ray: &Ray) -> Option<f64> {
+    /// Returns the distance of a ray to the plane; `None` where it is not accurate ([`STEEP`]).
+    fn distance(&self, ray: &Ray) -> Option<f64> {
         let closing = self.normal.dot(&ray.direction);
         (closing.abs() > self.least).then(|| self.height(&ray.origin) / closing)
     }
 
-    /// One over the normal's length.
+    /// Returns 1/|N|.
     pub(crate) fn inverse(&self) -> f64 {
         1.0 / self.normal.norm()
     }
@@ -121,9 +122,9 @@ impl Plane {
         self.normal.dot(&(self.corner - origin))
     }
 
-    /// [`Plane::way`] of eight rays, the products of their directions with the normal, and where both are good.
+    /// Returns [`Plane::distance`] of eight rays, N·d of each, and the mask of rays for which both are accurate.
     #[inline(always)]
-    pub(crate) fn ways<S: Simd>(
+    pub(crate) fn distances<S: Simd>(
         &self,
         simd: S,
         height: f64x8<S>,
@@ -134,7 +135,7 @@ impl Plane {
         (height / closing, closing, sure)
     }
 
-    /// [`Plane::height`] of eight rays.
+    /// Returns [`Plane::height`] of eight rays.
     #[inline(always)]
     pub(crate) fn heights<S: Simd>(&self, simd: S, origin: &[f64x8<S>; 3]) -> f64x8<S> {
         let corner = [
@@ -142,11 +143,11 @@ impl Plane {
             f64x8::splat(simd, self.corner.y),
             f64x8::splat(simd, self.corner.z),
         ];
-        unfused::product(simd, &self.normal, &less(&corner, origin))
+        unfused::product(simd, &self.normal, &minus(&corner, origin))
     }
 }
 
-/// Distance at which a ray meets a triangle, from either side; its edges and corners belong to it.
+/// Returns the distance at which a ray hits a triangle, from either side; its edges and corners are part of it.
 fn meet(ray: &Ray, corners: &[Point3<f64>; 3]) -> Option<f64> {
     let d = ray.direction.into_inner();
     let [kx, ky, kz] = axes(ray);
@@ -164,12 +165,12 @@ fn meet(ray: &Ray, corners: &[Point3<f64>; 3]) -> Option<f64> {
         return None;
     }
     let distance = Plane::new(corners)
-        .way(ray)
+        .distance(ray)
         .unwrap_or_else(|| (u * a.z + v * b.z + w * c.z) / sum);
     (distance > 0.0 && distance < FARTHEST).then_some(distance)
 }
 
-/// The axis along which a ray goes farthest, after the two others.
+/// Returns the axes, the one with the ray's largest direction component last.
 #[inline(always)]
 fn axes(ray: &Ray) -> [usize; 3] {
     let d = &ray.direction;
@@ -183,11 +184,11 @@ fn axes(ray: &Ray) -> [usize; 3] {
     }
 }
 
-/// The edge function p×q, its sign exact.
+/// Returns the edge function p×q with an exact sign.
 fn edge(p: &Vector3<f64>, q: &Vector3<f64>) -> f64 {
     let (left, right) = (p.x * q.y, p.y * q.x);
     let value = left - right;
-    // Both products are off by half a unit in their last place at most, and so is the difference.
+    // Each product, and the difference, is rounded by at most half a unit in the last place.
     if value.abs() > 2.0 * f64::EPSILON * (left.abs() + right.abs()) {
         return value;
     }

@@ -1,5 +1,5 @@
-//! Ways of a bundle's rays to the triangles that they are known to meet, in f64: rays of one triangle by its plane, rays that
-//! have one to themselves eight at a time.
+//! Exact (f64) hit distances for a packet once the f32 pass has fixed each ray's triangle: rays that share a triangle are
+//! computed together from its plane, the others eight at a time.
 
 use crate::hit::NONE;
 use crate::lanes::inlined;
@@ -10,50 +10,50 @@ use crate::packet::rows::{HALF, LANES, Rows, half};
 use fearless_simd::{Simd, prelude::*};
 use fearless_simd::{f64x8, mask32x16, mask64x8, u32x16};
 
-/// What sixteen rays in a row meet.
+/// Hits of one row of sixteen rays.
 pub(crate) struct MetInRow<'a> {
     pub(crate) row: usize,
-    /// A bit for every ray that meets anything; the others have any numbers.
+    /// One bit per ray, set for a hit; the numbers of the other rays are undefined.
     pub(crate) some: u64,
     pub(crate) triangle: &'a [u32; LANES],
     pub(crate) distance: &'a [f64; LANES],
-    /// Product of the ray's direction with the triangle's normal, if it was asked for.
+    /// Dot product of the ray's direction and the triangle's normal, if requested.
     pub(crate) closing: &'a [f64; LANES],
 }
 
-/// Where the normal counts too, fewer rays of a row with the same triangle are looked at each by itself.
+/// If the incidence is requested, rays of a row that share a triangle are computed individually below this count.
 const FEW: u32 = 5;
 
-/// What is known so far.
-struct Ways<'a, const R: usize> {
+/// State of the computation.
+struct Distances<'a, const R: usize> {
     rays: &'a InRows<'a, R>,
     judge: &'a Judge<'a>,
     distance: Rows<f64, R>,
     closing: Rows<f64, R>,
     pending: Pending,
-    /// As many as there are rows, each in the place that its number gives it.
+    /// A direct-mapped cache of recent triangles, indexed by triangle modulo `R`.
     kept: [Kept; R],
 }
 
-/// A triangle that was looked at: neighboring rows have some in common.
+/// A cached triangle: neighboring rows often share some.
 #[derive(Clone, Copy)]
 struct Kept {
     triangle: u32,
     plane: Plane,
-    /// One over the length of the plane's normal, if it was asked for.
+    /// 1/|N|, if the incidence is requested.
     inverse: f64,
-    /// Height of the plane over where all rays start, if they do.
+    /// Height of the plane above the common origin, if there is one.
     height: f64,
 }
 
-/// Tells, row by row, how far rays go to these triangles, and under which incidence if that is asked for.
+/// Emits, row by row, the distances of the rays to the triangles found, with the incidence if `CLOSING`.
 #[inline(always)]
 pub(crate) fn finish<S: Simd, const R: usize, const CLOSING: bool>(
     simd: S,
     found: &[[u32; LANES]; R],
     rays: &InRows<'_, R>,
     judge: &Judge<'_>,
-    mut tell: impl FnMut(&MetInRow<'_>),
+    mut emit: impl FnMut(&MetInRow<'_>),
 ) {
     let none = Kept {
         triangle: NONE,
@@ -61,7 +61,7 @@ pub(crate) fn finish<S: Simd, const R: usize, const CLOSING: bool>(
         inverse: 0.0,
         height: 0.0,
     };
-    let mut ways = Ways {
+    let mut state = Distances {
         rays,
         judge,
         distance: Rows::of(0.0),
@@ -75,36 +75,36 @@ pub(crate) fn finish<S: Simd, const R: usize, const CLOSING: bool>(
         let triangles = u32x16::simd_from(simd, *numbers);
         *some = !triangles.simd_eq(u32x16::splat(simd, NONE)).to_bitmask();
         *some &= (1 << LANES.min(rays.count - row * LANES)) - 1;
-        // Rays of the same triangle, one triangle after the other.
+        // One triangle at a time, with all rays that hit it.
         let mut open = *some;
         while open != 0 {
             let triangle = numbers[open.trailing_zeros() as usize & (LANES - 1)];
-            let alike = triangles.simd_eq(u32x16::splat(simd, triangle));
-            let lanes = alike.to_bitmask() & open;
+            let same = triangles.simd_eq(u32x16::splat(simd, triangle));
+            let lanes = same.to_bitmask() & open;
             open &= !lanes;
             if CLOSING && lanes.count_ones() < FEW {
-                ways.postpone(simd, row, lanes, triangle);
+                state.postpone(simd, row, lanes, triangle);
             } else {
-                ways.meet::<S, CLOSING>(simd, row, alike, lanes, triangle);
+                state.meet::<S, CLOSING>(simd, row, same, lanes, triangle);
             }
         }
     }
     if CLOSING {
-        ways.settle(simd);
+        state.settle(simd);
     }
     for (row, triangle) in found.iter().enumerate().take(rows) {
-        tell(&MetInRow {
+        emit(&MetInRow {
             row,
             some: somes[row],
             triangle,
-            distance: &ways.distance.0[row],
-            closing: &ways.closing.0[row],
+            distance: &state.distance.0[row],
+            closing: &state.closing.0[row],
         });
     }
 }
 
-impl<const R: usize> Ways<'_, R> {
-    /// Leaves some rays of a row with one triangle for later.
+impl<const R: usize> Distances<'_, R> {
+    /// Defers the rays in `lanes` to the individual computation.
     #[inline(always)]
     fn postpone<S: Simd>(&mut self, simd: S, row: usize, mut lanes: u64, triangle: u32) {
         while lanes != 0 {
@@ -123,23 +123,23 @@ impl<const R: usize> Ways<'_, R> {
             #[inline(always)]
             |ray: usize| rays.get(ray),
         );
-        let tell = inlined(
+        let emit = inlined(
             #[inline(always)]
             |settled: Settled| {
-                distance.set(settled.ray, settled.way);
+                distance.set(settled.ray, settled.distance);
                 closing.set(settled.ray, settled.closing);
             },
         );
-        self.pending.settle::<S, true>(simd, self.judge, &ray, tell);
+        self.pending.settle::<S, true>(simd, self.judge, &ray, emit);
     }
 
-    /// Finds the ways of some rays of a row to one triangle.
+    /// Computes the distances of the rays in `lanes` to one triangle.
     #[inline(always)]
     fn meet<S: Simd, const CLOSING: bool>(
         &mut self,
         simd: S,
         row: usize,
-        alike: mask32x16<S>,
+        same: mask32x16<S>,
         lanes: u64,
         triangle: u32,
     ) {
@@ -156,26 +156,26 @@ impl<const R: usize> Ways<'_, R> {
             }
         }
         let mut unsure = lanes;
-        let (low, high) = alike.widen();
-        for (second, alike) in [low, high].into_iter().enumerate() {
+        let (low, high) = same.widen();
+        for (second, same) in [low, high].into_iter().enumerate() {
             let height = match &rays.common {
                 Some(_) => f64x8::splat(simd, kept.height),
                 None => kept.plane.heights(simd, &half(simd, &rays.origin, row, second)),
             };
             let direction = half(simd, &rays.direction, row, second);
-            let (way, closing, steep) = kept.plane.ways(simd, height, &direction);
-            put(simd, alike, way, &mut self.distance.0[row], second);
+            let (distance, closing, steep) = kept.plane.distances(simd, height, &direction);
+            put(simd, same, distance, &mut self.distance.0[row], second);
             if CLOSING {
                 let closing = closing * f64x8::splat(simd, kept.inverse);
-                put(simd, alike, closing, &mut self.closing.0[row], second);
+                put(simd, same, closing, &mut self.closing.0[row], second);
             }
-            unsure &= !((steep & alike).to_bitmask() << (second * HALF));
+            unsure &= !((steep & same).to_bitmask() << (second * HALF));
         }
         while unsure != 0 {
             let number = row * LANES + unsure.trailing_zeros() as usize;
             unsure &= unsure - 1;
             let ray = rays.get(number);
-            self.distance.set(number, judge.way(&ray, triangle));
+            self.distance.set(number, judge.distance(&ray, triangle));
             if CLOSING {
                 self.closing.set(number, judge.closing(triangle, &ray));
             }
@@ -183,7 +183,7 @@ impl<const R: usize> Ways<'_, R> {
     }
 }
 
-/// Puts numbers in a half of a row where they count.
+/// Stores the selected numbers in one half of a row.
 #[inline(always)]
 fn put<S: Simd>(simd: S, which: mask64x8<S>, numbers: f64x8<S>, row: &mut [f64; LANES], second: usize) {
     let place = &mut row[second * HALF..(second + 1) * HALF];

@@ -1,4 +1,4 @@
-//! Triangle meshes: as data, and in their places with an index over them.
+//! Triangle meshes: as data, and placed in a frame with an index over their triangles.
 
 pub(crate) mod beam;
 pub(crate) mod data;

@@ -1,13 +1,14 @@
-//! Ways to triangles that are known to be met, each ray to one of its own: found in f64 eight at a time.
+//! Queue of rays whose triangle is known but not the f64 distance to it: computed eight at a time, each ray with its own
+//! triangle.
 
-use crate::lanes::{inlined, less, size, unfused};
+use crate::lanes::{inlined, minus, size, unfused};
 use crate::mesh::exact::{Judge, STEEP};
 use crate::ray::Ray;
 use fearless_simd::{Simd, f64x8, prelude::*};
 
 const LANES: usize = 8;
 
-/// Rays whose triangle is known, but not the way to it.
+/// Rays whose triangle is known, but not the distance to it.
 #[derive(Default)]
 pub(crate) struct Pending {
     count: usize,
@@ -15,18 +16,18 @@ pub(crate) struct Pending {
     found: [(usize, u32); LANES],
 }
 
-/// The way of a ray to its triangle.
+/// The computed hit of a ray on its triangle.
 pub(crate) struct Settled {
     pub(crate) ray: usize,
     pub(crate) triangle: u32,
-    /// What [`Judge::way`] gives, to the bit.
-    pub(crate) way: f64,
-    /// [`Judge::closing`], if it was asked for.
+    /// Bit-identical to [`Judge::distance`].
+    pub(crate) distance: f64,
+    /// [`Judge::closing`], if requested.
     pub(crate) closing: f64,
 }
 
 impl Pending {
-    /// Takes one more; whether that is all there is room for, and [`Pending::settle`] must be called.
+    /// Adds a ray. Returns whether the queue is full and [`Pending::settle`] must be called.
     #[inline(always)]
     pub(crate) fn add(&mut self, ray: usize, triangle: u32) -> bool {
         self.found[self.count] = (ray, triangle);
@@ -34,14 +35,14 @@ impl Pending {
         self.count == LANES
     }
 
-    /// Finds the ways and tells them.
+    /// Computes the distances and emits them.
     #[inline(always)]
     pub(crate) fn settle<S: Simd, const CLOSING: bool>(
         &mut self,
         simd: S,
         judge: &Judge<'_>,
         rays: &impl Fn(usize) -> Ray,
-        mut tell: impl FnMut(Settled),
+        mut emit: impl FnMut(Settled),
     ) {
         let count = std::mem::take(&mut self.count);
         if count == 0 {
@@ -72,14 +73,14 @@ impl Pending {
             },
         );
         let (a, direction) = (load(&a), load(&direction));
-        let (p, q) = (less(&load(&b), &a), less(&load(&c), &a));
+        let (p, q) = (minus(&load(&b), &a), minus(&load(&c), &a));
         let long = size(&p).max(size(&q));
         let normal = unfused::cross(&p, &q);
         let closing = unfused::dot(&normal, &direction);
         let least = f64x8::splat(simd, STEEP) * long * long;
         let sure = closing.abs().simd_gt(least).to_bitmask();
-        let (mut ways, mut closings) = ([0.0; LANES], [0.0; LANES]);
-        (unfused::dot(&normal, &less(&a, &load(&origin))) / closing).store_slice(&mut ways);
+        let (mut distances, mut closings) = ([0.0; LANES], [0.0; LANES]);
+        (unfused::dot(&normal, &minus(&a, &load(&origin))) / closing).store_slice(&mut distances);
         if CLOSING {
             let inverse = f64x8::splat(simd, 1.0) / unfused::dot(&normal, &normal).sqrt();
             (closing * inverse).store_slice(&mut closings);
@@ -88,15 +89,15 @@ impl Pending {
             let mut settled = Settled {
                 ray: number,
                 triangle,
-                way: ways[lane],
+                distance: distances[lane],
                 closing: closings[lane],
             };
             if sure >> lane & 1 == 0 {
                 let ray = rays(number);
-                settled.way = judge.way(&ray, triangle);
+                settled.distance = judge.distance(&ray, triangle);
                 settled.closing = judge.closing(triangle, &ray);
             }
-            tell(settled);
+            emit(settled);
         }
     }
 }

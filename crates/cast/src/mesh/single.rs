@@ -1,40 +1,40 @@
-//! One ray against eight boxes or eight triangles.
+//! One ray against the eight boxes of a node or the eight triangles of a leaf.
 //!
-//! The errors are those of [`beam`](super::beam) with the ray's own start as the reference, and longer bounds: the way to
-//! the farthest corner is not longer than all that there is, the longest edge not longer than two that meet. One of the
-//! edges is what the others leave of N·d, and has the errors of the three.
+//! The errors are those of [`beam`](super::beam) with the ray's origin as the reference, and with looser bounds: the
+//! distance to the farthest corner is bounded by the reach of the mesh, the longest edge by two adjacent edges. One edge
+//! function is N·d minus the other two, and carries the errors of all three.
 
 use crate::index::wide::{Leaf, Node, WIDTH};
-use crate::lanes::{cross, dot, inlined, less, size};
+use crate::lanes::{cross, dot, inlined, minus, size};
 use crate::ray::Ray;
 use crate::rounding::ROUNDING;
 use crate::rounding::rounded;
 use fearless_simd::f32x8;
 use fearless_simd::{Simd, prelude::*};
 
-/// The ray in f32.
+/// A ray in f32, prepared for slab tests.
 pub(crate) struct Line {
     start: [f32; 3],
     direction: [f32; 3],
-    /// By axis, whether the ray comes to a box's low side (0) or high side (1) first.
+    /// By axis, whether the ray enters a box at its low (0) or high side (1).
     entry: [usize; 3],
-    /// By axis, what gives the way to a side of a box: a factor and what is taken away, so that boxes are entered early
-    /// and left late.
+    /// By axis, the distance to a slab side as a factor and a subtrahend, rounded so that boxes are entered early and
+    /// left late.
     early: [[f32; 2]; 3],
     late: [[f32; 2]; 3],
-    /// Error of a corner's coordinate seen from the start.
+    /// Error of a corner's coordinate relative to the origin.
     eta: f32,
-    /// Not less than the sum of a corner's coordinates seen from the start.
+    /// Upper bound on the L1 norm of a corner relative to the origin.
     far: f32,
 }
 
-/// What eight triangles are to the ray.
+/// Result of testing eight triangles.
 #[derive(Default)]
 pub(crate) struct Outcome {
-    /// Bounds of the way to each.
+    /// Bounds of the distance to each.
     pub(crate) low: [f32; WIDTH],
     pub(crate) high: [f32; WIDTH],
-    /// Lanes that the ray may meet, and those that it surely meets.
+    /// Lanes that the ray may hit, and those that it certainly hits.
     pub(crate) may: u32,
     pub(crate) surely: u32,
 }
@@ -45,7 +45,7 @@ impl Line {
         let start: [f32; 3] = std::array::from_fn(|k| rounded(ray.origin[k]));
         let direction: [f32; 3] = std::array::from_fn(|k| rounded(ray.direction[k]));
         let greatest = start.iter().fold(0.0_f32, |m, c| c.abs().max(m));
-        // Its inverse stays finite, and the ray stays in the box for as long as anything is looked for.
+        // Its inverse stays finite, and a ray inside the slab stays inside up to the search limit.
         const LEAST: f32 = 1e-20;
         let slack = 4.0 * ROUNDING * (greatest + reach);
         let mut line = Self {
@@ -69,7 +69,7 @@ impl Line {
         line
     }
 
-    /// Which of eight boxes the ray meets before `limit`, and where.
+    /// Returns which of eight boxes the ray hits before `limit`, and the entry distances.
     #[inline(always)]
     pub(crate) fn boxes<S: Simd>(&self, simd: S, node: &Node, limit: f32) -> (u32, f32x8<S>) {
         let splat = inlined(
@@ -80,17 +80,17 @@ impl Line {
             #[inline(always)]
             |k: usize, far: usize| f32x8::simd_from(simd, node.bounds[k][(self.entry[k] ^ far) & 1]),
         );
-        let way = inlined(
+        let distance = inlined(
             #[inline(always)]
-            |side: f32x8<S>, [factor, less]: [f32; 2]| side.mul_sub(splat(factor), splat(less)),
+            |side: f32x8<S>, [factor, subtrahend]: [f32; 2]| side.mul_sub(splat(factor), splat(subtrahend)),
         );
         let enter = inlined(
             #[inline(always)]
-            |k: usize| way(side(k, 0), self.early[k]),
+            |k: usize| distance(side(k, 0), self.early[k]),
         );
         let leave = inlined(
             #[inline(always)]
-            |k: usize| way(side(k, 1), self.late[k]),
+            |k: usize| distance(side(k, 1), self.late[k]),
         );
         let near = enter(0).max(enter(1)).max(enter(2).max(splat(0.0)));
         let far = leave(0).min(leave(1)).min(leave(2));
@@ -129,8 +129,8 @@ impl Line {
         );
         let d = three(&self.direction);
         let a = corner(0);
-        let (b, c) = (less(&corner(1), &a), less(&corner(2), &a));
-        let a = less(&a, &three(&self.start));
+        let (b, c) = (minus(&corner(1), &a), minus(&corner(2), &a));
+        let a = minus(&a, &three(&self.start));
         let normal = cross(&b, &c);
         let closing = dot(&normal, &d);
         let moment = cross(&a, &d);
@@ -151,9 +151,9 @@ impl Line {
         let error = error.mul_add(size(&normal), cube * splat(128.0 * ROUNDING)) * 2.0;
         let least = long * long.mul_add(splat(128.0 * ROUNDING), eta * 32.0);
         let inverse = splat(1.0) / closing;
-        let way = dot(&normal, &a) * inverse;
+        let distance = dot(&normal, &a) * inverse;
         let error = error * inverse.abs();
-        let (low, high) = (way - error, way + error);
+        let (low, high) = (distance - error, distance + error);
         let sure = closing.abs().simd_gt(least);
         let aside = sure & (low.simd_gt(splat(limit)) | high.simd_lt(splat(0.0)));
         low.store_slice(&mut outcome.low);

@@ -1,17 +1,17 @@
-//! A triangle mesh in its place.
+//! A placed triangle mesh that rays can be cast into.
 //!
-//! Triangles are found in f32 by an index made for lanes and decided about in f64 without a gap between triangles that
-//! share an edge; the answer is the same with any instruction set, alone or in a beam. Of triangles that are met at the
-//! very same distance the first counts.
+//! An f32 index over SIMD lanes finds candidate triangles; the hit is decided in f64 and is watertight. Results are
+//! bit-identical with any instruction set, for a single ray or in a beam. Of triangles hit at exactly the same distance,
+//! the one with the lowest index counts.
 
-use crate::index::wide::Wide;
+use crate::index::wide::WideBvh;
 use crate::lanes::inlined;
 use crate::mesh::beam::{self, Found};
 use crate::mesh::data::Mesh;
 use crate::mesh::each;
 use crate::mesh::exact::{Judge, Met};
 use crate::mesh::finish::{MetInRow, finish};
-use crate::packet::bundle::{Bundle, Caster, cast_all};
+use crate::packet::cast::{Caster, Packet, cast_all};
 use crate::packet::rays::Rays;
 use crate::packet::rows::LANES;
 use crate::ray::Ray;
@@ -20,11 +20,11 @@ use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::{Point3, Unit, Vector3};
 use std::ops::Range;
 
-/// A mesh in its place, with an index over its triangles.
+/// A placed mesh with an index over its triangles.
 pub struct Triangles {
     vertices: Vec<Point3<f64>>,
     triangles: Vec<[u32; 3]>,
-    wide: Wide,
+    wide: WideBvh,
 }
 
 impl std::fmt::Debug for Triangles {
@@ -34,13 +34,13 @@ impl std::fmt::Debug for Triangles {
 }
 
 impl Triangles {
-    /// A mesh in metres after multiplication with `scale`, then placed.
+    /// Scales the mesh to meters by `scale`, then places it.
     pub fn new(mesh: &Mesh, scale: f64, frame_from_mesh: &Pose) -> Self {
         let place = |p: &Point3<f64>| frame_from_mesh * Point3::from(p.coords * scale);
         let vertices: Vec<Point3<f64>> = mesh.vertices().iter().map(place).collect();
         let triangles = mesh.triangles().to_vec();
         Self {
-            wide: Wide::new(&vertices, &triangles),
+            wide: WideBvh::new(&vertices, &triangles),
             vertices,
             triangles,
         }
@@ -50,17 +50,17 @@ impl Triangles {
         self.triangles[triangle].map(|v| self.vertices[v as usize])
     }
 
-    /// The vertices, in metres.
+    /// Returns the vertices, in meters.
     pub fn vertices(&self) -> &[Point3<f64>] {
         &self.vertices
     }
 
-    /// Its triangles one by one, in metres.
+    /// Iterates over the triangles, in meters.
     pub fn each(&self) -> impl Iterator<Item = [Point3<f64>; 3]> {
         (0..self.triangles.len()).map(|t| self.corners(t))
     }
 
-    /// All of its triangles, in metres.
+    /// Returns all triangles, in meters.
     pub(crate) fn skin(&self) -> Vec<[Point3<f64>; 3]> {
         self.each().collect()
     }
@@ -72,25 +72,25 @@ impl Triangles {
         }
     }
 
-    /// The nearest triangle along a ray.
+    /// Returns the nearest hit of a ray.
     pub fn nearest(&self, ray: &Ray) -> Option<Met> {
         let mut met = [None];
         self.follow_each(Level::new(), |_| *ray, &mut met);
         met[0]
     }
 
-    /// The nearest triangle along each of some rays that have nothing in common.
+    /// Finds the nearest hit of each ray, for incoherent rays.
     ///
     /// # Panics
-    /// If there are not as many places for what they meet.
+    /// If the numbers of rays and result slots differ.
     pub fn nearest_of_each(&self, rays: &Rays, met: &mut [Option<Met>]) {
         InMesh::new(self, Level::new()).cast_each(rays, 0..rays.len(), met);
     }
 
-    /// The nearest triangle along each of some rays: fast if they are a narrow cone, from nearly one point.
+    /// Finds the nearest hit of each ray: fast for coherent rays, a narrow cone with nearly one origin.
     ///
     /// # Panics
-    /// If there are not as many places for what they meet.
+    /// If the numbers of rays and result slots differ.
     pub fn nearest_of_beam(&self, rays: &Rays, met: &mut [Option<Met>]) {
         cast_all(&InMesh::new(self, Level::new()), rays, met);
     }
@@ -98,44 +98,44 @@ impl Triangles {
     fn follow_each(&self, level: Level, rays: impl Fn(usize) -> Ray, met: &mut [Option<Met>]) {
         let (judge, count) = (self.judge(), met.len());
         dispatch!(level, simd => {
-            let tell = inlined(#[inline(always)] |ray: usize, of_ray| met[ray] = of_ray);
-            each::follow(simd, &self.wide, &judge, count, &rays, tell);
+            let emit = inlined(#[inline(always)] |ray: usize, of_ray| met[ray] = of_ray);
+            each::follow(simd, &self.wide, &judge, count, &rays, emit);
         });
     }
 
-    /// Tells what the rays of a bundle meet, row by row, and under which incidence if that is asked for; it may be made for
-    /// things that reach farther than the mesh.
+    /// Emits the nearest hits of a packet, row by row, with the incidence if `CLOSING`. The packet's reach may exceed that
+    /// of the mesh.
     #[inline(always)]
-    pub(crate) fn nearest_of_bundle<S: Simd, const R: usize, const CLOSING: bool>(
+    pub(crate) fn nearest_of_packet<S: Simd, const R: usize, const CLOSING: bool>(
         &self,
         simd: S,
-        bundle: &Bundle<'_, R>,
-        tell: impl FnMut(&MetInRow<'_>),
+        packet: &Packet<'_, R>,
+        emit: impl FnMut(&MetInRow<'_>),
     ) {
         let judge = self.judge();
-        let mut found = Found::new(bundle.rays.count);
-        beam::follow(simd, &self.wide, bundle, &judge, &mut found);
-        finish::<S, R, CLOSING>(simd, found.triangles(), &bundle.rays, &judge, tell);
+        let mut found = Found::new(packet.rays.count);
+        beam::follow(simd, &self.wide, packet, &judge, &mut found);
+        finish::<S, R, CLOSING>(simd, found.triangles(), &packet.rays, &judge, emit);
     }
 
-    /// Normal of a triangle, for a ray that meets it.
+    /// Returns the normal of a triangle, for a ray that hits it.
     pub(crate) fn normal(&self, triangle: u32, ray: &Ray) -> Unit<Vector3<f64>> {
         self.judge().normal(triangle, ray)
     }
 
-    /// Product of the direction of a ray with the normal of a triangle that it meets.
+    /// Returns the dot product of a ray's direction and the normal of a triangle that it hits.
     pub(crate) fn closing(&self, triangle: u32, ray: &Ray) -> f64 {
         self.judge().closing(triangle, ray)
     }
 
-    /// Distance and normal of the nearest triangle along a ray.
+    /// Returns distance and normal of the nearest hit of a ray.
     pub(crate) fn cast(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
         let met = self.nearest(ray)?;
         Some((met.distance, self.normal(met.triangle, ray)))
     }
 }
 
-/// A mesh, with what the machine has.
+/// A mesh and the instruction set to cast with.
 pub(crate) struct InMesh<'a> {
     mesh: &'a Triangles,
     level: Level,
@@ -149,7 +149,7 @@ impl<'a> InMesh<'a> {
 
 impl Caster<Option<Met>> for InMesh<'_> {
     fn cast_each(&self, rays: &Rays, which: Range<usize>, met: &mut [Option<Met>]) {
-        assert_eq!(which.len(), met.len(), "every ray has its place");
+        assert_eq!(which.len(), met.len(), "one result slot per ray");
         let ray = inlined(
             #[inline(always)]
             |ray: usize| rays.get(which.start + ray),
@@ -159,10 +159,10 @@ impl Caster<Option<Met>> for InMesh<'_> {
 
     fn cast_rows<const R: usize>(&self, rays: &Rays, which: Range<usize>, met: &mut [Option<Met>]) -> bool {
         dispatch!(self.level, simd => {
-            let mut bundle = Bundle::<R>::new(rays, which);
-            let narrow = bundle.surround(simd, self.mesh.wide.reach);
+            let mut packet = Packet::<R>::new(rays, which);
+            let narrow = packet.surround(simd, self.mesh.wide.reach);
             if narrow {
-                self.mesh.nearest_of_bundle::<_, R, false>(simd, &bundle, inlined(#[inline(always)] |row: &MetInRow<'_>| {
+                self.mesh.nearest_of_packet::<_, R, false>(simd, &packet, inlined(#[inline(always)] |row: &MetInRow<'_>| {
                     let places = met.chunks_mut(LANES).nth(row.row).unwrap_or_default();
                     for (lane, place) in places.iter_mut().enumerate() {
                         let found = Met { triangle: row.triangle[lane], distance: row.distance[lane] };
@@ -182,10 +182,10 @@ pub(crate) mod tests {
     use rayon::prelude::*;
     use std::collections::BTreeMap;
 
-    /// Rays shot at the random mesh, half of them from inside and half from outside.
+    /// Rays cast at the random mesh, half of them from inside and half from outside.
     const RAYS: u64 = 10_000_000;
 
-    /// A closed mesh that can be seen whole from the origin: a divided octahedron, every vertex at a random distance.
+    /// A closed mesh that is star-shaped about the origin: a subdivided octahedron with every vertex at a random distance.
     pub(crate) fn random_star(seed: u64, divisions: u32) -> Mesh {
         let mut vertices: Vec<Point3<f64>> = [
             [1.0, 0.0, 0.0],
@@ -223,7 +223,7 @@ pub(crate) mod tests {
         for vertex in &mut vertices {
             vertex.coords *= 0.5 + draws.uniform();
         }
-        Mesh::new(vertices, triangles).expect("it is a mesh")
+        Mesh::new(vertices, triangles).expect("a valid mesh")
     }
 
     #[test]
@@ -236,9 +236,9 @@ pub(crate) mod tests {
         (0..RAYS / 2 / BATCH).into_par_iter().for_each(|batch| {
             let mut draws = Draws::new(3, batch);
             for shot in 0..BATCH {
-                // A point inside: the star holds a ball of a third of its least radius.
+                // A point inside: the star contains a ball of a third of its smallest radius.
                 let inside = place * Point3::from(draws.normal3().normalize() * (0.1 * draws.uniform()));
-                // Truncation picks a triangle evenly.
+                // Truncation picks a triangle uniformly.
                 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
                 let number = (draws.uniform() * placed.triangles.len() as f64) as usize;
                 let [a, b, c] = placed.corners(number);
@@ -249,7 +249,7 @@ pub(crate) mod tests {
                     _ => a + (b - a) * draws.uniform() + (c - a) * draws.uniform(),
                 };
                 let outwards = Unit::new_normalize(target - inside);
-                // Outwards nothing gets out; the first thing met from inside is a back.
+                // From inside, every ray hits the back of a triangle.
                 let ray = Ray {
                     origin: inside,
                     direction: outwards,
@@ -258,19 +258,20 @@ pub(crate) mod tests {
                     placed.cast(&ray).is_some(),
                     "leaks from {inside} towards {target}"
                 );
-                // And inwards through the same point nothing reaches the middle without meeting it.
+                // From outside through the same point, no ray reaches the inside without a hit.
                 let outside = inside + outwards.into_inner() * 4.0;
                 let ray = Ray {
                     origin: outside,
                     direction: -outwards,
                 };
-                let (distance, _) = placed.cast(&ray).expect("it is in the way");
-                assert!(distance < 4.0, "lets {target} through from outside");
+                let (distance, _) = placed.cast(&ray).expect("a hit from outside");
+                assert!(distance < 4.0, "leaks from outside at {target}");
             }
         });
     }
 
-    /// A cube of so many units whose faces are unit squares, each cut in two along either diagonal.
+    /// A cube with edges of `units`, its faces divided into unit squares and each square into two triangles along a random
+    /// diagonal.
     fn lattice_cube(units: u32, seed: u64) -> Mesh {
         let mut draws = Draws::new(seed, 0);
         let (mut numbers, mut triangles) = (BTreeMap::new(), Vec::new());
@@ -303,13 +304,13 @@ pub(crate) mod tests {
         for (place, number) in numbers {
             vertices[number as usize] = Point3::from(place.map(f64::from));
         }
-        Mesh::new(vertices, triangles).expect("it is a mesh")
+        Mesh::new(vertices, triangles).expect("a valid mesh")
     }
 
     #[test]
-    fn rays_exactly_on_edges_and_vertices_meet_the_face_they_share() {
-        // Along an axis the quarters of a unit are exact: of these rays a sixteenth meets vertices, and a half meets
-        // edges or diagonals, with every edge function exactly zero.
+    fn rays_exactly_on_edges_and_vertices_hit_the_shared_face() {
+        // Quarter units along an axis are exact: a sixteenth of these rays hits vertices, and half of them hit edges or
+        // diagonals, where an edge function is exactly zero.
         const UNITS: u32 = 8;
         for seed in 0..20 {
             let placed = Triangles::new(&lattice_cube(UNITS, seed), 1.0, &Pose::identity());
@@ -324,7 +325,7 @@ pub(crate) mod tests {
                             origin: from,
                             direction: Unit::new_unchecked(along),
                         };
-                        let (distance, normal) = placed.cast(&ray).expect("it is closed");
+                        let (distance, normal) = placed.cast(&ray).expect("a closed mesh");
                         let expected = if sign > 0.0 { f64::from(UNITS) - 3.25 } else { 3.25 };
                         assert_eq!((distance, normal.into_inner()), (expected, along), "from {from}");
                     }
@@ -334,7 +335,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_ray_meets_a_triangle_where_its_plane_is() {
+    fn the_hit_distance_is_that_to_the_plane() {
         let mesh = random_star(5, 2);
         let placed = Triangles::new(&mesh, 2.0, &Pose::identity());
         let mut draws = Draws::new(9, 0);
@@ -343,7 +344,7 @@ pub(crate) mod tests {
                 origin: Point3::origin(),
                 direction: Unit::new_normalize(draws.normal3()),
             };
-            let (found, normal) = placed.cast(&ray).expect("it is closed");
+            let (found, normal) = placed.cast(&ray).expect("a closed mesh");
             // By solving a + s(b − a) + t(c − a) = d·u for every triangle.
             let solved = (0..placed.triangles.len()).filter_map(|i| {
                 let [a, b, c] = placed.corners(i);
@@ -353,7 +354,7 @@ pub(crate) mod tests {
             });
             let expected = solved.fold(f64::INFINITY, f64::min);
             assert!((found - expected).abs() < 1e-12, "{found} against {expected}");
-            assert!(normal.dot(&ray.direction) > 0.0, "its fronts look outwards");
+            assert!(normal.dot(&ray.direction) > 0.0, "the fronts face outward");
         }
     }
 
@@ -366,7 +367,7 @@ pub(crate) mod tests {
         assert!(matches!(found, Err(MeshError::NoVertex { vertex: 3, .. })));
         let found = Mesh::new(vec![corner(f64::NAN); 3], vec![[0, 1, 2]]);
         assert_eq!(found, Err(MeshError::NotFinite { vertex: 0 }));
-        // A sliver without an area is met by nothing, and nothing goes wrong.
+        // A triangle of zero area is never hit, and nothing panics.
         let sliver = Mesh::new(vec![corner(0.0), corner(1.0), corner(2.0)], vec![[0, 1, 2]]).expect("finite");
         let placed = Triangles::new(&sliver, 1.0, &Pose::identity());
         let ray = Ray {

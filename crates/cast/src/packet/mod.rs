@@ -1,6 +1,6 @@
-//! Many rays side by side, and as packets in lanes.
+//! Rays in structure-of-arrays form, and packets of them in SIMD lanes.
 
-pub(crate) mod bundle;
+pub(crate) mod cast;
 pub(crate) mod in_rows;
 pub(crate) mod pyramid;
 pub(crate) mod rays;

@@ -1,7 +1,7 @@
-//! The pyramid around a bundle of rays, in f32.
+//! The pyramid that encloses a packet of rays, in f32.
 //!
-//! The rays of a narrow cone, from nearly one point, lie in a pyramid. What is outside one of its sides, or outside one
-//! of the sides that it has in projection along an axis, is met by none of them. All of it errs outwards.
+//! The rays of a narrow cone with nearly one origin are inside a pyramid. No ray hits anything that is outside one of its
+//! sides, or outside one of the sides of its projection along a coordinate axis. All bounds are conservative.
 
 use crate::index::wide::WIDTH;
 use crate::lanes;
@@ -10,37 +10,37 @@ use crate::packet::rows::{LANES, Vectors, whole};
 use crate::rounding::ROUNDING;
 use fearless_simd::{Simd, f32x4, f32x8, f32x16, prelude::*};
 
-/// Rounding of a slope, with room to spare.
+/// Rounding error of a slope, with a safety margin.
 const SLOPE_SLACK: f32 = 2e-6;
 
-/// Least cosine between the bundle's middle and each of its rays: in wider cones there is too much that few rays meet.
+/// Minimum cosine between the packet's axis and each of its rays: wider cones contain too much that only few rays hit.
 const NARROW: f32 = 0.97;
 
-/// Where sides have their place among [`LANES`]: two in projection without each axis, then the four of the pyramid.
+/// Indices of the sides among [`LANES`]: two for the projection along each axis, then the four of the pyramid.
 const FOUR: usize = 6;
 const FAR: usize = 10;
 const NEAR: usize = 11;
 
-/// The pyramid.
+/// The pyramid around a packet, as half-spaces.
 pub(crate) struct Pyramid {
-    /// Normals of the sides, by axis. What is behind a side is out of the bundle.
+    /// Outward normals of the sides, by axis. A point beyond a side is outside the packet.
     normal: [[f32; LANES]; 3],
-    /// Greatest product of the normal with a point that is not out.
+    /// Maximum dot product of the normal and a point that is not outside.
     edge: [f32; LANES],
-    /// By axis whether a box's corner that is farthest inside has its low (0) or its high side (1).
+    /// By axis, whether the innermost corner of a box is on its low (0) or high side (1).
     inner: [[u32; LANES]; 3],
-    /// Four directions, by axis: every ray is a sum of them, none of them taken away.
+    /// Four directions, by axis: every ray is a nonnegative combination of them.
     pub(crate) corners: [[f32; 4]; 3],
 }
 
-/// Where the rays start, as far as the pyramid needs it.
+/// Origins of the rays, as far as the pyramid needs them.
 #[derive(Default)]
 pub(crate) struct Start {
-    /// The point that coordinates are relative to.
+    /// The reference point to which coordinates are relative.
     pub(crate) reference: [f32; 3],
-    /// Greatest coordinate of it.
+    /// Its largest coordinate, in absolute value.
     pub(crate) reach: f32,
-    /// Greatest offset of a start from the reference, by the sum of its coordinates.
+    /// Maximum L1 distance of an origin from the reference.
     pub(crate) spread: f32,
 }
 
@@ -89,8 +89,8 @@ impl Pyramid {
         }
     }
 
-    /// Finds the sides around directions in rows, among things whose coordinates reach so far; whether they are a
-    /// narrow cone.
+    /// Computes the sides around the directions, for geometry whose coordinates do not exceed `reach`. Returns whether
+    /// the rays form a narrow cone.
     #[inline(always)]
     pub(crate) fn surround<S: Simd, const R: usize>(
         &mut self,
@@ -109,7 +109,7 @@ impl Pyramid {
         let Some(forward) = unit([sum[0].reduce_sum(), sum[1].reduce_sum(), sum[2].reduce_sum()]) else {
             return false;
         };
-        // The ray farthest from the middle shows how the bundle lies.
+        // The ray farthest from the axis determines how the pyramid is oriented.
         let (mut farthest, mut most) = ([0.0; 3], -1.0);
         let mut least = f32x16::splat(simd, f32::INFINITY);
         for row in 0..R {
@@ -120,7 +120,7 @@ impl Pyramid {
                 f32x16::splat(simd, forward[1]),
                 f32x16::splat(simd, forward[2]),
             ];
-            let off = lanes::less(&d, &middle);
+            let off = lanes::minus(&d, &middle);
             let square = lanes::dot(&off, &off);
             let greatest = square.reduce_max();
             if greatest > most {
@@ -207,8 +207,8 @@ impl Pyramid {
         true
     }
 
-    /// The normals of the two sides without an axis, the others being a and b; `false` if the rays go along that axis:
-    /// then nothing is out.
+    /// Computes the normals of the two sides of the projection along `axis`; a and b are the other axes. Returns `false`
+    /// if the rays are nearly parallel to `axis`, so that the projection excludes nothing.
     #[inline(always)]
     fn project<S: Simd>(
         &mut self,
@@ -217,7 +217,7 @@ impl Pyramid {
         axis: usize,
         (a, b): (usize, usize),
     ) -> bool {
-        // The slope of the lesser over the greater.
+        // Slope of the minor over the major coordinate.
         let (i, j) = if forward[a].abs() >= forward[b].abs() {
             (a, b)
         } else {
@@ -234,7 +234,7 @@ impl Pyramid {
         if least < 0.05 {
             return false;
         }
-        // Products of slopes are rounded as the corners are.
+        // Products of slopes are rounded like the corners.
         let pad = 4.0 * SLOPE_SLACK * (1.0 + low.abs().max(high.abs()));
         let (low, high) = (low - pad, high + pad);
         let (above, below) = if sign > 0.0 { (high, low) } else { (low, high) };
@@ -243,12 +243,12 @@ impl Pyramid {
         true
     }
 
-    /// Moves the sides to where the rays start.
+    /// Moves the sides to the origins of the rays.
     #[inline(always)]
     fn place<S: Simd>(&mut self, simd: S, start: &Start, reach: f32) {
-        // Products of points and normals, and the reference, are rounded.
+        // Covers the rounding of the dot products and of the reference.
         let slack = f32x16::splat(simd, 16.0 * ROUNDING * (reach + start.reach + start.spread));
-        // The rounding of the one start, or how far others are from the reference.
+        // The rounding of the common origin, or the distance of the origins from the reference.
         let apart = f32x16::splat(simd, start.spread.max(2.0 * ROUNDING * start.reach));
         let normal = [
             f32x16::simd_from(simd, self.normal[0]),
@@ -265,7 +265,7 @@ impl Pyramid {
         }
     }
 
-    /// Which of eight boxes some ray may meet before `limit`, and a way along a ray that is shorter than that to them.
+    /// Returns which of eight boxes a ray may hit before `limit`, and a lower bound on the distance to each.
     #[inline(always)]
     pub(crate) fn boxes<S: Simd>(
         &self,
@@ -293,7 +293,7 @@ impl Pyramid {
             #[inline(always)]
             |side: usize| term(side, 2, term(side, 1, term(side, 0, splat(-self.edge[side])))),
         );
-        // Without one of the axes.
+        // In the projection along one axis.
         let two = inlined(
             #[inline(always)]
             |side: usize, a: usize, b: usize| term(side, a, term(side, b, splat(-self.edge[side]))),
@@ -311,7 +311,7 @@ impl Pyramid {
         (met.to_bitmask() as u32, near)
     }
 
-    /// Which of eight triangles some ray may meet.
+    /// Returns which of eight triangles a ray may hit.
     #[inline(always)]
     pub(crate) fn triangles<S: Simd>(&self, simd: S, corners: &[[f32x8<S>; 3]; 3]) -> u32 {
         let splat = inlined(

@@ -1,7 +1,8 @@
-//! Rays side by side, and moved into another frame eight at a time with the operations of one alone, in their order.
+//! Rays in structure-of-arrays form. Eight at a time are transformed into another frame, by the same operations in the
+//! same order as for a single ray.
 
 use crate::lanes::{inlined, unfused};
-use crate::packet::rows::{HALF, LANES as ROW, MOST, Wide};
+use crate::packet::rows::{F64Rows, HALF, LANES as ROW, MOST};
 use crate::ray::Ray;
 use catoptric_model::Pose;
 use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
@@ -10,10 +11,10 @@ use std::ops::Range;
 
 const LANES: usize = HALF;
 
-/// Rays that are put in their places at a time.
+/// Rays that are appended per block.
 const BLOCK: usize = 64;
 
-/// Rays side by side: each coordinate of all of them in a row of its own, starts in metres, directions of length 1.
+/// Rays as a structure of arrays: one array per coordinate, origins in meters, directions of length 1.
 ///
 /// ```
 /// # use catoptric_cast::{Ray, Rays};
@@ -25,28 +26,29 @@ const BLOCK: usize = 64;
 #[derive(Debug, Clone, Default)]
 pub struct Rays {
     count: usize,
-    /// A bundle more than there are, so that whole bundles can be taken from any ray on; what is there is of no account.
+    /// One packet longer than `count`, so that a full packet can be read from any ray on; the rest is padding, never
+    /// read as data.
     origin: [Vec<f64>; 3],
     direction: [Vec<f64>; 3],
 }
 
 impl Rays {
-    /// How many.
+    /// Returns the number of rays.
     pub fn len(&self) -> usize {
         self.count
     }
 
-    /// Whether there are none.
+    /// Whether there are no rays.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// Forgets them and keeps their place in memory.
+    /// Removes all rays and keeps the allocated memory.
     pub fn clear(&mut self) {
         self.count = 0;
     }
 
-    /// Makes room for so many more.
+    /// Makes room for `more` rays and the padding.
     fn make_room(&mut self, more: usize) {
         let wanted = self.count + more + MOST;
         if self.origin[0].len() < wanted {
@@ -56,9 +58,9 @@ impl Rays {
         }
     }
 
-    /// Adds some of others.
+    /// Appends a range of other rays.
     pub fn extend_from(&mut self, others: &Self, which: Range<usize>) {
-        assert!(which.end <= others.count, "they are there");
+        assert!(which.end <= others.count, "range within the rays");
         self.make_room(which.len());
         let own = self.count..self.count + which.len();
         for k in 0..3 {
@@ -68,16 +70,16 @@ impl Rays {
         self.count = own.end;
     }
 
-    /// Adds some of others, moved into another frame: what [`placed`](crate::placed) makes of each of them, to the bit.
+    /// Appends a range of other rays, transformed into another frame: bit-identical to [`placed`](crate::placed).
     pub fn extend_placed(&mut self, others: &Self, which: Range<usize>, other_from_ray: &Pose) {
-        assert!(which.end <= others.count, "they are there");
+        assert!(which.end <= others.count, "range within the rays");
         self.make_room(which.len());
         let own = self.count;
         self.count += which.len();
         dispatch!(Level::new(), simd => self.place(simd, own, others, which, other_from_ray));
     }
 
-    /// There is room for eight beyond the last, and eight may be read there.
+    /// Reads and writes whole groups of eight, also beyond the last ray: the padding has room for them.
     #[inline(always)]
     fn place<S: Simd>(&mut self, simd: S, own: usize, others: &Self, which: Range<usize>, pose: &Pose) {
         let splat = inlined(
@@ -109,37 +111,37 @@ impl Rays {
         }
     }
 
-    /// One of them.
+    /// Returns one ray.
     ///
     /// # Panics
-    /// If there are not so many.
+    /// If the index is out of range.
     #[inline(always)]
     pub fn get(&self, ray: usize) -> Ray {
-        assert!(ray < self.count, "it is there");
+        assert!(ray < self.count, "ray index in range");
         let [ox, oy, oz] = &self.origin;
         let [dx, dy, dz] = &self.direction;
         Ray {
             origin: Point3::new(ox[ray], oy[ray], oz[ray]),
-            // As it came.
+            // Stored with unit length; renormalizing could change the last bit.
             direction: Unit::new_unchecked(Vector3::new(dx[ray], dy[ray], dz[ray])),
         }
     }
 
-    /// All of them, one by one.
+    /// Iterates over the rays.
     pub fn iter(&self) -> impl Iterator<Item = Ray> {
         (0..self.count).map(|ray| self.get(ray))
     }
 
-    /// Coordinates of where they start and of where they go, by axis, from one of them on for so many rows.
+    /// Returns the origins and the directions, by axis: `R` rows from ray `from` on.
     #[inline(always)]
-    pub(crate) fn rows<'a, const R: usize>(&'a self, from: usize) -> [Wide<'a, R>; 2] {
+    pub(crate) fn rows<'a, const R: usize>(&'a self, from: usize) -> [F64Rows<'a, R>; 2] {
         let three = inlined(
             #[inline(always)]
             |of: &'a [Vec<f64>; 3]| {
                 [
-                    bundle(&of[0][from..]),
-                    bundle(&of[1][from..]),
-                    bundle(&of[2][from..]),
+                    first_rows(&of[0][from..]),
+                    first_rows(&of[1][from..]),
+                    first_rows(&of[2][from..]),
                 ]
             },
         );
@@ -147,12 +149,12 @@ impl Rays {
     }
 }
 
-/// The first so many rows.
+/// Returns the first `R` rows.
 #[inline(always)]
-fn bundle<const R: usize>(of: &[f64]) -> &[[f64; ROW]; R] {
+fn first_rows<const R: usize>(of: &[f64]) -> &[[f64; ROW]; R] {
     match of.as_chunks().0.first_chunk() {
         Some(rows) => rows,
-        None => unreachable!("there is a bundle more than there are rays"),
+        None => unreachable!("the arrays are one packet longer than the rays"),
     }
 }
 
@@ -161,7 +163,7 @@ impl Extend<Ray> for Rays {
         let mut rays = rays.into_iter();
         let mut next = rays.next();
         while next.is_some() {
-            // In blocks, so that a place is looked for once in a while.
+            // In blocks, so that memory is checked and bounds are taken once per block.
             self.make_room(BLOCK);
             let from = self.count;
             let [x, y, z] = self.origin.each_mut().map(|row| &mut row[from..from + BLOCK]);
@@ -209,7 +211,7 @@ mod tests {
     use nalgebra::{Translation3, UnitQuaternion};
 
     #[test]
-    fn many_rays_are_moved_as_each_alone_to_the_bit() {
+    fn many_rays_transform_bit_identically_to_single_rays() {
         let pose = Pose::from_parts(
             Translation3::new(0.3, -1.7, 2.9),
             UnitQuaternion::from_scaled_axis(Vector3::new(0.4, -1.1, 0.7)),
@@ -225,7 +227,7 @@ mod tests {
         let mut moved = Rays::default();
         for count in [0, 1, 7, 8, 9, 19, 61] {
             moved.clear();
-            // Not at the beginning of either.
+            // At an offset in both source and destination.
             moved.extend([ray(0)]);
             moved.extend_placed(&all, 3..3 + count, &pose);
             let each: Vec<Ray> = (3..3 + count).map(|i| placed(&all.get(i), &pose)).collect();

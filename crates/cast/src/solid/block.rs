@@ -1,4 +1,4 @@
-//! A ray against a box.
+//! Intersection of a ray with an oriented box.
 
 use crate::ray::{FARTHEST, Ray};
 use catoptric_model::Pose;
@@ -7,7 +7,7 @@ use parry3d::math::Vector;
 use parry3d::query::RayCast;
 use parry3d::shape::Cuboid;
 
-/// A box in its own pose.
+/// An oriented box.
 #[derive(Debug, Clone)]
 pub struct Block {
     pub(crate) sensor_from_block: Pose,
@@ -15,7 +15,7 @@ pub struct Block {
 }
 
 impl Block {
-    /// A box of the given extents, in metres, centered on its own frame.
+    /// A box of the given extents, in meters, centered on its frame.
     pub fn new(sensor_from_block: Pose, size: Vector3<f64>) -> Self {
         Self {
             sensor_from_block,
@@ -23,7 +23,7 @@ impl Block {
         }
     }
 
-    /// Distance and outward normal where a ray enters the box, or leaves it if it starts inside.
+    /// Returns distance and outward normal where a ray enters the box, or leaves it if it starts inside.
     pub(crate) fn cast(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
         let origin = self.sensor_from_block.inverse_transform_point(&ray.origin);
         let direction = self.sensor_from_block.inverse_transform_vector(&ray.direction);
@@ -46,7 +46,7 @@ impl Block {
     }
 }
 
-/// A vector as parry has it.
+/// Converts a vector to parry's type.
 pub(crate) fn to_glam(v: &Vector3<f64>) -> Vector {
     Vector::new(v.x, v.y, v.z)
 }

@@ -1,10 +1,10 @@
-//! A ray against a solid cylinder with flat caps, in closed form.
+//! Closed-form intersection of a ray with a solid cylinder with flat caps.
 
 use crate::ray::Ray;
 use catoptric_model::Pose;
 use nalgebra::{Point3, Unit, Vector3};
 
-/// A solid cylinder about the z axis of its own frame, centered on its origin.
+/// A solid cylinder about the z axis of its frame, centered on the origin.
 #[derive(Debug, Clone)]
 pub struct Cylinder {
     pub(crate) frame_from_cylinder: Pose,
@@ -12,11 +12,11 @@ pub struct Cylinder {
     pub(crate) half_height: f64,
 }
 
-/// A place on a ray, and the outward normal there in the cylinder's own frame.
+/// Distance along a ray, and the outward normal there in the cylinder's frame.
 type Side = (f64, Vector3<f64>);
 
 impl Cylinder {
-    /// A cylinder of the given diameter and height, in metres.
+    /// A cylinder of the given diameter and height, in meters.
     pub fn new(frame_from_cylinder: Pose, diameter: f64, height: f64) -> Self {
         Self {
             frame_from_cylinder,
@@ -25,10 +25,10 @@ impl Cylinder {
         }
     }
 
-    /// Distance and outward normal where a ray enters the cylinder, or leaves it if it starts inside.
+    /// Returns distance and outward normal where a ray enters the cylinder, or leaves it if it starts inside.
     ///
-    /// The solid is the part of the round column x² + y² ≤ r² between the planes z = ±h: the ray is inside it where
-    /// its stretch inside the column, a quadratic's two roots, overlaps its stretch between the planes.
+    /// The solid is the part of the infinite cylinder x² + y² ≤ r² between the planes z = ±h. The ray is inside it where
+    /// its interval inside that cylinder, between the roots of a quadratic, overlaps its interval between the planes.
     pub(crate) fn cast(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
         let origin = self.frame_from_cylinder.inverse_transform_point(&ray.origin);
         let direction = self.frame_from_cylinder.inverse_transform_vector(&ray.direction);
@@ -52,7 +52,7 @@ impl Cylinder {
             .then(|| (distance, Unit::new_normalize(self.frame_from_cylinder * normal)))
     }
 
-    /// Where the ray is inside the endless column.
+    /// Returns the interval of the ray inside the infinite cylinder.
     fn column(&self, o: &Point3<f64>, d: &Vector3<f64>) -> Option<(Side, Side)> {
         let square = d.x * d.x + d.y * d.y;
         let outside = o.x * o.x + o.y * o.y - self.radius * self.radius;
@@ -61,13 +61,13 @@ impl Cylinder {
             return (outside <= 0.0).then_some(((f64::NEG_INFINITY, nowhere), (f64::INFINITY, nowhere)));
         }
         let half = o.x * d.x + o.y * d.y;
-        // half² − square·outside, with the distance of the line from the axis written out: nothing cancels far away.
+        // half² − square·outside, in terms of the line's distance from the axis to avoid cancellation far away.
         let aside = o.x * d.y - o.y * d.x;
         let discriminant = square * self.radius * self.radius - aside * aside;
         if discriminant < 0.0 {
             return None;
         }
-        // The root in which nothing cancels, and the other by Vieta's formula.
+        // The root without cancellation, and the other by Vieta's formula.
         let sum = -(half + f64::copysign(discriminant.sqrt(), half));
         let (a, b) = (
             sum / square,
@@ -77,7 +77,7 @@ impl Cylinder {
         Some((at(a.min(b)), at(a.max(b))))
     }
 
-    /// Where the ray is between the planes of the caps.
+    /// Returns the interval of the ray between the planes of the caps.
     fn caps(&self, o: &Point3<f64>, d: &Vector3<f64>) -> Option<(Side, Side)> {
         if d.z == 0.0 {
             let nowhere = Vector3::z();
@@ -89,7 +89,7 @@ impl Cylinder {
         Some((at(-side), at(side)))
     }
 
-    /// Corners of a box around it.
+    /// Returns the corners of an enclosing box.
     pub(crate) fn corners(&self) -> Vec<Point3<f64>> {
         let sign = |i: u8, bit: u8| if i & bit == 0 { -1.0 } else { 1.0 };
         (0..8)
@@ -116,22 +116,22 @@ mod tests {
     }
 
     #[test]
-    fn side_caps_and_inside_are_where_they_should_be() {
+    fn side_caps_and_inside_are_hit_at_the_expected_distances() {
         let cylinder = Cylinder::new(Pose::identity(), 2.0, 4.0);
         let hit = |o, d| cylinder.cast(&ray(o, d)).map(|(t, n)| (t, n.into_inner()));
         let close = |found: Option<(f64, Vector3<f64>)>, t: f64, n: [f64; 3]| {
-            let (distance, normal) = found.expect("it is met");
+            let (distance, normal) = found.expect("a hit");
             assert!((distance - t).abs() < 1e-14 && (normal - Vector3::from(n)).norm() < 1e-14);
         };
         close(hit([-5.0, 0.0, 0.0], [1.0, 0.0, 0.0]), 4.0, [-1.0, 0.0, 0.0]);
         close(hit([0.5, 0.5, 9.0], [0.0, 0.0, -1.0]), 7.0, [0.0, 0.0, 1.0]);
-        // At half the radius aside, the side is met at √(1 − 1/4) from the middle.
+        // A ray offset by half the radius hits the side at √(1 − 1/4) from the middle.
         close(
             hit([-5.0, 0.5, 1.0], [1.0, 0.0, 0.0]),
             5.0 - 0.75_f64.sqrt(),
             [-(0.75_f64.sqrt()), 0.5, 0.0],
         );
-        // From inside it is left.
+        // From inside, the hit is where the ray leaves.
         close(hit([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]), 2.0, [0.0, 0.0, 1.0]);
         assert!(hit([-5.0, 1.0 + 1e-12, 0.0], [1.0, 0.0, 0.0]).is_none());
         assert!(hit([1.0 + 1e-12, 0.0, 9.0], [0.0, 0.0, -1.0]).is_none());
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn every_hit_lies_on_the_surface_and_every_miss_stays_outside() {
+    fn every_hit_is_on_the_surface_and_every_miss_stays_outside() {
         let pose = Pose::from_parts(Translation3::new(0.3, -0.2, 0.5), yaw_pitch_roll(0.4, 0.8, -0.3));
         let cylinder = Cylinder::new(pose, 0.8, 1.4);
         let mut draws = Draws::new(5, 0);
@@ -161,7 +161,7 @@ mod tests {
                 assert!(depth(t).abs() < 1e-13);
                 if depth(0.0) < 0.0 {
                     assert!(normal.dot(&ray.direction) < 0.0);
-                    // Sampled on the way there it is outside.
+                    // Points sampled before the hit are outside.
                     assert!((0..50).all(|i| depth(t * f64::from(i) / 50.0) < 1e-12));
                 }
             } else {

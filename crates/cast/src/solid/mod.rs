@@ -1,4 +1,4 @@
-//! Shapes that a ray meets in closed form.
+//! Shapes with a closed-form ray intersection: polygon, box and cylinder.
 
 pub(crate) mod block;
 mod cylinder;

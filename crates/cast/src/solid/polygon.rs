@@ -1,9 +1,9 @@
-//! A ray against a convex plane polygon, exactly.
+//! Exact intersection of a ray with a convex plane polygon.
 
 use crate::ray::{FARTHEST, Ray};
 use nalgebra::{Point3, Unit, Vector3};
 
-/// A convex plane polygon; its front is the side from which the corners run counter-clockwise.
+/// A convex plane polygon; its front is the side from which the corners are counterclockwise.
 #[derive(Debug, Clone)]
 pub struct Polygon {
     /// A point of the plane: the first corner.
@@ -12,16 +12,16 @@ pub struct Polygon {
     pub normal: Unit<Vector3<f64>>,
     /// The corners.
     pub corners: Vec<Point3<f64>>,
-    /// For every edge, the unit vector in the plane that points inwards, and its product with the edge's points.
+    /// For every edge, the inward unit vector in the plane, and its dot product with any point of the edge.
     pub(crate) edges: Vec<(Vector3<f64>, f64)>,
 }
 
-/// Slack at a polygon's edge, in metres: two polygons that share an edge leave no gap between them, and the slack is
-/// smaller than any distance that matters by six orders of magnitude.
+/// Slack at a polygon's edge, in meters: polygons that share an edge leave no gap, and the slack is six orders of
+/// magnitude below any distance that matters.
 pub(crate) const EDGE_SLACK: f64 = 1e-12;
 
 impl Polygon {
-    /// The polygon with these corners. `None` if they span no area.
+    /// Returns the polygon with these corners, or `None` if their area is zero.
     pub fn new(corners: Vec<Point3<f64>>) -> Option<Self> {
         let normal = Unit::try_new(area_vector(&corners), f64::MIN_POSITIVE)?;
         let next = corners.iter().cycle().skip(1);
@@ -41,11 +41,11 @@ impl Polygon {
         })
     }
 
-    /// Distance at which a ray meets the polygon, from either side.
+    /// Returns the distance at which a ray hits the polygon, from either side.
     pub(crate) fn cast(&self, ray: &Ray) -> Option<f64> {
         let closing = self.normal.dot(&ray.direction);
         let distance = self.normal.dot(&(self.origin - ray.origin)) / closing;
-        // A ray along the plane gives an infinity or NaN, which fails the comparison.
+        // A ray parallel to the plane yields an infinity or NaN, which fails the comparison.
         if !(distance > 0.0 && distance < FARTHEST) {
             return None;
         }
@@ -53,20 +53,21 @@ impl Polygon {
         self.contains(&point).then_some(distance)
     }
 
-    /// Whether a point of its plane lies within its outline.
+    /// Whether a point of the plane is within the outline.
     pub fn contains(&self, point: &Point3<f64>) -> bool {
         self.edges
             .iter()
             .all(|(inwards, edge)| inwards.dot(&point.coords) >= edge - EDGE_SLACK)
     }
 
-    /// The same outline, seen from the other side.
+    /// Returns the same outline with front and back exchanged.
     pub fn turned(&self) -> Option<Self> {
         Self::new(self.corners.iter().rev().copied().collect())
     }
 }
 
-/// Twice the vector area of a polygon (Newell): its direction is the normal seen counter-clockwise.
+/// Returns twice the vector area of a polygon (Newell): its direction is the normal of the side from which the corners are
+/// counterclockwise.
 pub fn area_vector(corners: &[Point3<f64>]) -> Vector3<f64> {
     let closed = corners.iter().zip(corners.iter().cycle().skip(1));
     closed.map(|(a, b)| a.coords.cross(&b.coords)).sum()

@@ -1,4 +1,5 @@
-//! A bundle of rays in lanes of f32, and the pyramid around it.
+//! Ray packets: directions and origins in f32 lanes, with the pyramid that encloses them. Rays that do not form a narrow
+//! cone are split into smaller packets, or cast individually.
 
 use crate::lanes::{cross, size};
 use crate::packet::in_rows::InRows;
@@ -8,22 +9,22 @@ use crate::packet::rows::{FOUR_ROWS, HALF, LANES, MOST, ROWS, Rows, TWO_ROWS, Ve
 use fearless_simd::{Simd, f32x16, f64x8, prelude::*};
 use std::ops::Range;
 
-/// Greatest offset of a start, as a part of how far all things reach.
+/// Maximum offset of an origin from the reference, as a fraction of the scene's reach.
 const TOGETHER: f32 = 0.02;
 
-/// A bundle.
-pub(crate) struct Bundle<'a, const R: usize> {
+/// Rays cast together, in `R` rows of lanes.
+pub(crate) struct Packet<'a, const R: usize> {
     pub(crate) rays: InRows<'a, R>,
     pub(crate) start: Start,
     pub(crate) direction: Vectors<f32, R>,
-    /// If they do not all start at one point, starts relative to the reference.
+    /// Origins relative to the reference, if the rays do not share one origin.
     pub(crate) offset: Vectors<f32, R>,
-    /// And direction × offset.
+    /// direction × offset, under the same condition.
     pub(crate) moment: Vectors<f32, R>,
     pub(crate) pyramid: Pyramid,
 }
 
-impl<'a, const R: usize> Bundle<'a, R> {
+impl<'a, const R: usize> Packet<'a, R> {
     pub(crate) fn new(rays: &'a Rays, which: Range<usize>) -> Self {
         Self {
             rays: InRows::of(rays, which),
@@ -35,13 +36,14 @@ impl<'a, const R: usize> Bundle<'a, R> {
         }
     }
 
-    /// Whether the rays do not all start at one point.
+    /// Whether the rays have different origins.
     #[inline(always)]
     pub(crate) fn apart(&self) -> bool {
         self.rays.common.is_none()
     }
 
-    /// Finds what there is to know of the rays among things whose coordinates reach so far; whether they are a narrow cone.
+    /// Computes the f32 rows and the pyramid for geometry whose coordinates do not exceed `reach`. Returns whether the rays
+    /// form a narrow cone.
     #[inline(always)]
     pub(crate) fn surround<S: Simd>(&mut self, simd: S, reach: f32) -> bool {
         self.rays.narrow(simd, &mut self.direction);
@@ -60,7 +62,7 @@ impl<'a, const R: usize> Bundle<'a, R> {
         self.pyramid.surround(simd, &self.direction, &self.start, reach)
     }
 
-    /// Finds how rays start apart from the reference; not less than the greatest sum of an offset's coordinates.
+    /// Computes the offsets from the reference and the moments. Returns an upper bound on the offsets' L1 norm.
     #[inline(always)]
     fn part<S: Simd>(&mut self, simd: S) -> f32 {
         for k in 0..3 {
@@ -86,25 +88,25 @@ impl<'a, const R: usize> Bundle<'a, R> {
     }
 }
 
-/// What rays can be cast into, each by itself or as a bundle of so many rows.
+/// Geometry that rays can be cast into, individually or as packets of `R` rows.
 pub(crate) trait Caster<T> {
-    /// What each of some rays meets.
+    /// Finds the hit of each ray individually.
     fn cast_each(&self, rays: &Rays, which: Range<usize>, found: &mut [T]);
 
-    /// Whether rays are a narrow cone; then also what each of them meets.
+    /// Returns whether the rays form a narrow cone; if they do, also finds the hit of each.
     fn cast_rows<const R: usize>(&self, rays: &Rays, which: Range<usize>, found: &mut [T]) -> bool;
 }
 
-/// What each of some rays meets, as many at a time as fit in a bundle.
+/// Finds the hit of each ray, one full packet at a time.
 pub(crate) fn cast_all<T>(caster: &impl Caster<T>, rays: &Rays, found: &mut [T]) {
-    assert_eq!(rays.len(), found.len(), "every ray has its place");
+    assert_eq!(rays.len(), found.len(), "one result slot per ray");
     for (number, found) in found.chunks_mut(MOST).enumerate() {
         let first = number * MOST;
         cast_some(caster, rays, first..first + found.len(), found);
     }
 }
 
-/// What is no narrow cone may be two, unless it is few rays.
+/// Casts one packet. If the rays do not form a narrow cone, each half is tried again; few rays are cast individually.
 fn cast_some<T>(caster: &impl Caster<T>, rays: &Rays, which: Range<usize>, found: &mut [T]) {
     let all = which.clone();
     let narrow = match which.len() {
