@@ -1,6 +1,6 @@
 //! Point clouds as files: PLY (binary little-endian) and PCD (version 0.7, binary).
 //!
-//! Both hold x, y, z in metres as 32-bit floats, the beam as an unsigned 16-bit and the scan as an unsigned 32-bit
+//! Both hold x, y, z in meters as 32-bit floats, the beam as an unsigned 16-bit and the scan as an unsigned 32-bit
 //! integer. The frame stands in a comment of the header.
 
 use catoptric_model::cloud::{CloudFrame, CloudPoint, PointCloud};
@@ -138,7 +138,7 @@ pub fn point_bytes(point: &CloudPoint) -> io::Result<[u8; POINT_BYTES]> {
     let scan = u32::try_from(point.scan).map_err(|_| too_large("scan", point.scan))?;
     let mut bytes = [0; POINT_BYTES];
     for (axis, place) in point.position.iter().zip(bytes.chunks_exact_mut(4)) {
-        // The file holds 32-bit floats: at 30 m they are good to two micrometres.
+        // The file holds 32-bit floats: at 30 m they are good to two micrometers.
         #[allow(clippy::cast_possible_truncation)]
         place.copy_from_slice(&(*axis as f32).to_le_bytes());
     }

@@ -1,6 +1,6 @@
 //! The messages of a recording as bytes: encoding what we write, decoding what we need.
 //!
-//! Fields stand in the order of [`definitions`](super::definitions). Times are nanoseconds since 1970, lengths metres.
+//! Fields stand in the order of [`definitions`](super::definitions). Times are nanoseconds since 1970, lengths meters.
 
 use super::cdr::{CdrError, CdrReader, CdrWriter};
 use catoptric_model::beam;
@@ -57,7 +57,7 @@ pub struct Scan {
     pub angle_increment: f64,
     /// Time from scan to scan, in seconds.
     pub scan_time: f64,
-    /// Readings in metres, with the codes of REP-117.
+    /// Readings in meters, with the codes of REP-117.
     pub ranges: Vec<f64>,
 }
 
@@ -68,7 +68,7 @@ pub struct LabelledMarker {
     pub name: String,
     /// Place in the template of its body.
     pub index: usize,
-    /// Place in the room, in metres.
+    /// Place in the room, in meters.
     pub point: Point3<f64>,
 }
 

@@ -1,6 +1,6 @@
-//! Tables 1 to 4 as the paper prints them (Cooper, Raquet, Patton 2018), in millimetres and degrees.
+//! Tables 1 to 4 as the paper prints them (Cooper, Raquet, Patton 2018), in millimeters and degrees.
 
-/// Table 1: distance in metres, height and width of the spot of three neighbouring beams.
+/// Table 1: distance in meters, height and width of the spot of three neighboring beams.
 pub const TABLE_1: [(f64, f64, f64); 5] = [
     (0.5, 3.2, 15.9),
     (1.0, 4.0, 33.3),
@@ -9,7 +9,7 @@ pub const TABLE_1: [(f64, f64, f64); 5] = [
     (4.0, 6.3, 136.5),
 ];
 
-/// Table 2: distance in metres, mean error and standard deviation of each of three trials.
+/// Table 2: distance in meters, mean error and standard deviation of each of three trials.
 pub const TABLE_2: [(f64, [f64; 3], [f64; 3]); 3] = [
     (0.5, [-1.7, -3.2, -3.6], [4.1, 4.1, 4.2]),
     (2.0, [7.0, 5.8, 5.4], [3.8, 3.9, 3.9]),
@@ -23,10 +23,10 @@ pub const TABLE_3: [(f64, [f64; 3]); 3] = [
     (-44.7, [35.4, 35.7, 33.0]),
 ];
 
-/// A_a and B_a of the least-squares line through Table 3's means over cos θ_N, which is the paper's Eq. 4.
+/// A_a and B_a of the least-squares line through Table 3's means over cos θ_N, which is the paper's Eq. (4).
 pub const EQUATION_4: [f64; 2] = [-70.3, 86.1];
 
-/// Distances of Table 4, in metres.
+/// Distances of Table 4, in meters.
 pub const TABLE_4_RANGE_M: [f64; 4] = [0.493, 1.011, 1.600, 2.007];
 
 /// Table 4: standard deviations at those distances, by color.

@@ -4,17 +4,17 @@ use crate::beam::Deflection;
 use crate::board::BoardPlane;
 use serde::{Deserialize, Serialize};
 
-/// A range as the scanner reports it, biases included, in metres.
+/// A range as the scanner reports it, biases included, in meters.
 ///
-/// The paper writes r(x̂) before and after Eq. 3; here the two are different types.
+/// The paper writes r(x̂) before and after Eq. (3); here the two are different types.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Serialize, Deserialize)]
 pub struct RawRange(pub f64);
 
-/// A range after Eq. 3, biases subtracted, in metres.
+/// A range after Eq. (3), biases subtracted, in meters.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Serialize, Deserialize)]
 pub struct CorrectedRange(pub f64);
 
-/// Range of a deflected beam on a plane, in metres: r = d + s — Cooper, Eq. (6).
+/// Range of a deflected beam on a plane, in meters: r = d + s — Cooper, Eq. (6).
 ///
 /// `None` if the outgoing ray does not meet the plane.
 #[doc(alias = "r")]

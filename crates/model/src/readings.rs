@@ -35,9 +35,9 @@ pub struct BeamStatistics {
     pub all: Moments,
     /// The ranges of the first half of the scans, and of the second; the middle one of an odd number is in the second.
     pub halves: [Moments; 2],
-    /// The least range, in metres; ∞ without any.
+    /// The least range, in meters; ∞ without any.
     pub least: f64,
-    /// The largest range, in metres; −∞ without any.
+    /// The largest range, in meters; −∞ without any.
     pub largest: f64,
 }
 
@@ -114,7 +114,7 @@ impl Gathered {
     }
 }
 
-/// The readings of a stretch in metres; −∞ too close, +∞ no return, NaN invalid (REP-117).
+/// The readings of a stretch in meters; −∞ too close, +∞ no return, NaN invalid (REP-117).
 ///
 /// Two are equal if they hold equal readings; of recordings, which are not read for that, if their statistics are.
 #[derive(Clone)]

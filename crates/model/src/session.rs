@@ -53,9 +53,9 @@ pub struct ScannerSheet {
     pub preset: String,
     /// How it scans.
     pub scan: ScanGeometry,
-    /// Shortest range, in metres.
+    /// Shortest range, in meters.
     pub range_min_m: f64,
-    /// Longest range, in metres.
+    /// Longest range, in meters.
     pub range_max_m: f64,
     /// Full 1/e² divergence of a beam along the longer axis of its spot, in milliradians.
     pub divergence_full_mrad: f64,
@@ -88,7 +88,7 @@ struct FlatSheet {
 pub struct MountTolerance {
     /// Turn about x, y and z, in degrees.
     pub rotation_sd_deg: [f64; 3],
-    /// Shift along x, y and z, in millimetres.
+    /// Shift along x, y and z, in millimeters.
     pub translation_sd_mm: [f64; 3],
 }
 
@@ -96,9 +96,9 @@ pub struct MountTolerance {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RoomSurvey {
-    /// Corner with the smallest coordinates, in metres.
+    /// Corner with the smallest coordinates, in meters.
     pub min_m: [f64; 3],
-    /// Corner with the largest coordinates, in metres.
+    /// Corner with the largest coordinates, in meters.
     pub max_m: [f64; 3],
     /// Color of walls, floor and ceiling.
     pub color: String,
@@ -108,22 +108,22 @@ pub struct RoomSurvey {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Beliefs {
-    /// White noise of one reading, in millimetres.
+    /// White noise of one reading, in millimeters.
     pub range_noise_sd_mm: f64,
-    /// Drift constant of one pose, in millimetres.
+    /// Drift constant of one pose, in millimeters.
     pub drift_sd_mm: f64,
-    /// Constant of one beam in one pose, in millimetres: what more readings do not average out.
+    /// Constant of one beam in one pose, in millimeters: what more readings do not average out.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub element_sd_mm: f64,
-    /// Constant error of one marker coordinate, in millimetres.
+    /// Constant error of one marker coordinate, in millimeters.
     pub marker_sd_mm: f64,
     /// The biases of step 1, as they were characterized.
     pub bias: RangeBias,
-    /// Uncertainty of E_r at each node of its table, in millimetres.
+    /// Uncertainty of E_r at each node of its table, in millimeters.
     pub distance_bias_sd_mm: f64,
-    /// Uncertainty of A_a, in millimetres, with B_a + A_a (the error at normal incidence) held.
+    /// Uncertainty of A_a, in millimeters, with B_a + A_a (the error at normal incidence) held.
     pub angle_gain_sd_mm: f64,
-    /// Uncertainty of E_c, in millimetres.
+    /// Uncertainty of E_c, in millimeters.
     pub color_bias_sd_mm: f64,
 }
 
@@ -175,9 +175,9 @@ impl Beliefs {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BareStructure {
-    /// Thickness of the mirrors, in millimetres, along their normals.
+    /// Thickness of the mirrors, in millimeters, along their normals.
     pub mirror_thickness_mm: f64,
-    /// Uncertainty of a bare distance, in millimetres.
+    /// Uncertainty of a bare distance, in millimeters.
     pub distance_sd_mm: f64,
     /// Whether the scanner itself ranged them, in one recording: then they share its drift there, and what is not known of
     /// the believed biases by which they are corrected. Both are part of the uncertainty.
@@ -185,7 +185,7 @@ pub struct BareStructure {
     pub scanned: bool,
     /// First beam of `distance_m`.
     pub first_beam: usize,
-    /// Mean bias-corrected range of each beam to the bare structure, in metres; 0 where there is none.
+    /// Mean bias-corrected range of each beam to the bare structure, in meters; 0 where there is none.
     pub distance_m: Vec<f64>,
 }
 
@@ -195,7 +195,7 @@ pub struct BareStructure {
 pub struct Marker {
     /// Label.
     pub name: String,
-    /// Place in its body's frame, in millimetres.
+    /// Place in its body's frame, in millimeters.
     pub position_mm: [f64; 3],
 }
 
@@ -205,7 +205,7 @@ pub struct Marker {
 pub struct NominalFacet {
     /// Name.
     pub name: String,
-    /// Corners in the nominal sensor frame, in millimetres, counter-clockwise seen from the reflecting side.
+    /// Corners in the nominal sensor frame, in millimeters, counter-clockwise seen from the reflecting side.
     pub corners_mm: Vec<[f64; 3]>,
     /// First and last beam that the drawing sends to this facet.
     pub beams: [usize; 2],
@@ -217,9 +217,9 @@ pub struct NominalFacet {
 pub struct BoardSheet {
     /// Name, which is also the motion-capture subject.
     pub name: String,
-    /// Extent along the board's x axis, in millimetres.
+    /// Extent along the board's x axis, in millimeters.
     pub width_mm: f64,
-    /// Extent along the board's y axis, in millimetres.
+    /// Extent along the board's y axis, in millimeters.
     pub height_mm: f64,
     /// Color.
     pub color: String,
@@ -266,14 +266,14 @@ impl From<ScannerSheet> for FlatSheet {
 }
 
 impl Marker {
-    /// Place in its body's frame, in metres.
+    /// Place in its body's frame, in meters.
     pub fn position(&self) -> Point3<f64> {
         Point3::from(Vector3::from(self.position_mm) * 1e-3)
     }
 }
 
 impl NominalFacet {
-    /// Corners in the nominal sensor frame, in metres.
+    /// Corners in the nominal sensor frame, in meters.
     pub fn corners(&self) -> Vec<Point3<f64>> {
         self.corners_mm
             .iter()
@@ -281,7 +281,7 @@ impl NominalFacet {
             .collect()
     }
 
-    /// Normal on the reflecting side and centre of the corners; `None` for fewer than three corners or a line.
+    /// Normal on the reflecting side and center of the corners; `None` for fewer than three corners or a line.
     pub fn plane(&self) -> Option<BoardPlane> {
         let corners = self.corners();
         // Newell's sum: exact for a plane polygon, the best plane's normal for one that is nearly so.
@@ -298,7 +298,7 @@ impl NominalFacet {
 }
 
 impl BoardSheet {
-    /// The board's outline, in metres.
+    /// The board's outline, in meters.
     pub fn outline(&self) -> Rectangle {
         Rectangle {
             width: self.width_mm * 1e-3,
@@ -330,7 +330,7 @@ impl RoomSurvey {
 }
 
 impl BareStructure {
-    /// Bare distance of a beam, in metres; `None` where the structure was not met.
+    /// Bare distance of a beam, in meters; `None` where the structure was not met.
     pub fn distance(&self, beam: usize) -> Option<f64> {
         let d = *self.distance_m.get(beam.checked_sub(self.first_beam)?)?;
         (d > 0.0).then_some(d)

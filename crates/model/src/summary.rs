@@ -3,7 +3,7 @@
 /// Standard deviations around the median that belong to the main body.
 const WINDOW_SIGMAS: f64 = 5.0;
 
-/// Half of the window at least, in metres: readings come in whole millimetres.
+/// Half of the window at least, in meters: readings come in whole millimeters.
 const LEAST_WINDOW: f64 = 2e-3;
 
 /// Standard deviation of a normal variable over the median of its |x|.
@@ -21,9 +21,9 @@ pub struct Summary {
     pub missing: usize,
     /// Ranges that are left out of the rest, since they are plainly of something else.
     pub outliers: usize,
-    /// Mean of the ranges, in metres; 0 without any.
+    /// Mean of the ranges, in meters; 0 without any.
     pub mean: f64,
-    /// Sample standard deviation, in metres; 0 for fewer than two.
+    /// Sample standard deviation, in meters; 0 for fewer than two.
     pub sd: f64,
 }
 
@@ -32,13 +32,13 @@ pub struct Summary {
 pub struct Moments {
     /// Ranges taken in.
     pub count: usize,
-    /// Their mean, in metres; 0 without any.
+    /// Their mean, in meters; 0 without any.
     pub mean: f64,
     /// The sum of their squared deviations from it, in m².
     pub squares: f64,
 }
 
-/// The limits of the main body of some ranges, in metres.
+/// The limits of the main body of some ranges, in meters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
     /// The least range that belongs to it.
@@ -64,7 +64,7 @@ impl Window {
         })
     }
 
-    /// Half the width of a window for noise of a standard deviation, in metres.
+    /// Half the width of a window for noise of a standard deviation, in meters.
     pub fn half_width(noise_sd: f64) -> f64 {
         LEAST_WINDOW + WINDOW_SIGMAS * noise_sd
     }

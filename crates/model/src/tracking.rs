@@ -20,7 +20,7 @@ pub struct TrackedFrame {
     pub time_s: f64,
     /// `room_from_body` as solved from the markers; `None` where too few were seen.
     pub pose: Option<Pose>,
-    /// The markers in the order of the body's template, in metres; `None` where one was not seen.
+    /// The markers in the order of the body's template, in meters; `None` where one was not seen.
     pub markers: Vec<Option<Point3<f64>>>,
 }
 
@@ -36,7 +36,7 @@ pub struct Track {
 /// A marker averaged over some frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeanMarker {
-    /// Its mean place in the room frame, in metres; the origin if it was never seen.
+    /// Its mean place in the room frame, in meters; the origin if it was never seen.
     pub place: Point3<f64>,
     /// Frames in which it was seen.
     pub count: usize,
@@ -49,7 +49,7 @@ pub struct Watched {
     pub subject: String,
     /// Equal parts of the stretch in order of time, and in each the markers in the order of the body's template.
     pub parts: Vec<Vec<MeanMarker>>,
-    /// How far a marker jumps about from frame to frame along one axis, 1σ, in metres; one movement does not count.
+    /// How far a marker jumps about from frame to frame along one axis, 1σ, in meters; one movement does not count.
     pub jitter: f64,
 }
 

@@ -103,7 +103,7 @@ impl Numbers {
     }
 }
 
-/// Readings in whole millimetres as 32-bit numbers, with every code in between.
+/// Readings in whole millimeters as 32-bit numbers, with every code in between.
 fn ranges(numbers: &mut Numbers, count: usize) -> Vec<f64> {
     let code = |r: f64| match r {
         r if r < 0.02 => f64::NEG_INFINITY,
