@@ -1,6 +1,6 @@
 //! The result of step 1 about the bare sensor: `characterization.json`.
 //!
-//! Tables 1 to 4 of the paper as measured, and the parameters of Eqs. (3)–(5) fitted to them. Errors are *measured − true*.
+//! Tables 1 to 4 of the paper as measured, and the fitted parameters of Eqs. (3)–(5). Errors are *measured − true*.
 
 use crate::bias::RangeBias;
 use crate::calibration::MountEstimate;

@@ -77,8 +77,8 @@ pub struct PoseRecord {
 
 /// A recorded experiment: the input of a calibration.
 ///
-/// Its size does not grow with the number of scans: readings stay in the recording, which is read again where a statistic
-/// needs them, unless the dataset was made in memory.
+/// Its size does not grow with the number of scans: readings stay in the recording, which is read again when a
+/// statistic needs them, unless the dataset was made in memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dataset {
     /// What the experimenter knows.
@@ -190,8 +190,8 @@ impl Dataset {
     /// Checks that the parts are consistent.
     ///
     /// # Errors
-    /// [`ModelError::Inconsistent`] names the first pose whose board is not in the session, that does not have the board
-    /// it needs, or whose number of readings is not scans × beams.
+    /// [`ModelError::Inconsistent`] names the first pose whose board is not in the session or is missing, or whose
+    /// number of readings is not scans × beams.
     pub fn check(&self) -> Result<(), ModelError> {
         let fail = |pose: &PoseRecord, what: String| {
             Err(ModelError::Inconsistent(format!(

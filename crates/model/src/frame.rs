@@ -48,7 +48,7 @@ pub fn yaw_pitch_roll(yaw: f64, pitch: f64, roll: f64) -> UnitQuaternion<f64> {
 
 /// Spherical linear interpolation (slerp) between two attitudes along the shorter arc.
 ///
-/// `share` is 0 at `from` and 1 at `to`, and may be outside of that. Equal attitudes give exactly that attitude; between
+/// `share` is 0 at `from`, 1 at `to`, and may be outside of [0, 1]. Equal attitudes give exactly that attitude; between
 /// attitudes half a turn apart, either arc may be taken.
 pub fn slerp(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>, share: f64) -> UnitQuaternion<f64> {
     Arc::new(from, to).at(share)

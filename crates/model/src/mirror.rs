@@ -1,6 +1,6 @@
 //! Plane mirrors: reflection, and the deflection of a beam in the scan plane.
 //!
-//! One facet {m·x = h} turns u into v = u − 2(m·u)m at distance d = h/(m·u): its plane gives θ_a, φ and d of all its beams.
+//! A facet {m·x = h} turns u into v = u − 2(m·u)m at distance d = h/(m·u): three numbers describe all its beams.
 //! Tilting a facet by e turns the beam by 2e.
 
 use crate::beam::Deflection;
