@@ -191,7 +191,7 @@ fn a_wrong_parameter_is_reported_where_it_is() {
         problems
             .list
             .iter()
-            .any(|p| p.message.contains("goes round in a circle")),
+            .any(|p| p.message.contains("is circular: `")),
         "{problems}"
     );
     let dash = PARAMETRIC.replace("first_deg = 62 ", "first-deg = 62 ");

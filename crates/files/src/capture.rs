@@ -60,9 +60,10 @@ impl Capture {
         solved.chain(self.markers.values().flatten().map(|(body, _, _)| *body))
     }
 
-    /// Takes out the frames of the given bodies in order of time, with times counted from the epoch, until the given number
-    /// of messages is left.
-    /// A body has a frame at every time at which any markers were recorded, even if none of its own was seen, or it was solved.
+    /// Takes out the frames of the given bodies in order of time until the given number of messages is left; times count
+    /// from the epoch.
+    ///
+    /// A body has a frame whenever any markers were recorded, even if none of its own was seen, and whenever it was solved.
     pub(super) fn take(
         &mut self,
         left: usize,

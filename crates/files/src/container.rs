@@ -19,7 +19,7 @@ use std::mem;
 /// Size at which a chunk is full, in bytes before compression.
 const CHUNK_SIZE: usize = 1 << 20;
 
-/// Bytes passed to the compressor at a time: less than one of its blocks, so that its output does not depend on addresses.
+/// Bytes passed to the compressor at a time: less than one of its blocks, for output independent of buffer addresses.
 const SLICE: usize = 1 << 15;
 
 /// Name of the compression, as stored in files.
