@@ -34,7 +34,7 @@ pub(super) struct NoValue {
     pub(super) help: Option<String>,
 }
 
-/// Evaluates an expression; `value` is called for every name, in order.
+/// Evaluates an expression; `look_up` is called for every name, in order.
 pub(super) fn evaluate(
     text: &str,
     look_up: &mut dyn FnMut(&str) -> Result<f64, NoValue>,
