@@ -84,8 +84,8 @@ impl Place {
         }
     }
 
-    /// Visits all records in order; `visit` receives the index of each one's block, and its index there. Returns the blocks
-    /// and the length of the recording in bytes.
+    /// Visits all records in order; `visit` receives the index of each one's block, and its index there. Returns the
+    /// blocks and the length of the recording in bytes.
     ///
     /// # Errors
     /// [`IoError`] with the offset if the recording cannot be read, is cut off or corrupt, or if `visit` fails.

@@ -29,8 +29,8 @@ pub(super) struct Bodies {
 impl Bodies {
     /// The bodies of a session.
     ///
-    /// `path` names the file in errors. Names that are duplicate, empty, contain a slash or equal a topic's are rejected,
-    /// because a recording could not tell them apart.
+    /// `path` names the file in errors. Names that are duplicate, empty, contain a slash or equal a topic's are
+    /// rejected, because a recording could not tell them apart.
     pub(super) fn of(session: &Session, path: &Path) -> Result<Self, IoError> {
         let boards = session.boards.iter().map(|b| (b.name.as_str(), &b.markers));
         let named = std::iter::once((RIG_SUBJECT, &session.rig_markers)).chain(boards);

@@ -60,10 +60,11 @@ impl Capture {
         solved.chain(self.markers.values().flatten().map(|(body, _, _)| *body))
     }
 
-    /// Takes out the frames of the given bodies in order of time until the given number of messages is left; times count
-    /// from the epoch.
+    /// Takes out the frames of the given bodies in order of time until the given number of messages is left; times
+    /// count from the epoch.
     ///
-    /// A body has a frame whenever any markers were recorded, even if none of its own was seen, and whenever it was solved.
+    /// A body has a frame whenever any markers were recorded, even if none of its own was seen, and whenever it was
+    /// solved.
     pub(super) fn take(
         &mut self,
         left: usize,

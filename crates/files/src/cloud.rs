@@ -31,6 +31,9 @@ pub enum CloudError {
     Malformed(String),
 }
 
+/// Unit of the coordinates in a header. Its spelling is part of the format: other headers are rejected.
+const UNIT: &str = "metres";
+
 /// Bytes per point: three floats, a beam, a scan.
 pub const POINT_BYTES: usize = 3 * 4 + 2 + 4;
 
@@ -111,12 +114,12 @@ pub fn cloud_header(format: CloudFormat, frame: CloudFrame, count: usize) -> Str
     let frame = frame.word();
     match format {
         CloudFormat::Ply => format!(
-            "ply\nformat binary_little_endian 1.0\ncomment catoptric, frame {frame}, metres\n\
+            "ply\nformat binary_little_endian 1.0\ncomment catoptric, frame {frame}, {UNIT}\n\
              element vertex {count}\nproperty float x\nproperty float y\nproperty float z\n\
              property ushort beam\nproperty uint scan\nend_header\n"
         ),
         CloudFormat::Pcd => format!(
-            "# .PCD v0.7 - Point Cloud Data file format\n# catoptric, frame {frame}, metres\nVERSION 0.7\n\
+            "# .PCD v0.7 - Point Cloud Data file format\n# catoptric, frame {frame}, {UNIT}\nVERSION 0.7\n\
              FIELDS x y z beam scan\nSIZE 4 4 4 2 4\nTYPE F F F U U\nCOUNT 1 1 1 1 1\nWIDTH {count}\nHEIGHT 1\n\
              VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {count}\nDATA binary\n"
         ),

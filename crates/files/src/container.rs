@@ -5,8 +5,8 @@
 //! summary offsets | footer | magic
 //! ```
 //!
-//! Chunk boundaries depend on the sizes of the messages alone, and each chunk is compressed separately: the same messages
-//! give the same bytes on any number of threads. The format is <https://mcap.dev/spec>; numbers are little endian.
+//! Chunk boundaries depend on the sizes of the messages alone, and each chunk is compressed separately: the same
+//! messages give the same bytes on any number of threads. The format is <https://mcap.dev/spec>; numbers are little endian.
 
 use crc32fast::Hasher;
 use mcap::MAGIC;

@@ -54,8 +54,8 @@ pub struct DatasetWriter {
 impl DatasetWriter {
     /// Begins a dataset that will appear at `out`, and writes the session.
     ///
-    /// Missing parent folders are created. An existing empty folder is replaced; an existing dataset only with `replace`
-    /// and if nothing was added to it, and it remains until the new one is complete.
+    /// Missing parent folders are created. An existing empty folder is replaced; an existing dataset only with
+    /// `replace` and if nothing was added to it, and it remains until the new one is complete.
     ///
     /// # Errors
     /// [`IoError::Exists`] or [`IoError::Foreign`] if `out` cannot be replaced, [`IoError::Content`] if the names
@@ -222,7 +222,7 @@ pub fn parse_dataset(session: Session, recording: impl Into<Arc<[u8]>>) -> Resul
     assembled(&path, session, poses, id)
 }
 
-/// Reads the session and the requested part of the observations; returns the hashes as well.
+/// Reads the session and the requested part of the observations; returns the hash of the recording as well.
 fn read<T: Send>(
     dataset: &Path,
     observations: impl FnOnce(Place, &Session) -> Result<T, IoError> + Send,

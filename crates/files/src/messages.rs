@@ -110,8 +110,8 @@ fn write_numbers(cdr: &mut CdrWriter, values: &[f64]) {
     }
 }
 
-/// The beginning of a scan: header, angles, times and limits. The increment of a clockwise scan is negative, as drivers of
-/// clockwise scanners set it.
+/// The beginning of a scan: header, angles, times and limits. The increment of a clockwise scan is negative, as drivers
+/// of clockwise scanners set it.
 fn write_scan_sheet(cdr: &mut CdrWriter, stamp: u64, scanner: &ScannerSheet, period_s: f64) {
     write_header(cdr, stamp, LASER_FRAME);
     let scan = &scanner.scan;

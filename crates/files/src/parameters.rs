@@ -83,10 +83,7 @@ impl Values<'_> {
         match self.known.get(name) {
             Some(Some(value)) => return Ok(*value),
             Some(None) => {
-                return none(
-                    format!("is circular: `{name}` depends on itself"),
-                    None,
-                );
+                return none(format!("is circular: `{name}` depends on itself"), None);
             }
             None => {}
         }

@@ -51,7 +51,7 @@ struct Playback<'a, R: Keep> {
 /// Ranges are returned as the 32-bit numbers that were stored, poses and markers bit for bit.
 ///
 /// # Errors
-/// [`IoError`] with the file and offset if it cannot be read, is cut off or corrupt, or is inconsistent with the session.
+/// [`IoError`] with the file and offset if it cannot be read, is cut off or corrupt, or does not fit the session.
 pub fn read_recording(path: &Path, session: &Session) -> Result<Vec<Stretch>, IoError> {
     Ok(play::<Whole>(&Place::File(path.to_owned()), session)?.0)
 }

@@ -339,7 +339,7 @@ fn departures(
     findings.into_iter().filter(|f| !explained(f)).collect()
 }
 
-/// Problems with the file as a whole; `None` if it cannot be interpreted.
+/// Problems of the file without any `--set`; `None` if it cannot be interpreted on its own.
 fn problems_without_sets(
     file: &Node,
     text: &str,

@@ -1,7 +1,7 @@
 //! Everything a calibration needs of a stretch, accumulated while its messages are read, in bounded memory.
 //!
-//! If a stretch is long for motion capture, its markers are averaged in another pass over its messages, when their frames
-//! have been counted.
+//! If a stretch is long for motion capture, its markers are averaged in another pass over its messages, when their
+//! frames have been counted.
 
 use super::capture::Capture;
 use super::error::IoError;

@@ -97,7 +97,8 @@ mod tests {
             Point3::new(1.0, 2.0, -0.1),
             Point3::new(1.5, 0.3, 1.0),
         ];
-        let plane = BoardPlane::from_points(points[0], points[1], points[2]).expect("the points span a plane");
+        let plane =
+            BoardPlane::from_points(points[0], points[1], points[2]).expect("the points span a plane");
         for p in points {
             assert!(plane.normal.dot(&(p - plane.point)).abs() < 1e-15);
         }

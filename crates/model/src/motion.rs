@@ -30,8 +30,8 @@ impl Motion {
     /// `room_from_rig` at a given time; `None` if the rig was never solved.
     ///
     /// Between two frames the position is linear in time and the attitude turns at a constant rate along the shorter
-    /// arc. Before the first frame and after the last, the motion between the two nearest frames is extrapolated: a scan
-    /// ends up to one frame after the last frame of its stretch. A single frame holds for all times.
+    /// arc. Before the first frame and after the last, the motion between the two nearest frames is extrapolated: a
+    /// scan ends up to one frame after the last frame of its stretch. A single frame holds for all times.
     pub fn room_from_rig(&self, time_s: f64) -> Option<Pose> {
         let (last, before) = self.frames.split_last()?;
         if before.is_empty() {

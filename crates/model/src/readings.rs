@@ -33,7 +33,8 @@ pub struct BeamStatistics {
     pub too_close: usize,
     /// The ranges of all scans.
     pub all: Moments,
-    /// The ranges of the first and of the second half of the scans; with an odd number, the middle scan is in the second.
+    /// The ranges of the first and of the second half of the scans; with an odd number, the middle scan is in the
+    /// second.
     pub halves: [Moments; 2],
     /// The smallest range, in meters; ∞ without any.
     pub least: f64,
@@ -228,7 +229,9 @@ impl Readings {
                     .chunks(self.beams.max(1))
                     .for_each(|scan| gathered.add(scan)),
                 Place::Nowhere(_) => gathered.beams.iter_mut().for_each(|b| b.missing = scans),
-                Place::Recording(..) => unreachable!("a recording's statistics were computed when it was read"),
+                Place::Recording(..) => {
+                    unreachable!("a recording's statistics were computed when it was read")
+                }
             }
             gathered.finish().into()
         })

@@ -5,8 +5,8 @@
 //! t(i)   = i·beam time                    seconds after the scan begins; beam time is step/(360°·rate) unless given
 //! ```
 //!
-//! If the beams cover the full circle, beams·step = 360° to within half a step, the scan closes: its first and last beams
-//! are neighbors, and a run of beams may cross the seam, `[first, last]` with first > last.
+//! If the beams cover the full circle, beams·step = 360° to within half a step, the scan closes: its first and last
+//! beams are neighbors, and a run of beams may cross the seam, `[first, last]` with first > last.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -119,7 +119,8 @@ impl ScanAngles {
         Ok(())
     }
 
-    /// Whether both belong to the same scanner: as many beams, in the same directions to within the rounding of decimals.
+    /// Whether both belong to the same scanner: as many beams, in the same directions to within the rounding of
+    /// decimals.
     pub fn same_as(&self, other: &Self) -> bool {
         let near = |a: f64, b: f64| (a - b).abs() <= SAME_PART_OF_STEP * self.step_deg;
         let steps = self.beams.saturating_sub(1) as f64;

@@ -5,7 +5,8 @@ const BITS: u32 = 16;
 
 /// The upper median of a sequence of numbers that is passed repeatedly, the same numbers in any order.
 ///
-/// Every pass counts, in a histogram over the next bits, the numbers that agree with the median in the bits known so far.
+/// Every pass counts, in a histogram over the next bits, the numbers that agree with the median in the bits known so
+/// far.
 ///
 /// ```
 /// use catoptric_model::selection::Median;

@@ -61,8 +61,8 @@ pub struct ScannerSheet {
     pub divergence_full_mrad: f64,
 }
 
-/// The same as stored in `session.toml`. Entries missing in version 1 default to what all scanners had then: beams placed
-/// symmetrically about the x axis, counter-clockwise, spread evenly over the turn.
+/// The same as stored in `session.toml`. Entries missing in version 1 default to what all scanners had then: beams
+/// placed symmetrically about the x axis, counter-clockwise, spread evenly over the turn.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct FlatSheet {
@@ -179,8 +179,8 @@ pub struct BareStructure {
     pub mirror_thickness_mm: f64,
     /// Uncertainty of a bare distance, in millimeters.
     pub distance_sd_mm: f64,
-    /// Whether the scanner itself measured them, in one recording: then they share its drift there and the uncertainty of the
-    /// assumed biases that correct them. Both are part of the uncertainty.
+    /// Whether the scanner itself measured them, in one recording: then they share its drift there and the uncertainty
+    /// of the assumed biases that correct them. Both are part of the uncertainty.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub scanned: bool,
     /// First beam of `distance_m`.

@@ -101,8 +101,8 @@ impl Moments {
 }
 
 impl Summary {
-    /// Statistics of the main body of readings; all other ranges count as outliers. `None` if there are no ranges, or if
-    /// no majority of them is close together.
+    /// Statistics of the main body of readings; all other ranges count as outliers. `None` if there are no ranges, or
+    /// if no majority of them is close together.
     ///
     /// ```
     /// use catoptric_model::Summary;

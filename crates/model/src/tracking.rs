@@ -232,8 +232,8 @@ impl Watching {
         }
     }
 
-    /// Returns the averages. Jumps between successive frames have twice the variance of a frame, and the median of their
-    /// squares, `None` without any, is insensitive to a few large ones.
+    /// Returns the averages. Jumps between successive frames have twice the variance of a frame, and the median of
+    /// their squares, `None` without any, is insensitive to a few large ones.
     pub fn finish(self, subject: String, median_jump: Option<f64>) -> Watched {
         let mean = |(sum, count): (Vector3<f64>, usize)| MeanMarker {
             place: Point3::from(sum / count.max(1) as f64),

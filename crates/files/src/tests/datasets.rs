@@ -101,11 +101,7 @@ fn a_changed_file_is_named() {
     let session = session(3);
     write_dataset(&out, false, &session, &[stretch(&session, 0, 2, 3, 5)]).expect("written");
     let text = fs::read_to_string(out.join(SESSION)).expect("session");
-    fs::write(
-        out.join(SESSION),
-        text.replace("round trip", "round, trip"),
-    )
-    .expect("edited");
+    fs::write(out.join(SESSION), text.replace("round trip", "round, trip")).expect("edited");
     let error = read_dataset(&out).expect_err("changed");
     assert!(
         error.to_string().contains("session.toml: changed since"),
