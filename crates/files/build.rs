@@ -1,4 +1,4 @@
-//! Tells the library which commit it was built from, for the manifest of every dataset it writes.
+//! Passes the commit it is built from to the library, for the manifest of every dataset it writes.
 
 use std::path::Path;
 use std::process::Command;
@@ -8,17 +8,17 @@ fn main() {
     println!("cargo::rustc-env=CATOPTRIC_GIT_HASH={}", commit());
 }
 
-/// The commit checked out, or "unknown" outside a checkout of this very package.
+/// The commit checked out, or "unknown" outside a checkout of this package.
 fn commit() -> String {
     let root = std::env::var("CARGO_MANIFEST_DIR").unwrap_or_default();
-    // A package unpacked inside somebody else's repository must not report that repository's commit.
+    // A package unpacked inside another repository must not report that repository's commit.
     let own = git(&["rev-parse", "--show-toplevel"]).is_some_and(|top| {
         Path::new(&top).join("crates/files").canonicalize().ok() == Path::new(&root).canonicalize().ok()
     });
     if !own {
         return "unknown".to_owned();
     }
-    // HEAD changes with the branch, its log with every commit. Asked of git, because .git is a file in a worktree.
+    // HEAD changes with the branch, its log with every commit. Git locates them, because .git is a file in a worktree.
     for name in ["HEAD", "logs/HEAD"] {
         if let Some(path) = git(&["rev-parse", "--git-path", name]).filter(|p| Path::new(p).exists()) {
             println!("cargo::rerun-if-changed={path}");
@@ -27,7 +27,7 @@ fn commit() -> String {
     git(&["rev-parse", "HEAD"]).unwrap_or_else(|| "unknown".to_owned())
 }
 
-/// What git prints, or nothing if it is not there or does not know.
+/// The output of git, or `None` if git is missing or fails.
 fn git(arguments: &[&str]) -> Option<String> {
     let output = Command::new("git").args(arguments).output().ok()?;
     let text = String::from_utf8(output.stdout).ok()?.trim().to_owned();

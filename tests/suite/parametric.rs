@@ -188,10 +188,7 @@ fn a_wrong_parameter_is_reported_where_it_is() {
     let circle = PARAMETRIC.replace("first_deg = 62 ", "first_deg = \"= third_deg\" ");
     let problems = problems_with(&circle, &[]);
     assert!(
-        problems
-            .list
-            .iter()
-            .any(|p| p.message.contains("goes round in a circle")),
+        problems.list.iter().any(|p| p.message.contains("is circular: `")),
         "{problems}"
     );
     let dash = PARAMETRIC.replace("first_deg = 62 ", "first-deg = 62 ");
@@ -199,7 +196,7 @@ fn a_wrong_parameter_is_reported_where_it_is() {
     let about = problems
         .list
         .iter()
-        .find(|p| p.message.contains("`first-deg` cannot stand"))
+        .find(|p| p.message.contains("`first-deg` cannot be used"))
         .unwrap();
     assert_eq!(
         problems.position(about),

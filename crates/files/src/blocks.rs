@@ -1,6 +1,6 @@
-//! Where the messages of a recording are: its chunks, and its stretches in them, noted while it is read for the first time.
+//! Index of the messages of a recording: its chunks and the stretches in them, built on the first pass over it.
 //!
-//! What lies in a block is read again later and must then be what it was: every block has a checksum of its messages.
+//! Blocks are read again later and must not have changed by then: every block has a checksum of its messages.
 
 use super::error::IoError;
 use crc32fast::Hasher;
@@ -14,16 +14,16 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Longest record or chunk that is believed, in bytes; a longer one is a corrupt length, not a reason to allocate.
+/// Maximum plausible length of a record or chunk, in bytes; a longer one is corrupt, not a reason to allocate.
 const LONGEST_RECORD: usize = 1 << 28;
 
-/// Messages outside of chunks are taken together until they take so many bytes.
+/// Messages outside of chunks are grouped up to this many bytes.
 const LONGEST_RUN: usize = 1 << 20;
 
-/// An opcode and a length stand before every record.
+/// Opcode and length precede every record.
 const RECORD_HEAD: usize = 1 + 8;
 
-/// Where the bytes of a recording are.
+/// Where the bytes of a recording are stored.
 #[derive(Debug, Clone)]
 pub(super) enum Place {
     /// In a file.
@@ -32,34 +32,34 @@ pub(super) enum Place {
     Memory(PathBuf, Arc<[u8]>),
 }
 
-/// A part of a recording that is read as a whole.
+/// A part of a recording that is read in one piece.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Block {
-    /// Where it begins, and its length, in bytes.
+    /// Offset and length, in bytes.
     at: u64,
     length: usize,
-    /// Whether it is the body of a chunk's record; else it is records.
+    /// Whether it is the body of a chunk record; otherwise it is a run of records.
     is_chunk: bool,
     checksum: u32,
 }
 
-/// The records of a block, those that are of any use here.
+/// The relevant records of a block.
 #[derive(Debug, Default)]
 pub(super) struct Records {
     bytes: Vec<u8>,
-    /// Opcode and place of each.
+    /// Opcode and byte range of each.
     all: Vec<(u8, Range<usize>)>,
 }
 
 impl Place {
-    /// What names it in errors.
+    /// The path that names the recording in errors.
     pub(super) fn path(&self) -> &Path {
         match self {
             Self::File(path) | Self::Memory(path, _) => path,
         }
     }
 
-    /// Its bytes from the beginning.
+    /// A reader at the beginning of its bytes.
     pub(super) fn open(&self) -> io::Result<Box<dyn Read + '_>> {
         Ok(match self {
             Self::File(path) => Box::new(BufReader::with_capacity(1 << 16, File::open(path)?)),
@@ -67,7 +67,7 @@ impl Place {
         })
     }
 
-    /// Some of its bytes.
+    /// A range of its bytes.
     fn bytes(&self, at: u64, length: usize) -> io::Result<Cow<'_, [u8]>> {
         match self {
             Self::File(path) => {
@@ -84,16 +84,16 @@ impl Place {
         }
     }
 
-    /// Goes through all records in order; `visit` is given the number of each one's block, and its number there. The blocks,
-    /// and the length of the recording in bytes.
+    /// Visits all records in order; `visit` receives the index of each one's block, and its index there. Returns the
+    /// blocks and the length of the recording in bytes.
     ///
     /// # Errors
-    /// [`IoError`] with the place if the recording cannot be read, is cut off or corrupt, or if `visit` says so.
+    /// [`IoError`] with the offset if the recording cannot be read, is cut off or corrupt, or if `visit` fails.
     pub(super) fn visit(
         &self,
         mut visit: impl FnMut(u8, &[u8], (usize, usize)) -> Result<(), String>,
     ) -> Result<(Vec<Block>, u64), IoError> {
-        // Every checksum is checked: readings that were damaged must not look like readings.
+        // All checksums are checked: damaged readings must not look like readings.
         let options = checked()
             .with_emit_chunks(true)
             .with_validate_data_section_crc(true)
@@ -153,7 +153,7 @@ impl Place {
         Ok((blocks, offset))
     }
 
-    /// The records of a block, which must be those that were there at first.
+    /// The records of a block, which must be unchanged since the first pass.
     pub(super) fn records(&self, block: &Block) -> Result<Records, IoError> {
         let bytes = self.bytes(block.at, block.length);
         let bytes = bytes.map_err(|e| IoError::read(self.path(), e))?;
@@ -167,12 +167,12 @@ impl Place {
         }
     }
 
-    /// A recording that is not the one it was.
+    /// The error for a recording that has changed.
     pub(super) fn changed(&self, offset: u64) -> IoError {
         self.corrupt("changed while it was being read".to_owned(), offset)
     }
 
-    /// A recording that is not what it should be, as was noticed after so many bytes.
+    /// The error for an invalid recording, detected at a given byte offset.
     pub(super) fn corrupt(&self, what: String, offset: u64) -> IoError {
         IoError::Recording {
             path: self.path().to_owned(),
@@ -183,19 +183,19 @@ impl Place {
 }
 
 impl Block {
-    /// Where it begins.
+    /// Offset of its beginning.
     pub(super) fn at(&self) -> u64 {
         self.at
     }
 
-    /// Whether a record that begins at some byte is one more of its run.
+    /// Whether a record that begins at a given byte continues the run.
     fn takes(&self, begin: u64) -> bool {
         !self.is_chunk && self.at + self.length as u64 == begin && self.length < LONGEST_RUN
     }
 }
 
 impl Records {
-    /// Those of a chunk, from the body of its record.
+    /// The records of a chunk, from the body of its record.
     fn of_chunk(body: &[u8]) -> McapResult<Self> {
         let options = checked().with_skip_start_magic(true).with_skip_end_magic(true);
         let mut reader = LinearReader::new_with_options(options);
@@ -219,7 +219,7 @@ impl Records {
         Ok(records)
     }
 
-    /// Those of a run outside of chunks.
+    /// The records of a run outside of chunks.
     fn of_run(mut bytes: &[u8]) -> McapResult<Self> {
         let mut records = Self::default();
         while let Some((head, rest)) = bytes.split_first_chunk::<RECORD_HEAD>() {
@@ -242,12 +242,12 @@ impl Records {
         crc32fast::hash(&self.bytes)
     }
 
-    /// Bytes that they take.
+    /// Their size in bytes.
     pub(super) fn size(&self) -> usize {
         self.bytes.len()
     }
 
-    /// A record by its number.
+    /// A record by its index.
     pub(super) fn get(&self, number: usize) -> Option<(u8, &[u8])> {
         let (opcode, range) = self.all.get(number)?;
         Some((*opcode, &self.bytes[range.clone()]))
@@ -260,7 +260,7 @@ impl Records {
     }
 }
 
-/// What every reader checks.
+/// Options shared by all readers.
 fn checked() -> LinearReaderOptions {
     LinearReaderOptions::default()
         .with_record_length_limit(LONGEST_RECORD)
@@ -271,7 +271,7 @@ fn is_of_use(opcode: u8) -> bool {
     matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE)
 }
 
-/// The reader's error in one line, with what lies beneath it.
+/// The reader's error in one line, with its cause.
 pub(super) fn words(error: &McapError) -> String {
     match error {
         McapError::Parse(e) => format!("not a whole recording: {error}: {e}"),

@@ -1,4 +1,4 @@
-//! The tracked bodies of a session, and how motion capture names their markers.
+//! The tracked bodies of a session, and the names of their markers in motion capture.
 
 use super::error::IoError;
 use catoptric_model::Session;
@@ -6,7 +6,7 @@ use catoptric_model::dataset::RIG_SUBJECT;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The last part of `/mocap/markers`, which no body can be named.
+/// Last part of the topic `/mocap/markers`; not allowed as the name of a body.
 pub(super) const MARKERS_TOPIC: &str = "markers";
 
 /// A tracked body.
@@ -14,7 +14,7 @@ pub(super) const MARKERS_TOPIC: &str = "markers";
 pub(super) struct Body {
     /// Name, which is the motion-capture subject.
     pub(super) subject: String,
-    /// Labels "subject/marker" in the order of its template.
+    /// Labels "subject/marker", in the order of its template.
     pub(super) labels: Vec<String>,
 }
 
@@ -29,8 +29,8 @@ pub(super) struct Bodies {
 impl Bodies {
     /// The bodies of a session.
     ///
-    /// `path` names the file in errors: names that are double, empty, hold a slash or are a topic's are refused,
-    /// because a recording could not tell them apart.
+    /// `path` names the file in errors. Names that are duplicate, empty, contain a slash or equal a topic's are
+    /// rejected, because a recording could not tell them apart.
     pub(super) fn of(session: &Session, path: &Path) -> Result<Self, IoError> {
         let boards = session.boards.iter().map(|b| (b.name.as_str(), &b.markers));
         let named = std::iter::once((RIG_SUBJECT, &session.rig_markers)).chain(boards);
@@ -66,12 +66,12 @@ impl Bodies {
         Ok(bodies)
     }
 
-    /// Where a subject stands in the list.
+    /// Index of a subject in the list.
     pub(super) fn position(&self, subject: &str) -> Option<usize> {
         self.all.iter().position(|b| b.subject == subject)
     }
 
-    /// Body and place in its template of a label.
+    /// Body of a label, and index in the body's template.
     pub(super) fn find(&self, label: &str) -> Option<(usize, usize)> {
         self.by_label.get(label).copied()
     }

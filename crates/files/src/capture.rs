@@ -1,4 +1,4 @@
-//! What motion capture saw during a stretch: messages put together into frames, in order of time.
+//! Motion capture during a stretch: messages assembled into frames, in order of time.
 
 use super::bodies::Bodies;
 use super::messages::{LabelledMarker, NS_PER_S};
@@ -7,25 +7,25 @@ use catoptric_model::frame::Pose;
 use nalgebra::Point3;
 use std::collections::BTreeMap;
 
-/// Messages that have come, by their time in nanoseconds, and the frames that they make.
+/// Messages received so far, by time in nanoseconds, and the frames they form.
 #[derive(Default)]
 pub(super) struct Capture {
     poses: BTreeMap<(u64, usize), Pose>,
-    /// Body, place in its template, and place in the room of every marker that was seen.
+    /// Body, index in its template, and position in the room of every marker that was seen.
     markers: BTreeMap<u64, Vec<(usize, usize, Point3<f64>)>>,
-    /// All frames before this time were taken out.
+    /// All frames before this time have been taken out.
     begin: u64,
 }
 
 impl Capture {
-    /// Takes a solved pose of a body in.
+    /// Adds a solved pose of a body.
     pub(super) fn pose(&mut self, time: u64, body: usize, pose: Pose) -> Result<(), String> {
         self.check(time)?;
         self.poses.insert((time, body), pose);
         Ok(())
     }
 
-    /// Takes the markers of a frame in; those that no body has are passed over.
+    /// Adds the markers of a frame; those of unknown bodies are ignored.
     pub(super) fn markers(
         &mut self,
         time: u64,
@@ -49,20 +49,22 @@ impl Capture {
         Err(format!("a frame of motion capture comes {late} s late"))
     }
 
-    /// Messages that wait to be frames.
+    /// Number of messages waiting to form frames.
     pub(super) fn waiting(&self) -> usize {
         self.poses.len() + self.markers.len()
     }
 
-    /// The bodies that were seen, in messages that wait.
+    /// The bodies seen in waiting messages.
     pub(super) fn seen(&self) -> impl Iterator<Item = usize> + '_ {
         let solved = self.poses.keys().map(|(_, body)| *body);
         solved.chain(self.markers.values().flatten().map(|(body, _, _)| *body))
     }
 
-    /// Takes the frames of some bodies out in order of time, with times counted from the epoch, until so many messages wait.
+    /// Takes out the frames of the given bodies in order of time until the given number of messages is left; times
+    /// count from the epoch.
     ///
-    /// A body has a frame wherever markers were recorded, even if none of its own was seen, and wherever it was solved.
+    /// A body has a frame whenever any markers were recorded, even if none of its own was seen, and whenever it was
+    /// solved.
     pub(super) fn take(
         &mut self,
         left: usize,
@@ -107,7 +109,7 @@ impl Capture {
     }
 }
 
-/// Seconds from one time to another, both in nanoseconds.
+/// Seconds between two times in nanoseconds.
 pub(super) fn seconds_between(from: u64, to: u64) -> f64 {
     let ns = i128::from(to) - i128::from(from);
     ns as f64 / NS_PER_S as f64

@@ -1,14 +1,14 @@
 //! Point clouds as files: PLY (binary little-endian) and PCD (version 0.7, binary).
 //!
-//! Both hold x, y, z in metres as 32-bit floats, the beam as an unsigned 16-bit and the scan as an unsigned 32-bit
-//! integer. The frame stands in a comment of the header.
+//! Both hold x, y, z in meters as 32-bit floats, the beam as an unsigned 16-bit and the scan as an unsigned 32-bit
+//! integer. The frame is given in a comment of the header.
 
 use catoptric_model::cloud::{CloudFrame, CloudPoint, PointCloud};
 use nalgebra::Point3;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// How a cloud is written.
+/// File format of a cloud.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum CloudFormat {
     /// Stanford's polygon file format.
@@ -17,25 +17,28 @@ pub enum CloudFormat {
     Pcd,
 }
 
-/// What can be wrong with a cloud's name or contents.
+/// An invalid file name or content of a cloud.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CloudError {
-    /// The name does not say which format is wanted.
+    /// The extension is not that of a supported format.
     #[error("{}: a cloud is written as .ply or .pcd", path.display())]
     UnknownExtension {
         /// The name.
         path: PathBuf,
     },
-    /// The bytes are not those of a cloud this program writes.
+    /// The bytes are not a cloud written by this program.
     #[error("not a cloud written by this program: {0}")]
     Malformed(String),
 }
 
-/// Bytes of one point: three floats, a beam, a scan.
+/// Unit of the coordinates in a header. Its spelling is part of the format: other headers are rejected.
+const UNIT: &str = "metres";
+
+/// Bytes per point: three floats, a beam, a scan.
 pub const POINT_BYTES: usize = 3 * 4 + 2 + 4;
 
 impl CloudFormat {
-    /// The format that a file's extension asks for, in upper or lower case.
+    /// The format selected by a file's extension, in upper or lower case.
     ///
     /// ```
     /// use catoptric_files::cloud::CloudFormat;
@@ -60,7 +63,7 @@ impl CloudFormat {
 /// Writes a cloud.
 ///
 /// # Errors
-/// Whatever the writer reports; [`io::ErrorKind::InvalidData`] for a beam above 65,535 or a scan above 2³² − 1.
+/// Any error of the writer; [`io::ErrorKind::InvalidData`] for a beam above 65,535 or a scan above 2³² − 1.
 pub fn write_cloud(format: CloudFormat, cloud: &PointCloud, to: &mut impl Write) -> io::Result<()> {
     to.write_all(cloud_header(format, cloud.frame, cloud.points.len()).as_bytes())?;
     for point in &cloud.points {
@@ -72,17 +75,17 @@ pub fn write_cloud(format: CloudFormat, cloud: &PointCloud, to: &mut impl Write)
 /// A cloud as the bytes of its file.
 ///
 /// # Errors
-/// As [`write_cloud`], whose writer here never fails.
+/// As for [`write_cloud`]; the writer here never fails.
 pub fn cloud_bytes(format: CloudFormat, cloud: &PointCloud) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::with_capacity(512 + POINT_BYTES * cloud.points.len());
     write_cloud(format, cloud, &mut bytes)?;
     Ok(bytes)
 }
 
-/// Reads the frame and the points of a cloud that [`write_cloud`] wrote; the header has to be its own.
+/// Reads the frame and the points of a cloud written by [`write_cloud`]; other headers are rejected.
 ///
 /// # Errors
-/// [`CloudError::Malformed`] for anything else, a file cut short included.
+/// [`CloudError::Malformed`] for anything else, including a truncated file.
 pub fn read_cloud(format: CloudFormat, bytes: &[u8]) -> Result<(CloudFrame, Vec<CloudPoint>), CloudError> {
     let malformed = |what: &str| CloudError::Malformed(what.to_owned());
     let last_line: &[u8] = match format {
@@ -106,24 +109,24 @@ pub fn read_cloud(format: CloudFormat, bytes: &[u8]) -> Result<(CloudFrame, Vec<
     Ok((frame, body.chunks_exact(POINT_BYTES).map(decode).collect()))
 }
 
-/// What stands before the points of a cloud.
+/// The header of a cloud.
 pub fn cloud_header(format: CloudFormat, frame: CloudFrame, count: usize) -> String {
     let frame = frame.word();
     match format {
         CloudFormat::Ply => format!(
-            "ply\nformat binary_little_endian 1.0\ncomment catoptric, frame {frame}, metres\n\
+            "ply\nformat binary_little_endian 1.0\ncomment catoptric, frame {frame}, {UNIT}\n\
              element vertex {count}\nproperty float x\nproperty float y\nproperty float z\n\
              property ushort beam\nproperty uint scan\nend_header\n"
         ),
         CloudFormat::Pcd => format!(
-            "# .PCD v0.7 - Point Cloud Data file format\n# catoptric, frame {frame}, metres\nVERSION 0.7\n\
+            "# .PCD v0.7 - Point Cloud Data file format\n# catoptric, frame {frame}, {UNIT}\nVERSION 0.7\n\
              FIELDS x y z beam scan\nSIZE 4 4 4 2 4\nTYPE F F F U U\nCOUNT 1 1 1 1 1\nWIDTH {count}\nHEIGHT 1\n\
              VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {count}\nDATA binary\n"
         ),
     }
 }
 
-/// A point as it stands in either file.
+/// A point in the layout of both formats.
 ///
 /// # Errors
 /// [`io::ErrorKind::InvalidData`] for a beam above 65,535 or a scan above 2³² − 1.
@@ -138,7 +141,7 @@ pub fn point_bytes(point: &CloudPoint) -> io::Result<[u8; POINT_BYTES]> {
     let scan = u32::try_from(point.scan).map_err(|_| too_large("scan", point.scan))?;
     let mut bytes = [0; POINT_BYTES];
     for (axis, place) in point.position.iter().zip(bytes.chunks_exact_mut(4)) {
-        // The file holds 32-bit floats: at 30 m they are good to two micrometres.
+        // The file holds 32-bit floats: at 30 m they are accurate to two micrometers.
         #[allow(clippy::cast_possible_truncation)]
         place.copy_from_slice(&(*axis as f32).to_le_bytes());
     }
@@ -200,12 +203,12 @@ mod tests {
     }
 
     #[test]
-    fn the_headers_are_those_of_the_formats() {
+    fn the_headers_conform_to_the_formats() {
         let ply = cloud_bytes(CloudFormat::Ply, &cloud()).expect("it fits");
         assert!(ply.starts_with(b"ply\nformat binary_little_endian 1.0\n"));
         let header = String::from_utf8_lossy(&ply);
         assert!(header.contains("\nelement vertex 3\n") && header.contains("\nproperty ushort beam\n"));
-        // The first point follows the header at once: x = 1.5 is 0x3FC00000.
+        // The first point follows the header directly: x = 1.5 is 0x3FC00000.
         let body = ply.len() - 3 * POINT_BYTES;
         assert_eq!(ply[body..body + 4], [0x00, 0x00, 0xC0, 0x3F]);
 
@@ -216,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_cut_short_is_not_read() {
+    fn a_truncated_file_is_rejected() {
         for format in [CloudFormat::Ply, CloudFormat::Pcd] {
             let bytes = cloud_bytes(format, &cloud()).expect("it fits");
             for length in [0, 10, bytes.len() - POINT_BYTES, bytes.len() - 1] {

@@ -1,12 +1,12 @@
-//! MCAP as we write it: messages gathered into chunks that are compressed side by side and written in order.
+//! The MCAP writer: messages are collected into chunks, which are compressed in parallel and written in order.
 //!
 //! ```text
 //! magic | header | (chunk | message indexes) … | end of data | schemas, channels, statistics, chunk indexes,
 //! summary offsets | footer | magic
 //! ```
 //!
-//! Where a chunk ends follows from the sizes of the messages alone, and each is compressed by itself: the same messages
-//! give the same bytes whoever compresses them. Field by field this is <https://mcap.dev/spec>; numbers are little endian.
+//! Chunk boundaries depend on the sizes of the messages alone, and each chunk is compressed separately: the same
+//! messages give the same bytes on any number of threads. The format is <https://mcap.dev/spec>; numbers are little endian.
 
 use crc32fast::Hasher;
 use mcap::MAGIC;
@@ -16,32 +16,32 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::mem;
 
-/// A chunk that is longer takes no more messages, in bytes before compression.
+/// Size at which a chunk is full, in bytes before compression.
 const CHUNK_SIZE: usize = 1 << 20;
 
-/// Bytes that the compressor is given at a time: less than one of its blocks, so that it never looks at where they lay.
+/// Bytes passed to the compressor at a time: less than one of its blocks, for output independent of buffer addresses.
 const SLICE: usize = 1 << 15;
 
-/// What compresses chunks, as files name it.
+/// Name of the compression, as stored in files.
 const COMPRESSION: &str = "lz4";
 
-/// A file being written. Without [`finish`](Self::finish) it has no end, and no reader takes it for whole.
+/// A file being written. Without [`finish`](Self::finish) it has no end, and readers reject it as incomplete.
 pub(super) struct Container<W> {
     writer: W,
-    /// Bytes written.
+    /// Number of bytes written.
     position: u64,
-    /// Of everything written.
+    /// CRC of everything written.
     checksum: Hasher,
     schemas: Vec<Vec<u8>>,
     channels: Vec<Vec<u8>>,
-    /// Messages on every channel.
+    /// Number of messages on every channel.
     counts: BTreeMap<u16, u64>,
     /// Times of the first and the last message.
     bounds: Option<(u64, u64)>,
     open: Chunk,
-    /// Chunks that take no more messages and are not written yet.
+    /// Full chunks that are not written yet.
     full: Vec<Chunk>,
-    /// Where the written ones are.
+    /// Locations of the written chunks.
     indexes: Vec<ChunkIndex>,
 }
 
@@ -51,24 +51,24 @@ struct Chunk {
     records: Vec<u8>,
     /// Times of the first and the last message.
     bounds: Option<(u64, u64)>,
-    /// Time and place of every message, by channel.
+    /// Time and offset of every message, by channel.
     messages: BTreeMap<u16, Vec<(u64, u64)>>,
 }
 
-/// A chunk as it is written.
+/// A chunk in its written form.
 struct Packed {
     /// The record of the chunk itself.
     chunk: Vec<u8>,
     /// Its message indexes.
     messages: Vec<u8>,
-    /// Where in `messages` the index of a channel begins.
+    /// Offset in `messages` of each channel's index.
     offsets: Vec<(u16, u64)>,
     bounds: (u64, u64),
     compressed: u64,
     uncompressed: u64,
 }
 
-/// Where a chunk is.
+/// Location of a chunk.
 struct ChunkIndex {
     bounds: (u64, u64),
     start: u64,
@@ -103,7 +103,7 @@ impl<W: Write> Container<W> {
         Ok(container)
     }
 
-    /// Adds a schema and returns its number; one that is there already keeps its own.
+    /// Adds a schema and returns its number; an existing schema keeps its number.
     pub(super) fn add_schema(&mut self, name: &str, encoding: &str, definition: &str) -> u16 {
         let bytes = |id: u16| {
             let mut bytes = Vec::new();
@@ -127,7 +127,7 @@ impl<W: Write> Container<W> {
         id
     }
 
-    /// Adds a channel and returns its number; schema 0 is none.
+    /// Adds a channel and returns its number; schema 0 means no schema.
     pub(super) fn add_channel(&mut self, schema: u16, topic: &str, encoding: &str) -> u16 {
         let id = next(&self.channels);
         let mut bytes = Vec::new();
@@ -143,7 +143,7 @@ impl<W: Write> Container<W> {
         id
     }
 
-    /// Adds a message to the chunk; nothing is written before [`write_full`](Self::write_full).
+    /// Adds a message to the chunk; nothing is written until [`write_full`](Self::write_full).
     pub(super) fn put(&mut self, channel: u16, sequence: u32, time: u64, message: &[u8]) {
         if self.open.records.len() > CHUNK_SIZE {
             self.full.push(mem::take(&mut self.open));
@@ -163,14 +163,14 @@ impl<W: Write> Container<W> {
         });
     }
 
-    /// Compresses the chunks that are full, side by side, and writes them in order.
+    /// Compresses the full chunks in parallel and writes them in order.
     pub(super) fn write_full(&mut self) -> io::Result<()> {
         let full = mem::take(&mut self.full);
         let packed: Vec<Packed> = full.into_par_iter().map(Chunk::pack).collect::<io::Result<_>>()?;
         packed.into_iter().try_for_each(|chunk| self.write_chunk(chunk))
     }
 
-    /// Writes what is left and the summary, and hands the writer back.
+    /// Writes the rest and the summary, and returns the writer.
     pub(super) fn finish(mut self) -> io::Result<W> {
         let last = mem::take(&mut self.open);
         if !last.records.is_empty() {
@@ -245,7 +245,7 @@ impl<W: Write> Container<W> {
         record(&mut bytes, op::FOOTER, |body| {
             body.extend(start.to_le_bytes());
             body.extend(offsets.to_le_bytes());
-            body.extend([0; 4]); // the checksum, of all before it
+            body.extend([0; 4]); // the checksum, of everything before it
         });
         let place = bytes.len() - 4;
         let checksum = crc32fast::hash(&bytes[..place]);
@@ -334,7 +334,7 @@ impl ChunkIndex {
     }
 }
 
-/// An LZ4 frame. MCAP has a checksum of its own, so the frame's blocks need none.
+/// An LZ4 frame. MCAP has its own checksum, so the frame's blocks have none.
 fn compress(records: &[u8]) -> io::Result<Vec<u8>> {
     let mut encoder = lz4::EncoderBuilder::new()
         .block_checksum(lz4::liblz4::BlockChecksum::NoBlockChecksum)
@@ -347,12 +347,12 @@ fn compress(records: &[u8]) -> io::Result<Vec<u8>> {
     Ok(compressed)
 }
 
-/// The number after those of a list that counts from 1.
+/// The next number in a list that counts from 1.
 fn next(list: &[Vec<u8>]) -> u16 {
     count(list.len() + 1)
 }
 
-/// A number of things of which no recording has so many that it does not fit.
+/// A count that never overflows in a real recording.
 fn count<T: TryFrom<usize, Error: std::fmt::Debug>>(number: usize) -> T {
     T::try_from(number).expect("schemas, channels and chunks are few")
 }
@@ -372,7 +372,7 @@ fn record(bytes: &mut Vec<u8>, opcode: u8, body: impl FnOnce(&mut Vec<u8>)) {
     bytes[place..place + 8].copy_from_slice(&length.to_le_bytes());
 }
 
-/// Appends a list or map with its length in bytes before it.
+/// Appends a list or map, preceded by its length in bytes.
 fn sized(bytes: &mut Vec<u8>, body: impl FnOnce(&mut Vec<u8>)) {
     let place = bytes.len();
     bytes.extend([0; 4]);

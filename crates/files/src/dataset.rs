@@ -1,9 +1,9 @@
-//! A dataset is a folder: what the experimenter knows, what was recorded, and apart from both the truth.
+//! Dataset folders: the session, the recording, and, separately, the truth.
 //!
 //! ```text
-//! manifest.json         where it comes from, SHA-256 of every file
-//! session.toml          what the experimenter knows
-//! observations.mcap     what was recorded
+//! manifest.json         provenance, SHA-256 of every file
+//! session.toml          the experimenter's knowledge
+//! observations.mcap     the recording
 //! truth/                scene.toml, truth.json, returns.csv, readings.csv, sub_rays.csv: delete it and the dataset is
 //!                       blind
 //! ```
@@ -29,37 +29,37 @@ use std::sync::Arc;
 
 /// Name of the manifest in a dataset.
 pub const MANIFEST: &str = "manifest.json";
-/// Name of what the experimenter knows.
+/// Name of the session file.
 pub const SESSION: &str = "session.toml";
-/// Name of what was recorded.
+/// Name of the recording.
 pub const OBSERVATIONS: &str = "observations.mcap";
 /// Name of the resolved scene.
 pub const SCENE: &str = "truth/scene.toml";
 /// Name of the truth about every beam.
 pub const TRUTH: &str = "truth/truth.json";
-/// Name of the truth about what every beam met.
+/// Name of the truth about the returns of every beam.
 pub const RETURNS: &str = "truth/returns.csv";
 /// Name of the truth about every reading.
 pub const READINGS: &str = "truth/readings.csv";
 /// Name of the truth about every sub-ray.
 pub const SUB_RAYS: &str = "truth/sub_rays.csv";
 
-/// A dataset being written. It appears as a whole in [`finish`](Self::finish); dropped before, it never does.
+/// A dataset being written. [`finish`](Self::finish) publishes it as a whole; if dropped before, it never appears.
 pub struct DatasetWriter {
-    // The recording is dropped before the folder that it is written in.
+    // The recording is dropped before the folder that contains it.
     recording: RecordingWriter<StagedFile>,
     folder: StagedFolder,
 }
 
 impl DatasetWriter {
-    /// Begins a dataset that will appear at `out`, and writes what the experimenter knows.
+    /// Begins a dataset that will appear at `out`, and writes the session.
     ///
-    /// Missing folders above it are created. An empty folder at its place is taken; a dataset only with `replace`
-    /// and if nothing was added to it, and it stays until the new one is whole.
+    /// Missing parent folders are created. An existing empty folder is replaced; an existing dataset only with
+    /// `replace` and if nothing was added to it, and it remains until the new one is complete.
     ///
     /// # Errors
-    /// [`IoError::Exists`] or [`IoError::Foreign`] if something stands in the way, [`IoError::Content`] if the names
-    /// in the session cannot be topics, otherwise what went wrong in writing.
+    /// [`IoError::Exists`] or [`IoError::Foreign`] if `out` cannot be replaced, [`IoError::Content`] if the names
+    /// in the session cannot be topics, otherwise the error in writing.
     pub fn create(out: &Path, replace: bool, session: &Session) -> Result<Self, IoError> {
         let folder = StagedFolder::create(out, occupant(out, replace)?)?;
         let shown = folder.shown(SESSION);
@@ -78,12 +78,12 @@ impl DatasetWriter {
         self.recording.write_stretch(stretch)
     }
 
-    /// What turns stretches into messages for [`append`](Self::append), on any thread.
+    /// The encoder of stretches into messages for [`append`](Self::append); usable on any thread.
     pub fn encoder(&self) -> Arc<RecordingEncoder> {
         self.recording.encoder()
     }
 
-    /// Appends what was encoded, in order.
+    /// Appends encoded messages, in order.
     ///
     /// # Errors
     /// [`IoError`] as [`RecordingWriter::append`].
@@ -99,7 +99,7 @@ impl DatasetWriter {
         self.folder.write(SCENE, toml.as_bytes())
     }
 
-    /// Writes a file that the resolved scene names, below its folder.
+    /// Writes a file named by the resolved scene, below its folder.
     ///
     /// # Errors
     /// [`IoError`] if writing fails.
@@ -116,7 +116,7 @@ impl DatasetWriter {
         self.folder.write(TRUTH, &bytes)
     }
 
-    /// Opens a file such as [`RETURNS`] to be written row by row; call its `finish` when all is written.
+    /// Opens a file such as [`RETURNS`] for writing row by row; call its `finish` at the end.
     ///
     /// # Errors
     /// [`IoError`] if the file exists already or cannot be created.
@@ -127,7 +127,7 @@ impl DatasetWriter {
     /// Ends the recording, writes the manifest and moves the dataset to its place.
     ///
     /// # Errors
-    /// [`IoError`] if writing fails; then nothing of it is left and what was there before is untouched.
+    /// [`IoError`] if writing fails; then no part of it is left, and an earlier dataset is untouched.
     pub fn finish(self, provenance: Provenance) -> Result<Manifest, IoError> {
         let Self { recording, folder } = self;
         recording.finish()?.finish()?;
@@ -144,7 +144,7 @@ impl DatasetWriter {
     }
 }
 
-/// What stands at the place of a dataset, if it may be overwritten.
+/// Checks whether the contents of `out`, if any, may be overwritten.
 fn occupant(out: &Path, replace: bool) -> Result<Occupant, IoError> {
     let path = out.to_owned();
     let foreign = |what| IoError::Foreign {
@@ -181,7 +181,7 @@ fn occupant(out: &Path, replace: bool) -> Result<Occupant, IoError> {
     Ok(Occupant::Replaceable)
 }
 
-/// Reads what the experimenter knows.
+/// Reads the session.
 ///
 /// # Errors
 /// [`IoError`] with line, column and key if `session.toml` is not a session.
@@ -190,7 +190,7 @@ pub fn read_session(dataset: &Path) -> Result<Session, IoError> {
     parse_session(dataset, &read_checked(dataset, SESSION, hashes.as_ref())?)
 }
 
-/// Reads the session and the observations, frame by frame; all of it is held.
+/// Reads the session and the observations, frame by frame; everything is held in memory.
 ///
 /// # Errors
 /// [`IoError`] as [`read_dataset`].
@@ -199,22 +199,22 @@ pub fn read_stretches(dataset: &Path) -> Result<(Session, Vec<Stretch>), IoError
     Ok((session, stretches))
 }
 
-/// Reads a dataset and checks that its parts fit together. The truth is not looked at.
+/// Reads a dataset and checks that its parts are consistent. The truth is not read.
 ///
-/// Single readings are not held: they are read again, from the same file, where a verb wants them.
+/// Individual readings are not held in memory: they are read again from the same file where needed.
 ///
 /// # Errors
-/// [`IoError`] names the file that is missing, changed since the manifest was written, not what it should be, or
-/// does not fit the others. A dataset without a manifest, somebody else's, is taken as it is.
+/// [`IoError`] names the file that is missing, changed since the manifest was written, invalid, or inconsistent
+/// with the others. A third-party dataset without a manifest is accepted unchecked.
 pub fn read_dataset(dataset: &Path) -> Result<Dataset, IoError> {
     let (session, poses, id) = read(dataset, survey)?;
     assembled(dataset, session, poses, id)
 }
 
-/// As [`read_dataset`], from what the experimenter knows and the bytes of a recording.
+/// As [`read_dataset`], from the session and the bytes of a recording.
 ///
 /// # Errors
-/// [`IoError`] if the recording is not what it should be, or does not fit the session.
+/// [`IoError`] if the recording is invalid or inconsistent with the session.
 pub fn parse_dataset(session: Session, recording: impl Into<Arc<[u8]>>) -> Result<Dataset, IoError> {
     let (path, bytes) = (PathBuf::from(OBSERVATIONS), recording.into());
     let id = sha256(&bytes);
@@ -222,7 +222,7 @@ pub fn parse_dataset(session: Session, recording: impl Into<Arc<[u8]>>) -> Resul
     assembled(&path, session, poses, id)
 }
 
-/// Reads the session, and with it what is wanted of the observations; and what they hash to.
+/// Reads the session and the requested part of the observations; returns the hash of the recording as well.
 fn read<T: Send>(
     dataset: &Path,
     observations: impl FnOnce(Place, &Session) -> Result<T, IoError> + Send,
@@ -234,13 +234,13 @@ fn read<T: Send>(
         || sha256_file(&path),
         || observations(Place::File(path.clone()), &session),
     );
-    // What was changed is not worth an error of its own: the one about the change comes first.
+    // For a changed file, the error about the change takes precedence over any other.
     let id = id.map_err(|e| IoError::read(&path, e))?;
     check(dataset, OBSERVATIONS, &id, hashes.as_ref())?;
     Ok((session, found?, id))
 }
 
-/// A dataset whose parts fit together.
+/// A dataset whose parts are consistent.
 fn assembled(
     path: &Path,
     session: Session,
@@ -262,7 +262,7 @@ fn assembled(
 
 /// The hashes of the manifest, if there is one.
 fn read_hashes(dataset: &Path) -> Result<Option<BTreeMap<String, String>>, IoError> {
-    // Said before any of its files is missed: the folder itself is what was meant wrongly.
+    // Reported before any missing file: the wrong folder was given.
     if !dataset.join(SESSION).is_file() && dataset.exists() {
         let reason = format!("it is no dataset: there is no {SESSION} in it");
         return Err(IoError::read(
@@ -281,7 +281,7 @@ fn read_hashes(dataset: &Path) -> Result<Option<BTreeMap<String, String>>, IoErr
     }
 }
 
-/// The bytes of a file, which must be those that the manifest knows.
+/// The bytes of a file, which must match the manifest.
 fn read_checked(
     dataset: &Path,
     name: &str,
@@ -293,7 +293,7 @@ fn read_checked(
     Ok(bytes)
 }
 
-/// Whether the SHA-256 of a file is the one that the manifest knows.
+/// Checks the SHA-256 of a file against the manifest.
 fn check(
     dataset: &Path,
     name: &str,
@@ -315,7 +315,7 @@ fn parse_session(dataset: &Path, bytes: &[u8]) -> Result<Session, IoError> {
         .map_err(|e| IoError::content(&path, format!("not UTF-8 from byte {}", e.valid_up_to())))?;
     let session: Session = toml::from_str(text).map_err(|e| IoError::toml(&path, text, &e))?;
     require_version(&path, session.schema_version, session::SCHEMA_VERSION)?;
-    // What version 1 lacks has its default now.
+    // Entries missing in version 1 take their defaults here.
     Ok(Session {
         schema_version: session::SCHEMA_VERSION,
         ..session

@@ -1,19 +1,19 @@
 //! The message types of a recording, as ROS 2 packages define them, fields only.
 //!
-//! A recording carries them so that a reader needs no ROS installation: each definition is followed by those it
+//! A recording includes them so that readers need no ROS installation: each definition is followed by those it
 //! refers to, separated as the `ros2msg` schema encoding of MCAP prescribes. The markers follow `mocap4r2_msgs`,
-//! which the drivers of the usual motion-capture systems publish.
+//! which the drivers of common motion-capture systems publish.
 
 /// A message type: its name, its own fields and the types it refers to.
 #[derive(Debug, Clone, Copy)]
 pub struct Definition {
-    /// Name with package, as in `sensor_msgs/msg/LaserScan`.
+    /// Name with package, such as `sensor_msgs/msg/LaserScan`.
     pub name: &'static str,
     fields: &'static str,
     parts: &'static [Part],
 }
 
-/// A type that another refers to: name without `msg/`, and fields.
+/// A type referred to by another: name without `msg/`, and fields.
 type Part = (&'static str, &'static str);
 
 const TIME: Part = ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n");
@@ -84,14 +84,14 @@ pub const POSE_STAMPED: Definition = Definition {
     parts: &[HEADER, TIME, POSE, POINT, QUATERNION],
 };
 
-/// The labelled markers of one motion-capture frame.
+/// The labeled markers of one motion-capture frame.
 pub const MARKERS: Definition = Definition {
     name: "mocap4r2_msgs/msg/Markers",
     fields: "std_msgs/Header header\nuint32 frame_number\nmocap4r2_msgs/Marker[] markers\n",
     parts: &[HEADER, TIME, MARKER, POINT],
 };
 
-/// Frames and where they stand.
+/// Frames and their poses.
 pub const TF_MESSAGE: Definition = Definition {
     name: "tf2_msgs/msg/TFMessage",
     fields: "geometry_msgs/TransformStamped[] transforms\n",
@@ -114,9 +114,9 @@ impl Definition {
 mod tests {
     use super::*;
 
-    /// Does not prove that the fields are those of ROS: `tests/mcap_peers.py` decodes with others' readers.
+    /// Does not check the fields against ROS: `tests/mcap_peers.py` decodes with third-party readers.
     #[test]
-    fn every_type_referred_to_is_there() {
+    fn every_type_referred_to_is_included() {
         for definition in [
             LASER_SCAN,
             MULTI_ECHO_SCAN,

@@ -1,46 +1,46 @@
-//! Problems with a file that a person wrote: each with its place, an excerpt, and what to do about it.
+//! Problems in a file written by a person: each with its location, an excerpt, and a suggestion.
 
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 use std::fmt;
 use std::ops::Range;
 
-/// Where a problem is.
+/// Location of a problem.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
-    /// Bytes of the file.
+    /// Byte range in the file.
     Span(Range<usize>),
-    /// Line and column of the file, both from 1, where no more is known.
+    /// Line and column in the file, both from 1, if no range is known.
     Position(usize, usize),
     /// The argument of a `--set`.
     Set(String),
-    /// A key of the file; its position is not known.
+    /// A key of the file with unknown position.
     Key(String),
 }
 
 /// One problem.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Diagnostic {
-    /// Where it is.
+    /// Its location.
     pub place: Place,
     /// What was found and what is allowed.
     pub message: String,
-    /// What to do about it.
+    /// How to fix it.
     pub help: Option<String>,
 }
 
 /// All problems of one file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Diagnostics {
-    /// The file's name as it was given.
+    /// The file's name as given.
     pub file: String,
-    /// Its text.
+    /// Its contents.
     pub text: String,
-    /// The problems, in the order of their places.
+    /// The problems, in the order of their locations.
     pub list: Vec<Diagnostic>,
 }
 
 impl Diagnostics {
-    /// Line and column, both from 1 and in characters, of a problem whose place in the file is known.
+    /// Line and column, both from 1 and in characters, of a problem with a known position in the file.
     pub fn position(&self, diagnostic: &Diagnostic) -> Option<(usize, usize)> {
         match &diagnostic.place {
             Place::Span(span) => Some(position(&self.text, span.start)),
@@ -49,7 +49,7 @@ impl Diagnostics {
         }
     }
 
-    /// Every problem with its excerpt, then a line that counts them; with terminal colors if `styled`.
+    /// Every problem with its excerpt, then a line with their number; with terminal colors if `styled`.
     pub fn render(&self, styled: bool) -> String {
         let renderer = if styled {
             Renderer::styled()
@@ -104,7 +104,7 @@ impl fmt::Display for Diagnostics {
 
 impl std::error::Error for Diagnostics {}
 
-/// Line and column of a byte, both from 1 and in characters.
+/// Line and column of a byte offset, both from 1 and in characters.
 pub(super) fn position(text: &str, byte: usize) -> (usize, usize) {
     let mut byte = byte.min(text.len());
     while !text.is_char_boundary(byte) {
@@ -118,7 +118,7 @@ pub(super) fn position(text: &str, byte: usize) -> (usize, usize) {
     )
 }
 
-/// The part of a span that is on its first line: an excerpt of a whole table would hide what it is about.
+/// The first line of a span: an excerpt of a whole table would hide the problem.
 fn first_line(text: &str, span: &Range<usize>) -> Range<usize> {
     let start = span.start.min(text.len());
     let end = span.end.clamp(start, text.len());

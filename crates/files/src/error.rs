@@ -1,4 +1,4 @@
-//! What can go wrong with files. Every message names the file.
+//! Errors in reading and writing files. Every message names the file.
 
 use catoptric_model::ModelError;
 use std::io;
@@ -7,45 +7,45 @@ use std::path::{Path, PathBuf};
 /// A file or folder that cannot be read, written or understood.
 #[derive(Debug, thiserror::Error)]
 pub enum IoError {
-    /// The system did not let us read.
+    /// The operating system refused to read.
     #[error("{}: cannot be read: {source}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// The system's reason.
+        /// The operating system's reason.
         source: io::Error,
     },
-    /// The system did not let us write.
+    /// The operating system refused to write.
     #[error("{}: cannot be written: {source}", path.display())]
     Write {
         /// The file.
         path: PathBuf,
-        /// The system's reason.
+        /// The operating system's reason.
         source: io::Error,
     },
-    /// The disk, or the user's share of it, is full.
+    /// The disk, or the user's quota on it, is full.
     #[error("{}: cannot be written: the disk is full; nothing half-written was left behind", path.display())]
     DiskFull {
         /// The file.
         path: PathBuf,
-        /// The system's reason.
+        /// The operating system's reason.
         source: io::Error,
     },
-    /// A dataset is already there and may not be replaced.
+    /// A dataset exists already and may not be replaced.
     #[error("{}: holds a dataset already; it is replaced only on request", path.display())]
     Exists {
         /// The folder.
         path: PathBuf,
     },
-    /// Something that is not a dataset is already there; it is never touched.
+    /// Something that is not a dataset exists already; it is never touched.
     #[error("{}: {what}; it is left as it is", path.display())]
     Foreign {
         /// The file or folder.
         path: PathBuf,
-        /// What is there instead.
+        /// What exists there instead.
         what: &'static str,
     },
-    /// Text that is not what the file should hold.
+    /// Text that is not valid content for the file.
     #[error("{}:{line}:{column}: {message}", path.display())]
     Text {
         /// The file.
@@ -57,17 +57,17 @@ pub enum IoError {
         /// What is wrong, with the key.
         message: String,
     },
-    /// A recording that is cut off or corrupt, or holds other messages than it should.
+    /// A recording that is cut off or corrupt, or holds unexpected messages.
     #[error("{}: {what} (by byte {offset})", path.display())]
     Recording {
         /// The file.
         path: PathBuf,
         /// What is wrong.
         what: String,
-        /// Bytes of the file read when it was noticed.
+        /// Byte offset at which it was detected.
         offset: u64,
     },
-    /// Values that do not fit together.
+    /// Inconsistent values.
     #[error("{}: {message}", path.display())]
     Content {
         /// The file or folder.
@@ -75,12 +75,12 @@ pub enum IoError {
         /// What is wrong.
         message: String,
     },
-    /// Parts of a dataset, or a dataset and a calibration, that do not fit together.
+    /// Inconsistent parts of a dataset, or an inconsistent dataset and calibration.
     #[error("{}: {source}", path.display())]
     Inconsistent {
         /// The folder or file.
         path: PathBuf,
-        /// The part.
+        /// The inconsistency.
         source: ModelError,
     },
     /// A file whose SHA-256 is not the one in the manifest.
@@ -94,13 +94,13 @@ pub enum IoError {
 }
 
 impl IoError {
-    /// A failure to read.
+    /// An error in reading.
     pub fn read(path: impl AsRef<Path>, source: io::Error) -> Self {
         let path = path.as_ref().to_owned();
         Self::Read { path, source }
     }
 
-    /// A failure to write; a full disk is told apart.
+    /// An error in writing; a full disk is a separate variant.
     pub fn write(path: impl AsRef<Path>, source: io::Error) -> Self {
         let path = path.as_ref().to_owned();
         match source.kind() {
@@ -109,7 +109,7 @@ impl IoError {
         }
     }
 
-    /// Values that do not fit together.
+    /// An error in the content as a whole.
     pub fn content(path: impl AsRef<Path>, message: impl Into<String>) -> Self {
         Self::Content {
             path: path.as_ref().to_owned(),
@@ -117,11 +117,11 @@ impl IoError {
         }
     }
 
-    /// A TOML file that is not what it should be.
+    /// An error in a TOML file.
     pub fn toml(path: impl AsRef<Path>, text: &str, error: &toml::de::Error) -> Self {
         let before = text.get(..error.span().map_or(0, |s| s.start)).unwrap_or(text);
         let line_start = before.rfind('\n').map_or(0, |i| i + 1);
-        // Without its input the error tells the key instead of drawing the line.
+        // Without its input, the error names the key instead of printing the line.
         let mut bare = error.clone();
         bare.set_input(None);
         Self::Text {
@@ -132,7 +132,7 @@ impl IoError {
         }
     }
 
-    /// A JSON file that is not what it should be.
+    /// An error in a JSON file.
     pub fn json(path: impl AsRef<Path>, error: &serde_json::Error) -> Self {
         let whole = error.to_string();
         let place = format!(" at line {} column {}", error.line(), error.column());
@@ -144,8 +144,8 @@ impl IoError {
         }
     }
 
-    /// What a program that ends with this error reports to its caller: 2 where the content of a file is wrong, 3
-    /// where the system could not read or write, or something else stands in the way.
+    /// The exit code of a program that ends with this error: 2 if the content of a file is wrong, 3 if the system could
+    /// not read or write, or if an existing file or folder may not be replaced.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Text { .. }
@@ -167,7 +167,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_full_disk_is_told_apart() {
+    fn a_full_disk_is_a_separate_error() {
         let full = IoError::write("d/f", io::Error::from(io::ErrorKind::StorageFull));
         assert!(matches!(full, IoError::DiskFull { .. }));
         assert!(full.to_string().starts_with("d/f: ") && full.to_string().contains("disk is full"));

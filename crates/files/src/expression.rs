@@ -1,4 +1,4 @@
-//! Arithmetic that a person reads at a glance: `reach_mm + 5`, `(a_deg − b_deg) / 2`.
+//! Simple arithmetic in scene files: `reach_mm + 5`, `(a_deg − b_deg) / 2`.
 //!
 //! ```text
 //! sum     = product { ("+" | "−") product }
@@ -9,19 +9,19 @@
 
 use catoptric_model::place::nearest;
 
-/// How deep parentheses and signs may nest.
+/// Maximum nesting depth of parentheses and signs.
 const DEEPEST: usize = 64;
 
-/// What is wrong with an expression, and where.
+/// An error in an expression, with its position.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Flaw {
-    /// Byte of the expression.
+    /// Byte offset in the expression.
     pub(super) at: usize,
-    /// Length of what is wrong, in bytes.
+    /// Length of the faulty part, in bytes.
     pub(super) length: usize,
     /// What was found and what is needed.
     pub(super) message: String,
-    /// What to do about it.
+    /// How to fix it.
     pub(super) help: Option<String>,
 }
 
@@ -30,11 +30,11 @@ pub(super) struct Flaw {
 pub(super) struct NoValue {
     /// What is wrong with it.
     pub(super) message: String,
-    /// What to do about it.
+    /// How to fix it.
     pub(super) help: Option<String>,
 }
 
-/// The value of an expression, names looked up as they come.
+/// Evaluates an expression; `look_up` is called for every name, in order.
 pub(super) fn evaluate(
     text: &str,
     look_up: &mut dyn FnMut(&str) -> Result<f64, NoValue>,
@@ -61,7 +61,7 @@ pub(super) fn evaluate(
     Ok(value)
 }
 
-/// Whether something may be the name of a value: letters, digits and `_`, no digit first.
+/// Whether a string is a valid name: letters, digits and `_`, not starting with a digit.
 pub(super) fn is_name(text: &str) -> bool {
     text.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
         && text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
@@ -83,7 +83,7 @@ impl Reader<'_> {
         self.at += self.rest().len() - self.rest().trim_start().len();
     }
 
-    /// One of several signs, if it comes next.
+    /// One of several signs, if it is next.
     fn sign(&mut self, signs: &[char]) -> Option<char> {
         self.blanks();
         let next = self.rest().chars().next().filter(|c| signs.contains(c))?;
@@ -200,7 +200,7 @@ impl Reader<'_> {
         Ok(function(value))
     }
 
-    /// Digits, a point, and an exponent with its sign.
+    /// Digits, a decimal point, and an exponent with its sign.
     fn number(&mut self, start: usize) -> Result<f64, Flaw> {
         let mut last = ' ';
         let length = self.rest().find(|c: char| {
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn flaws_say_where_they_are() {
+    fn flaws_have_positions() {
         for (text, at, length, words) in [
             ("reach_mm + ", 11, 0, "ends where a number"),
             ("reach_mm 5", 9, 1, "'5' where an operator"),

@@ -1,4 +1,4 @@
-//! One file, whole or not at all: written beside its place, brought to disk, then renamed.
+//! Atomic writing of one file: it is written next to its destination, flushed to disk, then renamed.
 
 use super::error::IoError;
 use super::json::to_json;
@@ -10,12 +10,12 @@ use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
-/// Writes a file so that it appears whole or not at all. What was there before is replaced.
+/// Writes a file completely or not at all, replacing any existing file.
 ///
-/// A link is followed; a pipe or a device, which cannot be replaced, is written to directly.
+/// Links are followed; a pipe or a device, which cannot be replaced, is written to directly.
 ///
 /// # Errors
-/// [`IoError`] if the system refuses; then the file is as it was and nothing is left beside it.
+/// [`IoError`] if the system refuses; then the file is unchanged and no temporary file is left.
 ///
 /// ```
 /// let folder = tempfile::tempdir()?;
@@ -43,7 +43,7 @@ fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
     place(file, path)
 }
 
-/// Brings a temporary file to disk and renames it.
+/// Flushes a temporary file to disk and renames it.
 fn place(file: NamedTempFile, path: &Path) -> io::Result<()> {
     file.as_file().sync_all()?;
     file.persist(path).map_err(|e| e.error)?;
@@ -56,14 +56,14 @@ fn temporary(folder: &Path) -> io::Result<NamedTempFile> {
     builder.prefix(".partial-");
     #[cfg(unix)]
     {
-        // Temporary files are private by default; this one becomes an ordinary file under the user's mask.
+        // Temporary files are private by default; this one gets the ordinary permissions under the user's mask.
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     builder.tempfile_in(folder)
 }
 
-/// A file written piece by piece, whole or not at all. A pipe or a device gets the pieces directly.
+/// A file written piece by piece, completely or not at all. A pipe or a device receives the pieces directly.
 #[derive(Debug)]
 pub struct StagedOutput {
     place: PathBuf,
@@ -78,7 +78,7 @@ enum Target {
 }
 
 impl StagedOutput {
-    /// Begins a file; what stands at its place stays until [`finish`](Self::finish).
+    /// Begins a file; an existing one remains until [`finish`](Self::finish).
     ///
     /// # Errors
     /// [`IoError`] if the system refuses.
@@ -101,12 +101,12 @@ impl StagedOutput {
         Ok(Self { place, shown, target })
     }
 
-    /// Whether the pieces go to a pipe or a device, where nothing can be changed once it is written.
+    /// Whether the pieces go to a pipe or a device, which cannot be rewritten.
     pub fn is_direct(&self) -> bool {
         matches!(self.target, Target::Direct(_))
     }
 
-    /// Appends.
+    /// Appends bytes.
     ///
     /// # Errors
     /// [`IoError`] if the system refuses.
@@ -118,7 +118,7 @@ impl StagedOutput {
         .map_err(|e| IoError::write(&self.shown, e))
     }
 
-    /// Writes over the beginning of a file, which must be no pipe, and appends no more.
+    /// Overwrites the beginning of a file, which must not be a pipe; nothing may be appended afterwards.
     ///
     /// # Errors
     /// [`IoError`] if the system refuses.
@@ -130,10 +130,10 @@ impl StagedOutput {
         rewritten.map_err(|e| IoError::write(&self.shown, e))
     }
 
-    /// Ends the file and moves it to its place.
+    /// Ends the file and moves it to its destination.
     ///
     /// # Errors
-    /// [`IoError`] if the system refuses; then nothing of it is left.
+    /// [`IoError`] if the system refuses; then no part of it is left.
     pub fn finish(self) -> Result<(), IoError> {
         let ended = match self.target {
             Target::Staged(file) => match file.into_inner() {
@@ -152,15 +152,15 @@ fn write_through(path: &Path, bytes: &[u8]) -> io::Result<()> {
     file.flush()
 }
 
-/// Brings a rename to disk.
+/// Flushes a rename to disk.
 pub(super) fn sync_folder(folder: &Path) {
-    // Not every system lets a folder be opened; there the rename reaches the disk in its own time.
+    // Not every system can open a folder; on those, the rename reaches the disk later.
     if let Ok(folder) = File::open(folder) {
         let _ = folder.sync_all();
     }
 }
 
-/// Writes a value as JSON, whole or not at all; numbers that are not finite become null.
+/// Writes a value as JSON, completely or not at all; numbers that are not finite become null.
 ///
 /// # Errors
 /// [`IoError`] as [`write_file`] and [`to_json`].
@@ -169,15 +169,15 @@ pub fn write_json(path: impl AsRef<Path>, value: &impl Serialize) -> Result<(), 
     write_file(path, &to_json(path, value)?)
 }
 
-/// SHA-256 of some bytes, as hexadecimal digits.
+/// SHA-256 of some bytes, in hexadecimal.
 pub fn sha256(bytes: &[u8]) -> String {
     hexadecimal(&Sha256::digest(bytes))
 }
 
-/// SHA-256 of a file, as hexadecimal digits.
+/// SHA-256 of a file, in hexadecimal.
 ///
 /// # Errors
-/// What the system says if it cannot be read.
+/// The error of the operating system if it cannot be read.
 pub(super) fn sha256_file(path: &Path) -> io::Result<String> {
     let mut hasher = Sha256::new();
     let mut file = File::open(path)?;
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_replaced_and_nothing_left_beside_it() {
+    fn a_file_is_replaced_without_leftovers() {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("a.json");
         write_json(&path, &[1.0, f64::NAN]).expect("written");
@@ -229,10 +229,10 @@ mod tests {
         assert!(matches!(error, IoError::Read { .. }));
     }
 
-    /// The device that is always full stands for the disk.
+    /// The device that is always full is used for the disk.
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_full_device_is_recognised() {
+    fn a_full_device_is_recognized() {
         let error = write_file("/dev/full", b"x").expect_err("full");
         assert!(matches!(error, IoError::DiskFull { .. }), "{error}");
         write_file("/dev/null", b"x").expect("a device is written to, not replaced");

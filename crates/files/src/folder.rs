@@ -1,4 +1,4 @@
-//! One folder, whole or not at all: filled beside its place, brought to disk, then renamed.
+//! Atomic writing of one folder: it is filled next to its destination, flushed to disk, then renamed.
 
 use super::error::IoError;
 use super::file::sync_folder;
@@ -8,7 +8,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// What stands at the place of a folder that is to be written.
+/// What exists at the destination of a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Occupant {
     /// Nothing, or an empty folder.
@@ -17,10 +17,10 @@ pub enum Occupant {
     Replaceable,
 }
 
-/// A folder being filled. Dropped before [`publish`](Self::publish) it disappears.
+/// A folder being filled. It is deleted if dropped before [`publish`](Self::publish).
 #[derive(Debug)]
 pub struct StagedFolder {
-    /// Holds `new`, and `old` for the moment of a replacement.
+    /// Holds `new`, and, during a replacement, `old`.
     staging: TempDir,
     out: PathBuf,
     occupant: Occupant,
@@ -34,7 +34,7 @@ pub struct StagedFile {
 }
 
 impl StagedFolder {
-    /// Begins a folder that will appear at `out`. Missing folders above it are created.
+    /// Begins a folder that will appear at `out`. Missing parent folders are created.
     ///
     /// # Errors
     /// [`IoError`] if the system refuses.
@@ -52,22 +52,22 @@ impl StagedFolder {
             out: out.to_owned(),
             occupant,
         };
-        // A folder within: the temporary one is private to its owner, the one that is published is not.
+        // A nested folder: the temporary one is private to its owner, the published one is not.
         fs::create_dir(staged.root()).map_err(|e| IoError::write(out, e))?;
         Ok(staged)
     }
 
-    /// Where files are until the folder is put in place.
+    /// Temporary location of the files until the folder is published.
     fn root(&self) -> PathBuf {
         self.staging.path().join("new")
     }
 
-    /// Where a file will be; errors name this place.
+    /// Final path of a file, used in errors.
     pub fn shown(&self, relative: &str) -> PathBuf {
         self.out.join(relative)
     }
 
-    /// Opens a new file; folders on its way are created.
+    /// Opens a new file; missing parent folders are created.
     ///
     /// # Errors
     /// [`IoError`] if the system refuses.
@@ -93,7 +93,7 @@ impl StagedFolder {
         file.finish()
     }
 
-    /// Every file so far, in order of name: its name with forward slashes, and where it stands until then.
+    /// All files so far, ordered by name: name with forward slashes, and temporary path.
     ///
     /// # Errors
     /// [`IoError`] if the system refuses.
@@ -101,21 +101,21 @@ impl StagedFolder {
         list(&self.root()).map_err(|e| IoError::read(&self.out, e))
     }
 
-    /// Moves the folder to its place. Every file was brought to disk when it was finished.
+    /// Moves the folder to its destination. Every file was flushed to disk when it was finished.
     ///
     /// # Errors
-    /// [`IoError`] if the system refuses; what was there before is then put back.
+    /// [`IoError`] if the system refuses; then the earlier folder is restored.
     pub fn publish(self) -> Result<(), IoError> {
         let fail = |e| IoError::write(&self.out, e);
         let old = self.staging.path().join("old");
         if self.occupant == Occupant::Replaceable {
             fs::rename(&self.out, &old).map_err(fail)?;
         } else if self.out.is_dir() {
-            fs::remove_dir(&self.out).map_err(fail)?; // refuses unless it is still empty
+            fs::remove_dir(&self.out).map_err(fail)?; // fails unless it is still empty
         }
         if let Err(error) = fs::rename(self.root(), &self.out) {
             if old.exists() && fs::rename(&old, &self.out).is_err() {
-                // Better a strange name than a lost dataset.
+                // A dataset under a strange name is better than a lost one.
                 let kept = self.staging.keep();
                 return Err(IoError::write(kept.join("old"), error));
             }
@@ -127,10 +127,10 @@ impl StagedFolder {
 }
 
 impl StagedFile {
-    /// Brings the file to disk.
+    /// Flushes the file to disk.
     ///
     /// # Errors
-    /// [`IoError`] if the system refuses; a file that is dropped instead may be cut off without a word.
+    /// [`IoError`] if the system refuses. Dropping the file instead may truncate it silently.
     pub fn finish(mut self) -> Result<(), IoError> {
         let synced = self.file.flush().and_then(|()| self.file.get_ref().sync_all());
         synced.map_err(|e| IoError::write(&self.shown, e))
@@ -147,7 +147,7 @@ impl Write for StagedFile {
     }
 }
 
-/// Every file below a folder, in order of name: its name with forward slashes, and its path.
+/// All files below a folder, ordered by name: name with forward slashes, and path.
 pub(super) fn list(root: &Path) -> io::Result<Vec<(String, PathBuf)>> {
     let mut found = Vec::new();
     let mut folders = vec![(String::new(), root.to_owned())];

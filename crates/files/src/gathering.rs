@@ -1,4 +1,4 @@
-//! A stretch in the making: the messages between one label and the next.
+//! A stretch being recorded: the messages between one label and the next.
 
 use super::bodies::Bodies;
 use super::capture::{Capture, seconds_between};
@@ -9,10 +9,10 @@ use catoptric_model::session::ScannerSheet;
 use catoptric_model::{PoseLabel, Stretch, Track};
 use std::f64::consts::TAU;
 
-/// How far a period may be from the scanner's to be taken for it, in seconds: stamps are whole nanoseconds.
+/// Maximum difference from the scanner's period to be treated as equal to it, in seconds: stamps are whole nanoseconds.
 const PERIOD_TOLERANCE_S: f64 = 1e-9;
 
-/// What every stretch of a recording shares.
+/// Properties shared by all stretches of a recording.
 #[derive(Clone, Copy)]
 pub(super) struct Known<'a> {
     pub(super) scanner: &'a ScannerSheet,
@@ -21,23 +21,23 @@ pub(super) struct Known<'a> {
     pub(super) epoch: u64,
 }
 
-/// What is kept of a stretch while it passes: all of it, or what a calibration needs.
+/// What is kept of a stretch while it is read: everything, or what a calibration needs.
 pub(super) trait Keep: Sized {
-    /// What it becomes.
+    /// The final result.
     type Kept;
-    /// Nothing yet of a stretch of so many beams.
+    /// Begins an empty stretch with a given number of beams.
     fn begin(label: &PoseLabel, beams: usize) -> Self;
-    /// Takes a scan in.
+    /// Adds a scan.
     fn scan(&mut self, ranges: Vec<f64>);
-    /// Takes the echoes of a scan in.
+    /// Adds the echoes of a scan.
     fn echoes(&mut self, echoes: Vec<Vec<f64>>);
-    /// Looks at what motion capture has seen so far.
+    /// Processes the motion capture received so far.
     fn look(&mut self, capture: &mut Capture, known: Known<'_>);
-    /// The end of a stretch that is whole.
+    /// Ends a complete stretch.
     fn end(stretch: Gathering<Self>, known: Known<'_>) -> Self::Kept;
 }
 
-/// A stretch being read; times are nanoseconds.
+/// A stretch being read; times are in nanoseconds.
 pub(super) struct Gathering<R> {
     pub(super) label: PoseLabel,
     label_time: u64,
@@ -45,13 +45,13 @@ pub(super) struct Gathering<R> {
     last_scan: u64,
     scan_time: f64,
     scans: usize,
-    /// Scans of which the echoes were recorded too.
+    /// Number of scans whose echoes were recorded too.
     echoes: usize,
     pub(super) kept: R,
     pub(super) capture: Capture,
 }
 
-/// All of a stretch.
+/// Keeps the whole stretch.
 #[derive(Default)]
 pub(super) struct Whole {
     ranges: Vec<f64>,
@@ -74,7 +74,7 @@ impl<R: Keep> Gathering<R> {
         }
     }
 
-    /// Takes a scan in; its beams must be those of the session.
+    /// Adds a scan; its beams must be those of the session.
     pub(super) fn scan(&mut self, scan: Scan, scanner: &ScannerSheet) -> Result<(), String> {
         let beams = scanner.scan.beams();
         if scan.ranges.len() != beams {
@@ -83,9 +83,9 @@ impl<R: Keep> Gathering<R> {
         let (first, step) = (scanner.scan.azimuth(0), scanner.scan.increment());
         let drift = (scan.angle_increment - step).abs() * beams as f64;
         let off = scan.angle_min - first;
-        // Azimuths a turn apart are one.
+        // Azimuths a full turn apart are equivalent.
         let off = off - TAU * (off / TAU).round();
-        // A quarter of a step tells rounding to 32 bits from another beam.
+        // A quarter of a step separates 32-bit rounding from a different beam.
         if drift + off.abs() > step.abs() / 4.0 {
             return Err(format!(
                 "beams from {} rad in steps of {} rad, session.toml has {first} and {step}",
@@ -100,7 +100,7 @@ impl<R: Keep> Gathering<R> {
         Ok(())
     }
 
-    /// Takes the echoes of a scan in; its beams must be those of the session.
+    /// Adds the echoes of a scan; its beams must be those of the session.
     pub(super) fn echoes(&mut self, echoes: Vec<Vec<f64>>, scanner: &ScannerSheet) -> Result<(), String> {
         let beams = scanner.scan.beams();
         if echoes.len() != beams {
@@ -111,7 +111,7 @@ impl<R: Keep> Gathering<R> {
         Ok(())
     }
 
-    /// Takes a solved pose of a body in.
+    /// Adds a solved pose of a body.
     pub(super) fn pose(
         &mut self,
         time: u64,
@@ -124,7 +124,7 @@ impl<R: Keep> Gathering<R> {
         Ok(())
     }
 
-    /// Takes the markers of a frame in.
+    /// Adds the markers of a frame.
     pub(super) fn markers(
         &mut self,
         time: u64,
@@ -141,7 +141,7 @@ impl<R: Keep> Gathering<R> {
         self.label.pose
     }
 
-    /// The end of the stretch; an error if its scans are not as many as its label says.
+    /// Ends the stretch; an error if the number of its scans differs from its label.
     pub(super) fn end(self, known: Known<'_>) -> Result<R::Kept, String> {
         let (pose, expected, found) = (self.label.pose, self.label.scans, self.scans);
         if found != expected {
@@ -153,7 +153,7 @@ impl<R: Keep> Gathering<R> {
         Ok(R::end(self, known))
     }
 
-    /// The stretch without its readings, with times counted from the epoch, and what was kept of them.
+    /// The stretch without its readings, with times counted from the epoch, and the data kept of them.
     pub(super) fn into_stretch(mut self, known: Known<'_>) -> (Stretch, R) {
         let start = self.first_scan.unwrap_or(self.label_time);
         let stretch = Stretch {
@@ -168,7 +168,7 @@ impl<R: Keep> Gathering<R> {
         (stretch, self.kept)
     }
 
-    /// Time from scan to scan: the scanner's where the stamps agree with it to their resolution.
+    /// Scan period: the scanner's if the stamps agree with it to within their resolution.
     fn period(&self, scanner: &ScannerSheet, start: u64) -> f64 {
         let rated = scanner.scan.scan_period_s();
         let (measured, tolerance) = match self.scans {
@@ -186,7 +186,7 @@ impl<R: Keep> Gathering<R> {
         }
     }
 
-    /// The rig, the board of the label and whatever else was seen, with the frames that are there still.
+    /// The rig, the board of the label and any other body seen, with their remaining frames.
     fn tracks(&mut self, known: Known<'_>) -> Vec<Track> {
         if self.capture.waiting() == 0 {
             return Vec::new();

@@ -1,8 +1,8 @@
-//! Files: the only part of the library that reads or writes.
+//! File formats: the only part of the library that reads or writes files.
 //!
-//! A dataset is a folder ([`dataset`]) whose observations are a recording in the Robot Operating System's own
-//! format ([`recording`], [`playback`]), so that others' tools open it. Whatever is written appears whole or not
-//! at all ([`file`](mod@file), [`folder`]); whatever goes wrong names the file ([`error`]).
+//! A dataset is a folder ([`dataset`]) whose observations are a recording in the Robot Operating System's
+//! format ([`recording`], [`playback`]), readable by third-party tools. Every output is written completely or not
+//! at all ([`file`](mod@file), [`folder`]); every error names the file ([`error`]).
 
 #[cfg(feature = "recording")]
 mod blocks;

@@ -1,4 +1,4 @@
-//! `manifest.json`: where a dataset comes from, and what its files were when it was written. It holds no clock.
+//! `manifest.json`: the provenance of a dataset, and the hashes of its files when it was written. It has no timestamps.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -9,18 +9,18 @@ pub const SCHEMA_VERSION: u32 = 1;
 /// The commit this library was built from; "unknown" if it was not built from a checkout.
 pub const GIT_HASH: &str = env!("CATOPTRIC_GIT_HASH");
 
-/// What the caller knows of where a dataset comes from.
+/// The provenance of a dataset, as known to the caller.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Provenance {
     /// Seed of all randomness.
     pub seed: u64,
-    /// The command in canonical form: without paths of one machine, options in a fixed order.
+    /// The command in canonical form: without machine-specific paths, options in a fixed order.
     pub command_line: String,
-    /// Name of the rule that makes random numbers from the seed.
+    /// Name of the rule that generates random numbers from the seed.
     pub rng_rule: String,
 }
 
-/// `manifest.json`, written last: a folder without it was never finished, or was recorded by someone else.
+/// `manifest.json`, written last: a folder without it is unfinished, or was recorded by a third party.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
@@ -34,9 +34,9 @@ pub struct Manifest {
     pub seed: u64,
     /// The command that wrote the dataset.
     pub command_line: String,
-    /// Name of the rule that makes random numbers from the seed.
+    /// Name of the rule that generates random numbers from the seed.
     pub rng_rule: String,
-    /// SHA-256 of the resolved scene, `truth/scene.toml`; `None` if there was none.
+    /// SHA-256 of the resolved scene, `truth/scene.toml`; `None` if there is none.
     pub scene_sha256: Option<String>,
     /// SHA-256 of every other file by its path in the dataset, with forward slashes.
     pub files: BTreeMap<String, String>,

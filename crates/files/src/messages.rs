@@ -1,6 +1,6 @@
-//! The messages of a recording as bytes: encoding what we write, decoding what we need.
+//! The messages of a recording as bytes: encoders for what we write, decoders for what we need.
 //!
-//! Fields stand in the order of [`definitions`](super::definitions). Times are nanoseconds since 1970, lengths metres.
+//! Fields are in the order of [`definitions`](super::definitions). Times are nanoseconds since 1970, lengths meters.
 
 use super::cdr::{CdrError, CdrReader, CdrWriter};
 use catoptric_model::beam;
@@ -14,25 +14,25 @@ pub const LASER_FRAME: &str = "laser";
 /// Frame of motion capture.
 pub const ROOM_FRAME: &str = "room";
 
-/// Nanoseconds in a second.
+/// Nanoseconds per second.
 pub const NS_PER_S: u64 = 1_000_000_000;
 
-/// A marker that is identified by name and by index (`USE_BOTH`).
+/// A marker identified by name and by index (`USE_BOTH`).
 const NAME_AND_INDEX: i8 = 2;
 
-/// Where the number of the frame stands in a message of markers.
+/// Offset of the frame number in a message of markers.
 pub(super) const FRAME_NUMBER: std::ops::Range<usize> = 24..28;
 
 /// The data type of a `PointField` of 32-bit numbers (`FLOAT32`).
 const FLOAT32: u8 = 7;
 
-/// A message whose bytes are not what its type says, or whose values cannot be.
+/// A message whose bytes do not match its type, or whose values are impossible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MessageError {
     /// The bytes.
     #[error(transparent)]
     Cdr(#[from] CdrError),
-    /// A pose that is none.
+    /// An invalid pose.
     #[error("a pose with a position that is not finite or a quaternion of length {length}")]
     NotAPose {
         /// Length of the quaternion, which should be 1.
@@ -49,15 +49,15 @@ pub enum MessageError {
 /// A scan as it was recorded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scan {
-    /// When the scan began, in nanoseconds.
+    /// Time at which the scan began, in nanoseconds.
     pub stamp: u64,
     /// Azimuth of the first beam, in radians.
     pub angle_min: f64,
     /// Azimuth between beams, in radians.
     pub angle_increment: f64,
-    /// Time from scan to scan, in seconds.
+    /// Scan period, in seconds.
     pub scan_time: f64,
-    /// Readings in metres, with the codes of REP-117.
+    /// Readings in meters, with the codes of REP-117.
     pub ranges: Vec<f64>,
 }
 
@@ -66,24 +66,24 @@ pub struct Scan {
 pub struct LabelledMarker {
     /// Label.
     pub name: String,
-    /// Place in the template of its body.
+    /// Index in the template of its body.
     pub index: usize,
-    /// Place in the room, in metres.
+    /// Position in the room, in meters.
     pub point: Point3<f64>,
 }
 
-/// A frame and where it stands in another.
+/// A frame and its pose in another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameTransform<'a> {
-    /// Frame in which it stands.
+    /// Parent frame.
     pub parent: &'a str,
-    /// The frame.
+    /// Child frame.
     pub child: &'a str,
     /// `parent_from_child`.
     pub pose: Pose,
 }
 
-/// The nearest 32-bit number, as messages hold them; one NaN for all, so that equal readings are equal bytes.
+/// The nearest 32-bit number, as stored in messages; all NaNs become the same, so that equal readings give equal bytes.
 pub(super) fn single(value: f64) -> f32 {
     if value.is_nan() {
         return f32::NAN;
@@ -110,8 +110,8 @@ fn write_numbers(cdr: &mut CdrWriter, values: &[f64]) {
     }
 }
 
-/// What a scan begins with: header, angles, times and limits. The increment of a clockwise scan is negative, as drivers of
-/// scanners that turn that way have it.
+/// The beginning of a scan: header, angles, times and limits. The increment of a clockwise scan is negative, as drivers
+/// of clockwise scanners set it.
 fn write_scan_sheet(cdr: &mut CdrWriter, stamp: u64, scanner: &ScannerSheet, period_s: f64) {
     write_header(cdr, stamp, LASER_FRAME);
     let scan = &scanner.scan;
@@ -141,7 +141,7 @@ pub fn encode_scan(stamp: u64, scanner: &ScannerSheet, period_s: f64, ranges: &[
     cdr.into_bytes()
 }
 
-/// A `sensor_msgs/msg/MultiEchoLaserScan`: the echoes of every beam, none where there is no return.
+/// A `sensor_msgs/msg/MultiEchoLaserScan`: the echoes of every beam, empty if there is no return.
 pub fn encode_echoes(stamp: u64, scanner: &ScannerSheet, period_s: f64, echoes: &[Vec<f64>]) -> Vec<u8> {
     let mut cdr = CdrWriter::new();
     write_scan_sheet(&mut cdr, stamp, scanner, period_s);
@@ -252,7 +252,7 @@ fn read_singles(cdr: &mut CdrReader<'_>) -> Result<Vec<f64>, CdrError> {
 pub fn decode_echoes(message: &[u8]) -> Result<(u64, Vec<Vec<f64>>), MessageError> {
     let (stamp, mut cdr) = open(message)?;
     for _ in 0..7 {
-        cdr.f32()?; // angles, times and limits are those of the LaserScan beside it
+        cdr.f32()?; // angles, times and limits are those of the accompanying LaserScan
     }
     // A beam takes at least the four bytes of its number of echoes.
     let beams = cdr.length(size_of::<u32>())?;
@@ -283,12 +283,12 @@ pub fn decode_scan(message: &[u8]) -> Result<Scan, MessageError> {
     })
 }
 
-/// Reads the time and the pose of a `PoseStamped`, bit by bit if its quaternion has unit length.
+/// Reads the time and the pose of a `PoseStamped`, bit for bit if its quaternion has unit length.
 ///
 /// # Errors
-/// [`MessageError`] if the bytes are not one or the numbers are no pose.
+/// [`MessageError`] if the bytes are not one or the pose is invalid.
 pub fn decode_pose(message: &[u8]) -> Result<(u64, Pose), MessageError> {
-    // Others' files may hold rounded quaternions; ours are unit to the last bits.
+    // Third-party files may hold rounded quaternions; ours have unit length to machine precision.
     const ROUNDED: f64 = 1e-3;
     const EXACT: f64 = 1e-12;
     let (stamp, mut cdr) = open(message)?;

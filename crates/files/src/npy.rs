@@ -1,4 +1,4 @@
-//! NumPy's array files, as far as rays need them: two-dimensional, little-endian f64 or f32, C order.
+//! NumPy array files, as far as rays need them: two-dimensional, little-endian f64 or f32, C order.
 //!
 //! A file is the magic `\x93NUMPY`, a version, the header's length (two bytes in version 1, four in version 2), the
 //! header, a Python dictionary in ASCII, and the numbers.
@@ -14,33 +14,33 @@ pub enum Float {
     F64,
 }
 
-/// What a header says.
+/// The contents of a header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Header {
     /// Type of the numbers.
     pub float: Float,
-    /// Rows.
+    /// Number of rows.
     pub rows: usize,
-    /// Columns.
+    /// Number of columns.
     pub columns: usize,
 }
 
-/// Bytes of a header as [`header`] writes it: fixed, so that it can be written again when the rows are known.
+/// Size of a header written by [`header`]: fixed, so that it can be rewritten when the number of rows is known.
 pub const HEADER_LENGTH: usize = START + TEXT_LENGTH as usize;
 
 /// Bytes before a header's text in version 1.
 const START: usize = 10;
 
-/// Bytes of the text: the whole header is a multiple of 64, as the format asks.
+/// Size of the text: the whole header is a multiple of 64, as the format requires.
 const TEXT_LENGTH: u16 = 118;
 
-/// Longest header that is read: NumPy's own are a hundredth of it.
+/// Maximum length of a header to read: NumPy's own are a hundredth of it.
 const LONGEST_HEADER: usize = 1 << 16;
 
 const MAGIC: &[u8; 6] = b"\x93NUMPY";
 
 impl Float {
-    /// Bytes of one number.
+    /// Size of one number, in bytes.
     pub fn size(self) -> usize {
         match self {
             Self::F32 => 4,
@@ -60,7 +60,7 @@ impl Float {
 /// The header of an array of f64 in version 1.
 pub fn header(rows: usize, columns: usize) -> Vec<u8> {
     let text = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
-    // Two numbers of 20 digits at most leave enough of it; the header ends with a newline.
+    // Two numbers of at most 20 digits fit easily; the header ends with a newline.
     let padded = format!("{text:<width$}\n", width = usize::from(TEXT_LENGTH) - 1);
     let mut bytes = MAGIC.to_vec();
     bytes.extend([1, 0]);
@@ -72,7 +72,7 @@ pub fn header(rows: usize, columns: usize) -> Vec<u8> {
 /// Reads a header and leaves the reader at the first number.
 ///
 /// # Errors
-/// What the system says, or [`io::ErrorKind::InvalidData`] with what is wrong with the header.
+/// The error of the operating system, or [`io::ErrorKind::InvalidData`] with what is wrong with the header.
 pub fn read_header(reader: &mut impl Read) -> io::Result<Header> {
     let mut start = [0; 8];
     exact(reader, &mut start)?;
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn damaged_headers_say_what_is_wrong() {
+    fn damaged_headers_give_specific_errors() {
         let of = |text: &str| read(&version_2(text)).expect_err("damaged");
         assert!(read(b"PK").expect_err("short").contains("ends within its header"));
         assert!(

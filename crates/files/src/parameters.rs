@@ -1,7 +1,7 @@
-//! Parameters and expressions of a scene, worked out before anything else looks at it.
+//! Parameters and expressions of a scene, evaluated before any other check.
 //!
-//! Text that begins with `=` where a number stands is an expression over the names in `[parameters]`; parameters may be
-//! made from one another.
+//! Text that begins with `=` in place of a number is an expression over the names in `[parameters]`; parameters may
+//! depend on one another.
 
 use super::expression::{Flaw, NoValue, evaluate, is_name};
 use super::tree::{Key, Node, Source, Value};
@@ -9,20 +9,20 @@ use catoptric_model::place::nearest;
 use serde_json::Value as Json;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Something wrong with a parameter or an expression.
+/// An error in a parameter or an expression.
 #[derive(Debug)]
 pub(super) struct Fault {
-    /// The value that it is in.
+    /// The value that contains it.
     pub(super) whole: Source,
-    /// The part of it that is wrong.
+    /// The faulty part of it.
     pub(super) part: Source,
     /// What was found and what is needed.
     pub(super) message: String,
-    /// What to do about it.
+    /// How to fix it.
     pub(super) help: Option<String>,
 }
 
-/// Puts a number in the place of every expression; `text` is the file, for places within them, `texts` the
+/// Replaces every expression by a number; `text` is the file, for positions in it, `texts` the
 /// [`text_keys`].
 pub(super) fn resolve(root: &mut Node, text: &str, texts: &BTreeSet<String>) -> Vec<Fault> {
     let mut faults = Vec::new();
@@ -35,7 +35,7 @@ pub(super) fn resolve(root: &mut Node, text: &str, texts: &BTreeSet<String>) -> 
     faults
 }
 
-/// What every parameter is, a bare number or expression being short for its value.
+/// Expands parameters given as a bare number or expression, which are short for their value.
 fn definitions(root: &mut Node, faults: &mut Vec<Fault>) -> BTreeMap<String, Value> {
     let Value::Table(entries) = &mut root.value else {
         return BTreeMap::new();
@@ -50,7 +50,7 @@ fn definitions(root: &mut Node, faults: &mut Vec<Fault>) -> BTreeMap<String, Val
             faults.push(Fault {
                 whole: key.source.clone(),
                 part: key.source.clone(),
-                message: format!("the parameter `{}` cannot stand in an expression", key.name),
+                message: format!("the parameter `{}` cannot be used in an expression", key.name),
                 help: Some("letters, digits and _ make a name, no digit first".to_owned()),
             });
         }
@@ -70,10 +70,10 @@ fn definitions(root: &mut Node, faults: &mut Vec<Fault>) -> BTreeMap<String, Val
     found
 }
 
-/// Values of parameters as far as they are known.
+/// Values of the parameters evaluated so far.
 struct Values<'a> {
     definitions: &'a BTreeMap<String, Value>,
-    /// `None` while it is being worked out.
+    /// `None` while it is being evaluated.
     known: BTreeMap<String, Option<f64>>,
 }
 
@@ -83,10 +83,7 @@ impl Values<'_> {
         match self.known.get(name) {
             Some(Some(value)) => return Ok(*value),
             Some(None) => {
-                return none(
-                    format!("goes round in a circle: `{name}` is made from itself"),
-                    None,
-                );
+                return none(format!("is circular: `{name}` depends on itself"), None);
             }
             None => {}
         }
@@ -122,7 +119,7 @@ impl Values<'_> {
     }
 }
 
-/// What follows the `=`.
+/// The text after the `=`.
 fn expression(text: &str) -> Option<&str> {
     text.trim_start().strip_prefix('=')
 }
@@ -157,9 +154,9 @@ fn walk(
     }
 }
 
-/// Whole numbers stay whole, for keys that count.
+/// Integers stay integers, for keys that count.
 fn number(value: f64) -> Value {
-    // As far as every whole number is one.
+    // The range in which every integer is exact.
     if value.fract() == 0.0 && value.abs() < 9e15 {
         #[allow(clippy::cast_possible_truncation)]
         return Value::Integer(value as i128);
@@ -170,7 +167,7 @@ fn number(value: f64) -> Value {
 fn fault(whole: Source, written: &str, own: &str, flaw: Flaw, text: &str) -> Fault {
     let skipped = written.len() - own.len();
     let part = match &whole {
-        // As long as it is written without escapes, a place within it is a place within the file.
+        // Without escapes, a position in the text is a position in the file.
         Source::File(span) if text.get(span.start + 1..span.end.saturating_sub(1)) == Some(written) => {
             let start = span.start + 1 + skipped + flaw.at;
             Source::File(start..start + flaw.length.max(1))
@@ -185,7 +182,7 @@ fn fault(whole: Source, written: &str, own: &str, flaw: Flaw, text: &str) -> Fau
     }
 }
 
-/// Keys that hold text and nothing else anywhere in the schema; what they hold is no expression.
+/// Keys that hold text everywhere in the schema; their values are never expressions.
 pub(super) fn text_keys(schema: &Json) -> BTreeSet<String> {
     let mut found = BTreeSet::new();
     collect_text_keys(schema, &mut found);
@@ -216,7 +213,7 @@ fn holds_text(schema: &Json) -> bool {
     }
 }
 
-/// The schema for editors: a number may be an expression, a parameter just a number.
+/// The schema for editors: numbers may be expressions, and a parameter just a number.
 pub(super) fn with_expressions(mut schema: Json) -> Json {
     open_numbers(&mut schema);
     let parameter = schema.pointer_mut("/$defs/Parameter");
@@ -231,7 +228,7 @@ pub(super) fn with_expressions(mut schema: Json) -> Json {
     schema
 }
 
-/// What an expression looks like.
+/// Pattern of an expression.
 const PATTERN: &str = "^\\s*=";
 
 fn open_numbers(schema: &mut Json) {

@@ -1,7 +1,7 @@
-//! A scene file with its parameters still open: one scene for every choice of them.
+//! A scene file with free parameters: one scene for each choice of them.
 //!
-//! The file is read once; a choice of parameters works its expressions out again, and everything is checked as if it had
-//! been written so.
+//! The file is read once; a choice of parameters evaluates its expressions again, and everything is checked as if the
+//! values were in the file.
 
 use super::scene::{self, SceneErrors};
 use super::tree::{self, Node, Source, Value};
@@ -14,21 +14,21 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::Path;
 
-/// A scene file with its parameters still open.
+/// A scene file with free parameters.
 #[derive(Debug)]
 pub struct ParametricScene {
     text: String,
     name: String,
-    /// As written, changed by `--set`.
+    /// The tree as written, changed by `--set`.
     root: Node,
-    /// Whether the file's own text can be given other numbers.
+    /// Whether numbers can be replaced in the file's own text.
     is_text: bool,
     schema: serde_json::Value,
     texts: BTreeSet<String>,
     scene: Scene,
 }
 
-/// Parameters and the numbers that are chosen for them.
+/// Parameters and the values chosen for them.
 pub type Choice<'a> = &'a [(&'a str, f64)];
 
 impl ParametricScene {
@@ -65,17 +65,17 @@ impl ParametricScene {
         Self::new(text.to_owned(), file_name, sets, scene)
     }
 
-    /// The same from a scene that has been read from this text with these settings.
+    /// The same from a scene already read from this text with these settings.
     ///
     /// # Errors
-    /// None where the scene is what the text comes to.
+    /// None, if the scene is the one the text gives.
     pub fn of(text: &str, name: &str, sets: &[String], scene: &Scene) -> Result<Self, SceneErrors> {
         Self::new(text.to_owned(), name, sets, scene.clone())
     }
 
     fn new(text: String, name: &str, sets: &[String], scene: Scene) -> Result<Self, SceneErrors> {
         let is_toml = !scene::is_json(name);
-        // The scene has been read from the same text, so there is no error to be met here.
+        // The scene was read from the same text, so this cannot fail.
         let mut root = if is_toml {
             tree::from_toml(&text).0
         } else {
@@ -104,7 +104,7 @@ impl ParametricScene {
         &self.scene
     }
 
-    /// The file's name as it was given.
+    /// The file's name as given.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -117,10 +117,10 @@ impl ParametricScene {
             .collect()
     }
 
-    /// The scene with other numbers for some parameters.
+    /// The scene with other values for some parameters.
     ///
     /// # Errors
-    /// Everything that is wrong with it then.
+    /// All problems of that scene.
     pub fn with(&self, choice: Choice<'_>) -> Result<Scene, Vec<String>> {
         let mut root = self.root.clone();
         for (name, number) in choice {
@@ -148,8 +148,8 @@ impl ParametricScene {
         }
     }
 
-    /// A scene file with other numbers: the file itself with its comments and expressions, if nothing but those numbers
-    /// differs, else everything worked out. `None` if that cannot be written, or is not this scene.
+    /// A scene file with other values: the file itself with its comments and expressions, if nothing but those values
+    /// differs; otherwise with everything evaluated. `None` if it cannot be written, or does not give this scene.
     pub fn text_with(&self, choice: Choice<'_>, scene: &Scene) -> Option<String> {
         let text = if self.is_text {
             self.substituted(choice)
@@ -165,7 +165,7 @@ impl ParametricScene {
             .iter()
             .map(|(name, number)| Some((self.span(name)?, *number)));
         let mut spans = spans.collect::<Option<Vec<(Range<usize>, f64)>>>()?;
-        // From the end, so that places before stay where they are.
+        // From the end, so that earlier positions remain valid.
         spans.sort_by_key(|(span, _)| std::cmp::Reverse(span.start));
         let mut text = self.text.clone();
         for (span, number) in spans {
@@ -181,7 +181,7 @@ impl ParametricScene {
         }
     }
 
-    /// Whether a parameter is a number of its own: one that follows from others cannot be chosen.
+    /// Whether a parameter is independent: one that follows from others cannot be chosen.
     fn number_span_or_set(&self, name: &str) -> bool {
         value_of(&self.root, name).is_some_and(|n| n.value.number().is_some())
     }
@@ -191,7 +191,7 @@ fn messages(problems: Vec<Problem>) -> Vec<String> {
     problems.into_iter().map(|p| p.message).collect()
 }
 
-/// Where the number of a parameter is written.
+/// Position of the number of a parameter in the file.
 fn value_of<'a>(root: &'a Node, name: &str) -> Option<&'a Node> {
     let key = |k: &str| Segment::Key(k.to_owned());
     let entry = root.child(&key("parameters"))?.child(&key(name))?;

@@ -1,8 +1,8 @@
-//! Paths: the folder of a file, and how a shell takes them in commands that are printed or recorded.
+//! Paths: the folder of a file, and quoting for the shell in printed or recorded commands.
 
 use std::path::Path;
 
-/// A path as a shell takes it.
+/// A path quoted for the shell.
 ///
 /// ```
 /// use catoptric_files::paths::quoted;
@@ -19,7 +19,7 @@ pub fn quoted(path: &Path) -> String {
     }
 }
 
-/// The folder a file is in.
+/// The folder that contains a file.
 pub(super) fn parent(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,

@@ -1,9 +1,9 @@
-//! Reading `observations.mcap`, ours or somebody else's.
+//! Reading `observations.mcap`, our own or a third party's.
 //!
-//! A stretch begins with its message on `/session/pose` and lasts to the next. It holds exactly as many scans as its
-//! label says. The recording begins with its first message. Topics that are not in the table of
-//! [`recording`](super::recording) are passed over, and so are bodies and markers that the session does not know and
-//! motion capture before the first label. Where `/mocap/markers` has no message, the list of markers is empty.
+//! A stretch begins with its message on `/session/pose` and lasts to the next. It has exactly as many scans as its
+//! label states. The recording begins with its first message. Topics that are not in the table of
+//! [`recording`](super::recording) are ignored, and so are bodies and markers that are not in the session, and
+//! motion capture before the first label. A frame without a message on `/mocap/markers` has an empty list of markers.
 
 use super::blocks::{Place, words};
 use super::bodies::{Bodies, MARKERS_TOPIC};
@@ -21,7 +21,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-/// What a channel carries.
+/// The content of a channel.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Topic {
     Label,
@@ -32,7 +32,7 @@ pub(super) enum Topic {
     Other,
 }
 
-/// The recording so far.
+/// The state of reading a recording.
 struct Playback<'a, R: Keep> {
     scanner: &'a ScannerSheet,
     bodies: Bodies,
@@ -41,17 +41,17 @@ struct Playback<'a, R: Keep> {
     /// Time of the first message, in nanoseconds.
     epoch: Option<u64>,
     current: Option<Gathering<R>>,
-    /// Where the stretches begin.
+    /// Locations of the stretches.
     starts: Vec<Start>,
     finished: Vec<R::Kept>,
 }
 
-/// Reads a recording, frame by frame; every stretch of it is held.
+/// Reads a recording, frame by frame; all of its stretches are held in memory.
 ///
-/// Ranges come back as the 32-bit numbers they were stored as, poses and markers bit by bit.
+/// Ranges are returned as the 32-bit numbers that were stored, poses and markers bit for bit.
 ///
 /// # Errors
-/// [`IoError`] with the file and the place if it cannot be read, is cut off or corrupt, or does not fit the session.
+/// [`IoError`] with the file and offset if it cannot be read, is cut off or corrupt, or does not fit the session.
 pub fn read_recording(path: &Path, session: &Session) -> Result<Vec<Stretch>, IoError> {
     Ok(play::<Whole>(&Place::File(path.to_owned()), session)?.0)
 }
@@ -65,9 +65,9 @@ pub fn parse_recording(bytes: &[u8], path: &Path, session: &Session) -> Result<V
     Ok(play::<Whole>(&place, session)?.0)
 }
 
-/// What a calibration needs of every stretch of a recording; readings stay in it.
+/// Reads what a calibration needs of every stretch of a recording; readings stay in the recording.
 ///
-/// The outer error is one of the recording, the inner one of a stretch that no calibration can use.
+/// The outer error concerns the recording, the inner one a stretch that no calibration can use.
 pub(super) fn survey(
     place: Place,
     session: &Session,
@@ -94,7 +94,7 @@ pub(super) fn survey(
     Ok(records.into_iter().collect())
 }
 
-/// Goes through a recording once: what was kept of every stretch, and where everything is.
+/// Reads a recording once and returns the data kept of every stretch, and the index of its messages.
 fn play<R: Keep>(place: &Place, session: &Session) -> Result<(Vec<R::Kept>, Source), IoError> {
     let mut playback = Playback::<R> {
         scanner: &session.scanner,
@@ -122,7 +122,7 @@ fn play<R: Keep>(place: &Place, session: &Session) -> Result<(Vec<R::Kept>, Sour
 }
 
 impl<R: Keep> Playback<'_, R> {
-    /// Takes a record in, by its block and its number there.
+    /// Processes a record, given the index of its block and its index there.
     fn record(&mut self, opcode: u8, data: &[u8], at: (usize, usize)) -> Result<(), String> {
         if !matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
             return Ok(());
@@ -152,7 +152,7 @@ impl<R: Keep> Playback<'_, R> {
         Ok(())
     }
 
-    /// What a topic is to us.
+    /// The meaning of a topic.
     fn topic(&self, topic: &str, schema: &str, encoding: &str) -> Result<Topic, String> {
         let expect = |definition: Definition, found: Topic| {
             if schema == definition.name && encoding == "cdr" {
@@ -179,7 +179,7 @@ impl<R: Keep> Playback<'_, R> {
         }
     }
 
-    /// Takes a message in.
+    /// Processes a message.
     fn message(
         &mut self,
         topic: &Topic,
@@ -243,7 +243,7 @@ impl<R: Keep> Playback<'_, R> {
         Ok(())
     }
 
-    /// Closes the current stretch, if there is one.
+    /// Ends the current stretch, if there is one.
     fn end_stretch(&mut self) -> Result<(), String> {
         let Some(gathering) = self.current.take() else {
             return Ok(());

@@ -1,4 +1,4 @@
-//! Rays from CSV (`x_m,y_m,z_m,dx,dy,dz`) or NumPy (N × 6), read piece by piece; and their paths, written likewise.
+//! Rays from CSV (`x_m,y_m,z_m,dx,dy,dz`) or NumPy (N × 6), read in batches; and their paths, written the same way.
 
 use super::error::IoError;
 use super::file::StagedOutput;
@@ -13,24 +13,24 @@ use std::path::{Path, PathBuf};
 /// Columns of rays, in the order of an array.
 const COLUMNS: [&str; 6] = ["x_m", "y_m", "z_m", "dx", "dy", "dz"];
 
-/// First line of paths as CSV.
+/// Header line of paths as CSV.
 const PATH_HEADER: &str = "ray,vertex,surface,x_m,y_m,z_m,dx,dy,dz,path_m\n";
 
-/// Columns of paths as an array: distance to the first vertex or ∞, the surface that the path ends on or −1, length of
+/// Columns of paths as an array: distance to the first vertex or ∞, the surface on which the path ends or −1, length of
 /// the whole path or ∞.
 const PATH_COLUMNS: usize = 3;
 
-/// How a file holds its numbers, told by the end of its name.
+/// The format of a file, given by its extension.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// Text.
     Csv,
-    /// NumPy.
+    /// NumPy array.
     Npy,
 }
 
 impl Format {
-    /// The format of a file.
+    /// The format of a file by its name.
     ///
     /// # Errors
     /// [`IoError::Content`] if the name ends in neither .csv nor .npy.
@@ -41,13 +41,13 @@ impl Format {
             Some("npy") => Ok(Self::Npy),
             _ => Err(IoError::content(
                 path,
-                "is neither .csv nor .npy; the name tells the format",
+                "is neither .csv nor .npy; the extension determines the format",
             )),
         }
     }
 }
 
-/// Rays of a file, in order.
+/// The rays of a file, in order.
 pub struct RayReader {
     path: PathBuf,
     source: Source,
@@ -57,7 +57,7 @@ pub struct RayReader {
 enum Source {
     Csv {
         reader: Box<csv::Reader<File>>,
-        /// Where each of the six is in a row.
+        /// Position in a row of each of the six columns.
         order: [usize; 6],
     },
     Npy {
@@ -71,7 +71,7 @@ impl RayReader {
     /// Opens a file and reads its header.
     ///
     /// # Errors
-    /// [`IoError`] if it cannot be read or its header is not that of rays.
+    /// [`IoError`] if it cannot be read or does not have the header of rays.
     pub fn open(path: &Path) -> Result<Self, IoError> {
         let format = Format::of(path)?;
         let file = File::open(path).map_err(|e| IoError::read(path, e))?;
@@ -116,10 +116,10 @@ impl RayReader {
         })
     }
 
-    /// The next rays, at most so many; none at the end. Directions are brought to unit length.
+    /// The next N rays at most; empty at the end. Directions are normalized to unit length.
     ///
     /// # Errors
-    /// [`IoError`] if the file ends early, or with the ray that has a number which is not finite or no direction.
+    /// [`IoError`] if the file ends early, or for a ray with a number that is not finite or a zero direction.
     pub fn next_rays(&mut self, most: usize) -> Result<Vec<Ray>, IoError> {
         let mut rays = Vec::new();
         match &mut self.source {
@@ -179,7 +179,7 @@ impl RayReader {
     }
 }
 
-/// Where each column is; every one must be there and no other.
+/// Position of each column; all must exist, and no others.
 fn columns(header: &csv::StringRecord) -> Result<[usize; 6], String> {
     if let Some(unknown) = header.iter().find(|h| !COLUMNS.contains(h)) {
         return Err(format!(
@@ -206,7 +206,7 @@ fn ray(numbers: &[f64; 6]) -> Result<Ray, String> {
         return Err(format!("{name} is {value}; a finite number is needed"));
     }
     let [x, y, z, dx, dy, dz] = *numbers;
-    // Scaled first, so that neither tiny nor huge components are lost in their squares.
+    // Scaled first, so that squaring neither underflows nor overflows.
     let longest = dx.abs().max(dy.abs()).max(dz.abs());
     if longest == 0.0 {
         return Err("its direction is (0, 0, 0)".to_owned());
@@ -239,12 +239,12 @@ fn csv_error(path: &Path, error: csv::Error) -> IoError {
     }
 }
 
-/// Paths of rays being written.
+/// Writer of ray paths.
 pub struct PathWriter {
     output: StagedOutput,
     format: Format,
     rays: usize,
-    /// An array on its way to a pipe waits here: its header says how long it is.
+    /// Buffers an array for a pipe, because its header states its length.
     waiting: Vec<u8>,
 }
 
@@ -252,7 +252,7 @@ impl PathWriter {
     /// Begins a file.
     ///
     /// # Errors
-    /// [`IoError`] if the system refuses or the name tells no format.
+    /// [`IoError`] if the system refuses or the extension is unknown.
     pub fn create(path: &Path) -> Result<Self, IoError> {
         let format = Format::of(path)?;
         let mut output = StagedOutput::create(path)?;
@@ -274,7 +274,7 @@ impl PathWriter {
         self.format
     }
 
-    /// Appends what [`rows`] made of so many rays.
+    /// Appends the output of [`rows`] for a given number of rays.
     ///
     /// # Errors
     /// [`IoError`] if the system refuses.
@@ -287,10 +287,10 @@ impl PathWriter {
         self.output.write(rows)
     }
 
-    /// Ends the file and moves it to its place.
+    /// Ends the file and moves it to its destination.
     ///
     /// # Errors
-    /// [`IoError`] if the system refuses; then nothing of it is left.
+    /// [`IoError`] if the system refuses; then no part of it is left.
     pub fn finish(mut self) -> Result<(), IoError> {
         if self.format == Format::Npy {
             let header = npy::header(self.rays, PATH_COLUMNS);
@@ -305,7 +305,7 @@ impl PathWriter {
     }
 }
 
-/// Appends the path of a ray in a format: a line for every vertex, or a row of the array.
+/// Appends the path of a ray in a format: a line for each vertex, or a row of the array.
 pub fn rows(
     format: Format,
     ray: usize,
@@ -337,7 +337,7 @@ pub fn rows(
     }
 }
 
-/// A name as a field of CSV: in quotes where it needs them.
+/// A name as a CSV field, quoted if necessary.
 pub fn field(name: &str) -> String {
     if name.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", name.replace('"', "\"\""))

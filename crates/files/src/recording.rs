@@ -2,7 +2,7 @@
 //!
 //! | topic | message | when |
 //! |---|---|---|
-//! | `/tf_static` | `tf2_msgs/TFMessage`: laser in rig, as the drawing has it | once, at the beginning |
+//! | `/tf_static` | `tf2_msgs/TFMessage`: laser in rig, nominal | once, at the beginning |
 //! | `/session/pose` | the [`PoseLabel`](catoptric_model::PoseLabel) as JSON | before the messages of its stretch |
 //! | `/tf` | `tf2_msgs/TFMessage`: the bodies as first seen | at the start of a stretch; in a flight every frame after |
 //! | `/points` | `sensor_msgs/PointCloud2`: the plane as scanned | the first scan of a stretch, not every scan |
@@ -12,9 +12,9 @@
 //! | `/mocap/markers` | `mocap4r2_msgs/Markers` in `room`: "subject/marker", those that were seen | every frame |
 //!
 //! Time is [`EPOCH_NS`] plus the time since the recording began, in whole nanoseconds; log time, publish time and
-//! stamp are one. The messages of a stretch stand in order of time. The same stretches give the same bytes.
+//! stamp are equal. The messages of a stretch are ordered by time. The same stretches give the same bytes.
 //!
-//! `/session/pose` has no schema: rosbags refuses a recording with one that is not ROS, and Foxglove needs none.
+//! `/session/pose` has no schema: rosbags rejects a recording with a non-ROS schema, and Foxglove needs none.
 
 use super::bodies::{Bodies, MARKERS_TOPIC};
 use super::container::Container;
@@ -33,24 +33,24 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Longest recording, in seconds: times must stay inside the 32 bits of a stamp (January 2038).
+/// Maximum length of a recording, in seconds: times must fit into the 32 bits of a stamp (January 2038).
 const LONGEST_S: f64 = 6e8;
 
 /// A recording being written, stretch by stretch or excerpt by excerpt.
 ///
-/// Dropped before [`finish`](Self::finish) it leaves a file without its end, which no reader takes for whole.
+/// If dropped before [`finish`](Self::finish), it leaves a file without an end, which readers reject as incomplete.
 pub struct RecordingWriter<W: Write> {
     container: Container<W>,
     encoder: Arc<RecordingEncoder>,
-    /// Whether the channel of the echoes is there: recordings without any need no such topic.
+    /// Whether the channel of the echoes exists: recordings without echoes do not have this topic.
     has_echoes: bool,
     sequences: BTreeMap<u16, u32>,
     frame_number: u32,
-    /// The stretch that has begun, how many scans of it there are, and how many there should be.
+    /// The current stretch, the number of its scans so far, and their final number.
     current: Option<(usize, usize, usize)>,
 }
 
-/// Turns stretches into messages, on any thread.
+/// The encoder of stretches into messages; usable on any thread.
 #[derive(Debug)]
 pub struct RecordingEncoder {
     path: PathBuf,
@@ -59,16 +59,16 @@ pub struct RecordingEncoder {
     channels: Channels,
 }
 
-/// The messages of an excerpt or of a stretch as bytes, in the order in which they are written.
+/// The encoded messages of an excerpt or a stretch, in the order of writing.
 #[derive(Debug)]
 pub struct Encoded {
     pose: usize,
-    /// Which scans these are.
+    /// Range of the scans.
     scans: Range<usize>,
-    /// Scans of the whole stretch.
+    /// Number of scans in the whole stretch.
     expected: usize,
     bytes: Vec<u8>,
-    /// Channel, time, and where in `bytes`.
+    /// Channel, time, and byte range in `bytes`.
     messages: Vec<(u16, u64, Range<usize>)>,
 }
 
@@ -140,7 +140,7 @@ impl<W: Write> RecordingWriter<W> {
         Ok(recording)
     }
 
-    /// What turns stretches into the messages of this recording.
+    /// The encoder of stretches for this recording.
     pub fn encoder(&self) -> Arc<RecordingEncoder> {
         Arc::clone(&self.encoder)
     }
@@ -148,18 +148,18 @@ impl<W: Write> RecordingWriter<W> {
     /// Appends a stretch.
     ///
     /// # Errors
-    /// [`IoError::Content`] if its numbers do not fit each other or the session, otherwise what went wrong in
+    /// [`IoError::Content`] if its numbers are inconsistent with each other or the session, otherwise the error in
     /// writing.
     pub fn write_stretch(&mut self, stretch: &Stretch) -> Result<(), IoError> {
         let encoded = self.encoder.encode_stretch(stretch)?;
         self.append(vec![encoded])
     }
 
-    /// Appends what was encoded, in order. What fills a chunk is compressed, chunk by chunk side by side, and written;
-    /// less than a chunk waits for more.
+    /// Appends encoded messages, in order. Full chunks are compressed in parallel and written; the rest waits for
+    /// more messages.
     ///
     /// # Errors
-    /// [`IoError::Content`] if scans of a stretch are missing, otherwise what went wrong in writing.
+    /// [`IoError::Content`] if scans of a stretch are missing, otherwise the error in writing.
     pub fn append(&mut self, encoded: Vec<Encoded>) -> Result<(), IoError> {
         for mut next in encoded {
             self.follow(&next)?;
@@ -181,7 +181,7 @@ impl<W: Write> RecordingWriter<W> {
         written.map_err(|e| IoError::write(&self.encoder.path, e))
     }
 
-    /// Ends the recording and hands the writer back, flushed.
+    /// Ends the recording and returns the writer, flushed.
     ///
     /// # Errors
     /// [`IoError`] if scans of a stretch are missing or writing fails.
@@ -198,7 +198,7 @@ impl<W: Write> RecordingWriter<W> {
         *next = next.wrapping_add(1);
     }
 
-    /// Whether these scans are the next.
+    /// Checks that these scans are the next ones.
     fn follow(&mut self, next: &Encoded) -> Result<(), IoError> {
         let due = match self.current {
             Some((pose, done, _)) if next.scans.start > 0 => (pose, done),
@@ -219,7 +219,7 @@ impl<W: Write> RecordingWriter<W> {
         Ok(())
     }
 
-    /// Whether the stretch that has begun is whole.
+    /// Checks that the current stretch is complete.
     fn check_current(&self) -> Result<(), IoError> {
         match self.current {
             Some((pose, done, expected)) if done != expected => Err(IoError::content(
@@ -232,18 +232,18 @@ impl<W: Write> RecordingWriter<W> {
 }
 
 impl RecordingEncoder {
-    /// A whole stretch.
+    /// Encodes a whole stretch.
     ///
     /// # Errors
-    /// [`IoError::Content`] if its numbers do not fit each other or the session.
+    /// [`IoError::Content`] if its numbers are inconsistent with each other or the session.
     pub fn encode_stretch(&self, stretch: &Stretch) -> Result<Encoded, IoError> {
         self.encode(stretch, 0..stretch.label.scans, &stretch.first_seen())
     }
 
-    /// An excerpt of a stretch.
+    /// Encodes an excerpt of a stretch.
     ///
     /// # Errors
-    /// [`IoError::Content`] if its numbers do not fit each other or the session.
+    /// [`IoError::Content`] if its numbers are inconsistent with each other or the session.
     pub fn encode_excerpt(&self, excerpt: &Excerpt) -> Result<Encoded, IoError> {
         let scans = excerpt.part.ranges.len() / excerpt.part.beams.max(1);
         let scans = excerpt.first_scan..excerpt.first_scan + scans;
@@ -281,7 +281,7 @@ impl RecordingEncoder {
         Ok(encoded)
     }
 
-    /// One message with its channel; `None` of what has none.
+    /// One message with its channel; `None` for one without a channel.
     fn message(
         &self,
         part: &Stretch,
@@ -352,14 +352,14 @@ impl RecordingEncoder {
                 (channels.poses[body], messages::encode_pose(time, &pose))
             }
             Event::Markers => {
-                // The frames are numbered where they are put in order.
+                // Frame numbers are assigned when the messages are put in order.
                 let seen = self.seen_markers(part, &frames[&time]);
                 (channels.markers, messages::encode_markers(time, 0, &seen))
             }
         }))
     }
 
-    /// The markers that were seen at one time.
+    /// The markers seen at one time.
     fn seen_markers(&self, stretch: &Stretch, frames: &Simultaneous) -> Vec<LabelledMarker> {
         let mut seen = Vec::new();
         for &(track, frame) in frames {
@@ -376,7 +376,7 @@ impl RecordingEncoder {
         seen
     }
 
-    /// What of a stretch does not fit.
+    /// Checks that a stretch is consistent.
     fn check(&self, stretch: &Stretch, scans: &Range<usize>) -> Result<(), String> {
         let time_fits = |t: f64| (0.0..=LONGEST_S).contains(&t);
         let beams = self.scanner.scan.beams();
@@ -427,7 +427,7 @@ fn add_channel<W: Write>(container: &mut Container<W>, topic: &str, definition: 
     container.add_channel(schema, topic, "cdr")
 }
 
-/// Where a body stands in the room.
+/// Pose of a body in the room.
 fn in_room(subject: &str, pose: Pose) -> FrameTransform<'_> {
     FrameTransform {
         parent: ROOM_FRAME,

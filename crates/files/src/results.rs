@@ -1,4 +1,4 @@
-//! Results as JSON: calibrations, ours or anybody's, characterizations, the truth of a simulated dataset.
+//! Results as JSON: calibrations (our own or third-party), characterizations, and the truth of a simulated dataset.
 
 use super::error::IoError;
 use super::json::read_json;
@@ -8,7 +8,7 @@ use std::path::Path;
 /// Reads the truth of a dataset; `None` if the dataset is blind.
 ///
 /// # Errors
-/// [`IoError`] if it is there and cannot be read, or is of another version.
+/// [`IoError`] if it exists and cannot be read, or has an unknown version.
 #[cfg(all(feature = "recording", feature = "scene"))]
 pub fn read_truth(dataset: &Path) -> Result<Option<catoptric_sim::Truth>, IoError> {
     let path = dataset.join(super::dataset::TRUTH);
@@ -20,20 +20,20 @@ pub fn read_truth(dataset: &Path) -> Result<Option<catoptric_sim::Truth>, IoErro
     Ok(Some(found))
 }
 
-/// Reads a calibration, ours or anybody's.
+/// Reads a calibration, our own or third-party.
 ///
 /// # Errors
-/// [`IoError`] with line and column if it is not one, or is of another version.
+/// [`IoError`] with line and column if it is invalid, or has an unknown version.
 pub fn read_calibration(path: &Path) -> Result<Calibration, IoError> {
     let found: Calibration = read_json(path)?;
     require_version(path, found.schema_version, calibration::SCHEMA_VERSION)?;
     Ok(found)
 }
 
-/// Reads a calibration to be used with a dataset of this session: of the same scanner, as far as it says.
+/// Reads a calibration for use with a dataset of this session: it must be of the same scanner, if it states one.
 ///
 /// # Errors
-/// As [`read_calibration`], and [`IoError::Inconsistent`] if it is of a scanner with other beams.
+/// As [`read_calibration`], and [`IoError::Inconsistent`] if it belongs to a scanner with other beams.
 pub fn read_calibration_for(path: &Path, session: &Session) -> Result<Calibration, IoError> {
     let found = read_calibration(path)?;
     match found.check_scanner(session) {
@@ -48,14 +48,14 @@ pub fn read_calibration_for(path: &Path, session: &Session) -> Result<Calibratio
 /// Reads a characterization of the bare sensor.
 ///
 /// # Errors
-/// [`IoError`] with line and column if it is not one, or is of another version.
+/// [`IoError`] with line and column if it is invalid, or has an unknown version.
 pub fn read_characterization(path: &Path) -> Result<Characterization, IoError> {
     let found: Characterization = read_json(path)?;
     require_version(path, found.schema_version, characterization::SCHEMA_VERSION)?;
     Ok(found)
 }
 
-/// Whether a file is of the newest version of its format or an older one: each can still be read.
+/// Checks that a file has the newest version of its format or an older one, all of which can be read.
 pub(super) fn require_version(path: &Path, found: u32, newest: u32) -> Result<(), IoError> {
     if (1..=newest).contains(&found) {
         return Ok(());

@@ -1,7 +1,7 @@
-//! Scene files: TOML for people, JSON for programs, both through the same types.
+//! Scene files: TOML for people, JSON for programs, both read into the same types.
 //!
-//! A scene is read in three steps, and every problem of the first step that finds any is reported: the format
-//! against the schema, then the sense of it ([`catoptric_sim::check`]).
+//! A scene is read in steps, and all problems of the first step that finds any are reported: the format
+//! against the schema, then its semantics ([`catoptric_sim::check`]).
 
 use super::diagnostic::{Diagnostic, Diagnostics, Place, position};
 use super::error::IoError;
@@ -19,7 +19,7 @@ use catoptric_sim::check;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Why there is no scene.
+/// Why a scene could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneErrors {
     /// The file could not be read.
@@ -27,15 +27,15 @@ pub enum SceneErrors {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The reason.
         source: std::io::Error,
-        /// What to do about it.
+        /// How to fix it.
         help: Option<String>,
     },
     /// The scene is not valid.
     #[error(transparent)]
     Invalid(Box<Diagnostics>),
-    /// A mesh that the scene names is not there, or damaged.
+    /// A mesh named by the scene is missing or damaged.
     #[error("`{key}`: {source}")]
     Mesh {
         /// The key that names it.
@@ -45,21 +45,21 @@ pub enum SceneErrors {
     },
 }
 
-/// Built-in scenes to start from, each around a published mirror layout.
+/// Built-in scenes to start from, each with a published mirror layout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Template {
     /// Eight facets around the scanner, after Cooper's Figure 5.
     Prototype,
-    /// Two mirrors beside a 270° scanner.
+    /// Two mirrors next to a 270° scanner.
     TwoMirror,
-    /// Half a hexagonal pyramid before the scanner.
+    /// Half a hexagonal pyramid in front of the scanner.
     Pyramid,
     /// A small mirror that folds eleven beams straight down.
     Altimeter,
 }
 
 impl Template {
-    /// All of them.
+    /// All built-in scenes.
     pub const ALL: [Self; 4] = [Self::Prototype, Self::TwoMirror, Self::Pyramid, Self::Altimeter];
 
     /// Its name on the command line.
@@ -83,15 +83,15 @@ impl Template {
     }
 }
 
-/// Reads a scene and the meshes that it names, and changes it by `KEY=VALUE` arguments.
+/// Reads a scene and its meshes, and changes it by `KEY=VALUE` arguments.
 ///
 /// # Errors
-/// [`SceneErrors`]: a file cannot be read, or everything that is wrong with it.
+/// [`SceneErrors`]: a file that cannot be read, or all problems of the scene.
 pub fn load(path: &Path, sets: &[String]) -> Result<Scene, SceneErrors> {
     Ok(load_text(path, sets)?.1)
 }
 
-/// As [`load`], with the text of the file.
+/// As [`load`], but returns the text of the file as well.
 ///
 /// # Errors
 /// As [`load`].
@@ -124,7 +124,7 @@ pub fn load_text(path: &Path, sets: &[String]) -> Result<(String, Scene), SceneE
     }
 }
 
-/// Reads a scene from text, and the meshes that it names from a folder.
+/// Reads a scene from text, and its meshes from a folder.
 ///
 /// # Errors
 /// As [`load`].
@@ -134,7 +134,7 @@ pub fn parse_in(text: &str, file_name: &str, folder: &Path, sets: &[String]) -> 
     if scene.meshes.0.is_empty() {
         return Ok(scene);
     }
-    // A body that is a mesh is not looked at without it.
+    // A mesh body is not checked without its mesh.
     let keyed = check::problems(&scene).into_iter().map(|p| Diagnostic {
         place: Place::Key(p.path.to_string()),
         message: p.message,
@@ -148,10 +148,10 @@ pub fn parse_in(text: &str, file_name: &str, folder: &Path, sets: &[String]) -> 
     }
 }
 
-/// Reads the meshes that a scene names; relative names start at a folder.
+/// Reads the meshes named by a scene; relative names start at a folder.
 ///
 /// # Errors
-/// [`SceneErrors::Mesh`] for the first that is not there or damaged.
+/// [`SceneErrors::Mesh`] for the first that is missing or damaged.
 pub fn read_meshes(scene: &mut Scene, folder: &Path) -> Result<(), SceneErrors> {
     let mut meshes = std::mem::take(&mut scene.meshes);
     for (key, shape) in scene.mesh_shapes() {
@@ -167,8 +167,8 @@ pub fn read_meshes(scene: &mut Scene, folder: &Path) -> Result<(), SceneErrors> 
     Ok(())
 }
 
-/// The scene with its meshes under names made of their content, below a folder beside it, and those files: what a
-/// dataset keeps, so that it can be made again. A scene that is kept already keeps its names.
+/// The scene with its meshes renamed by content, in a subfolder, and those files: what a dataset stores to
+/// be reproducible. A scene from a dataset keeps its names.
 #[cfg(feature = "recording")]
 pub fn kept(scene: &Scene) -> (Scene, Vec<(String, Vec<u8>)>) {
     let mut scene = scene.clone();
@@ -180,7 +180,7 @@ pub fn kept(scene: &Scene) -> (Scene, Vec<(String, Vec<u8>)>) {
             continue;
         };
         let bytes = mesh::to_ply(mesh);
-        // Half of a SHA-256 tells meshes apart.
+        // Half of a SHA-256 is enough to distinguish meshes.
         shape.file = format!("meshes/{}.ply", &sha256(&bytes)[..32]);
         if kept.0.insert(shape.file.clone(), Arc::clone(mesh)).is_none() {
             files.push((shape.file.clone(), bytes));
@@ -190,7 +190,7 @@ pub fn kept(scene: &Scene) -> (Scene, Vec<(String, Vec<u8>)>) {
     (scene, files)
 }
 
-/// Reads a scene from its text, without the meshes that it names; a file name that ends in .json means JSON.
+/// Reads a scene from its text, without its meshes; a file name that ends in .json means JSON.
 ///
 /// ```
 /// use catoptric_files::scene::{self, SceneErrors};
@@ -204,7 +204,7 @@ pub fn kept(scene: &Scene) -> (Scene, Vec<(String, Vec<u8>)>) {
 /// ```
 ///
 /// # Errors
-/// [`SceneErrors::Invalid`] with everything that is wrong.
+/// [`SceneErrors::Invalid`] with all problems.
 pub fn parse(text: &str, file_name: &str, sets: &[String]) -> Result<Scene, SceneErrors> {
     let (file, mut list) = if is_json(file_name) {
         match tree::from_json(text) {
@@ -232,7 +232,7 @@ pub fn parse(text: &str, file_name: &str, sets: &[String]) -> Result<Scene, Scen
         .filter(|s| *s != Source::Unknown);
     let flawed: Vec<Source> = placed.collect();
     let departures = departures(&root, text, &schema, &list);
-    // An expression without a value is said to be wrong once.
+    // An expression without a value is reported only once.
     let departures = departures.into_iter().filter(|f| !flawed.contains(&f.source));
     list.extend(departures.map(|f| Diagnostic {
         place: place(&f.source, &f.path.to_string(), sets),
@@ -257,7 +257,7 @@ pub fn parse(text: &str, file_name: &str, sets: &[String]) -> Result<Scene, Scen
             let list = problems.into_iter().map(|p| locate(p, &root, sets, None));
             return Err(invalid(file_name, text, list.collect()));
         }
-        // The schema is generated from the type, so this is a difference between the two.
+        // The schema is generated from the type, so this is a discrepancy between the two.
         Err(error) => {
             let diagnostic = Diagnostic {
                 place: Place::Key(String::new()),
@@ -284,27 +284,27 @@ pub fn parse(text: &str, file_name: &str, sets: &[String]) -> Result<Scene, Scen
     Err(invalid(file_name, text, diagnostics))
 }
 
-/// Whether a file is JSON by its name.
+/// Whether a file is JSON, by its name.
 pub(super) fn is_json(file_name: &str) -> bool {
     let extension = Path::new(file_name).extension();
     extension.is_some_and(|e| e.eq_ignore_ascii_case("json"))
 }
 
-/// The scene of a tree, its patterns worked out.
+/// The scene of a tree, with its patterns evaluated.
 fn expanded(root: &Node) -> Result<Result<Expanded, Vec<Problem>>, serde_json::Error> {
     let scene: Scene = serde_json::from_value(root.to_json())?;
     Ok(pattern::expand(&scene))
 }
 
-/// The scene as TOML, with every default written out; it reads back as the same scene.
+/// The scene as TOML, with all defaults written out; it reads back as the same scene.
 ///
 /// # Errors
-/// A number that TOML cannot hold.
+/// A number that TOML cannot represent.
 pub fn to_toml(scene: &Scene) -> Result<String, toml::ser::Error> {
     toml::to_string(scene)
 }
 
-/// JSON Schema of a scene whose expressions have been worked out.
+/// JSON Schema of a scene whose expressions have been evaluated.
 pub fn json_schema() -> serde_json::Value {
     schemars::schema_for!(Scene).to_value()
 }
@@ -314,7 +314,7 @@ pub fn file_schema() -> serde_json::Value {
     parameters::with_expressions(json_schema())
 }
 
-/// Departures from the schema that a syntax error does not explain.
+/// Violations of the schema that a syntax error does not explain.
 fn departures(
     root: &Node,
     text: &str,
@@ -339,7 +339,7 @@ fn departures(
     findings.into_iter().filter(|f| !explained(f)).collect()
 }
 
-/// What is wrong with the file by itself; `None` if it has no sense by itself.
+/// Problems of the file without any `--set`; `None` if it cannot be interpreted on its own.
 fn problems_without_sets(
     file: &Node,
     text: &str,
@@ -357,7 +357,7 @@ fn problems_without_sets(
     Some(check::problems(&made.scene))
 }
 
-/// The place of a problem; what is wrong with a copy is wrong with the pattern that made it.
+/// The location of a problem; problems with a copy are reported at the pattern that made it.
 fn locate_copy(
     problem: Problem,
     made: &Expanded,
@@ -377,14 +377,14 @@ fn locate_copy(
     found
 }
 
-/// The place of a problem: the `--set` that caused it, else where the value is written.
+/// The location of a problem: the `--set` that caused it, otherwise the position of the value.
 fn locate(problem: Problem, root: &Node, sets: &[String], of_file: Option<&[Problem]>) -> Diagnostic {
     let node = root.nearest(&problem.path);
     let in_file = of_file.is_some_and(|list| list.contains(&problem));
     let set = match (node.set_within(), sets) {
         _ if in_file => None,
         (Some(number), _) => Some(number),
-        // The file has no such problem, so the only argument there is has made it.
+        // The file does not have this problem, so the only argument caused it.
         (None, [_]) if of_file.is_some() => Some(0),
         (None, _) => None,
     };
@@ -418,7 +418,7 @@ fn invalid(file: &str, text: &str, mut list: Vec<Diagnostic>) -> SceneErrors {
     }))
 }
 
-/// The file beside a missing one that was probably meant.
+/// The file next to a missing one that was probably meant.
 fn similar_file(path: &Path, error: &std::io::Error) -> Option<String> {
     if error.kind() != std::io::ErrorKind::NotFound {
         return None;

@@ -1,4 +1,4 @@
-//! In which order the messages of a stretch are written: by time, and at one time by kind.
+//! Order in which the messages of a stretch are written: by time, and at equal times by kind.
 
 use super::messages::NS_PER_S;
 use catoptric_model::dataset::nanoseconds;
@@ -6,10 +6,10 @@ use catoptric_model::{Pose, PoseKind, Stretch};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// When every recording begins, in nanoseconds since 1970: fixed, so that equal experiments are equal files.
+/// Start time of every recording, in nanoseconds since 1970: fixed, so that equal experiments give equal files.
 pub const EPOCH_NS: u64 = 1_518_000_000 * NS_PER_S;
 
-/// A message of a stretch; what happens at one time is written in this order.
+/// A message of a stretch; messages with equal times are written in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Event {
     Label,
@@ -22,7 +22,7 @@ pub(super) enum Event {
     Markers,
 }
 
-/// The frames of the tracks that are of one time, as (track, frame).
+/// Frames of the tracks with equal times, as (track, frame).
 pub(super) type Simultaneous = Vec<(usize, usize)>;
 
 /// The frames of all bodies by time.
@@ -37,7 +37,7 @@ pub(super) fn simultaneous_frames(stretch: &Stretch) -> BTreeMap<u64, Simultaneo
     by_time
 }
 
-/// Every message of some scans of a stretch, and of the frames that go with them, in the order it is written.
+/// All messages of some scans of a stretch and of the accompanying frames, in the order of writing.
 pub(super) fn schedule(
     part: &Stretch,
     scans: &Range<usize>,
@@ -67,7 +67,7 @@ pub(super) fn schedule(
             with_markers |= !seen.markers.is_empty();
             if seen.pose.is_some() {
                 events.push((*time, Event::Pose { track, frame }));
-                // Where a body was first seen, the transforms at the start of the stretch say.
+                // The transforms at the start of the stretch already have each body's first pose.
                 let first = first_seen[track].is_some_and(|(time_s, _)| time_s == seen.time_s);
                 if part.label.kind == PoseKind::Flight && !first {
                     events.push((*time, Event::Moved { track, frame }));

@@ -1,4 +1,4 @@
-//! A recording that was read once and is read again, stretch by stretch, as often as its readings are wanted.
+//! Repeated reading of a recording, stretch by stretch, whenever its readings are needed.
 
 use super::blocks::{Block, Place, Records};
 use super::bodies::Bodies;
@@ -13,19 +13,19 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Blocks that are kept for the next stretch, which often lies in the same, in bytes.
+/// Size of the blocks kept for the next stretch, which is often in the same block, in bytes.
 const MOST_KEPT: usize = 1 << 24;
 
-/// Where a stretch is.
+/// Location of a stretch.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Start {
-    /// Block and number of its label's message.
+    /// Block and index of its label's message.
     pub(super) label: (usize, usize),
     /// Its scans.
     pub(super) scans: usize,
 }
 
-/// A recording, and where everything in it is.
+/// A recording with the index of its contents.
 pub(super) struct Source {
     pub(super) place: Place,
     pub(super) blocks: Vec<Block>,
@@ -37,11 +37,11 @@ pub(super) struct Source {
     pub(super) kept: Mutex<VecDeque<(usize, Arc<Records>)>>,
 }
 
-/// The messages of a stretch, one after the other.
+/// The messages of a stretch, in order.
 struct Messages<'a> {
     source: &'a Source,
     block: usize,
-    /// Number of the next one in its block.
+    /// Index in its block of the next message.
     next: usize,
     records: Option<Arc<Records>>,
 }
@@ -53,7 +53,7 @@ struct ScansOf<'a> {
 }
 
 impl Source {
-    /// Shows the frames of some bodies in a stretch, in order of time.
+    /// Visits the frames of some bodies in a stretch, in order of time.
     pub(super) fn frames(
         &self,
         stretch: usize,
@@ -112,7 +112,7 @@ impl Source {
 }
 
 impl Messages<'_> {
-    /// The next message and what it is; `None` after the last of the stretch.
+    /// The next message and its kind; `None` after the last of the stretch.
     fn next(&mut self) -> Result<Option<(&Topic, &[u8])>, IoError> {
         let (topic, number, length) = loop {
             if self.block >= self.source.blocks.len() {

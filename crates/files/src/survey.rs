@@ -1,7 +1,7 @@
-//! What a calibration needs of a stretch, gathered while its messages pass by, in memory that does not grow with them.
+//! Everything a calibration needs of a stretch, accumulated while its messages are read, in bounded memory.
 //!
-//! Of a stretch that is long for motion capture, the markers are averaged when their frames have been counted: by another
-//! pass over its messages.
+//! If a stretch is long for motion capture, its markers are averaged in another pass over its messages, when their
+//! frames have been counted.
 
 use super::capture::Capture;
 use super::error::IoError;
@@ -13,23 +13,23 @@ use catoptric_model::tracking::{Jumping, MeanPose, Watching, median_jump};
 use catoptric_model::{BeamStatistics, Gathered, ModelError, Motion, Pose, PoseKind, PoseLabel, PoseRecord};
 use catoptric_model::{TrackedFrame, Watched};
 
-/// Messages of motion capture that wait to be frames, at most: of a stretch without more, they may come in any order.
+/// Maximum number of motion-capture messages waiting to form frames; stretches with fewer may have them in any order.
 ///
-/// Tests come to both limits sooner.
+/// Tests use lower limits.
 pub(super) const MOST_WAITING: usize = 1 << if cfg!(test) { 10 } else { 15 };
 
-/// Jumps of markers that are held for their median, at most; that of more takes passes of its own.
+/// Maximum number of marker displacements held for their median; more than that take additional passes.
 const MOST_JUMPS: usize = 1 << if cfg!(test) { 12 } else { 20 };
 
-/// A stretch while it passes.
+/// A stretch being read.
 pub(super) struct Survey {
     gathered: Gathered,
-    /// Body by body, once frames had to be let go.
+    /// Body by body, once frames have been discarded.
     followed: Option<Vec<Followed>>,
     is_flight: bool,
 }
 
-/// A body whose frames are let go one by one.
+/// A body whose frames are discarded one at a time.
 #[derive(Debug, Clone, Default)]
 struct Followed {
     mean: MeanPose,
@@ -37,13 +37,13 @@ struct Followed {
     markers: usize,
     is_seen: bool,
     jumping: Jumping,
-    /// Squares of the jumps; `None` once they are too many.
+    /// Squares of the displacements; `None` if there are too many.
     jumps: Jumps,
-    /// Of the rig in a flight: where it was.
+    /// Trajectory of the rig, in a flight.
     path: Vec<(f64, Pose)>,
 }
 
-/// Squares of jumps, or how it came that they are not held.
+/// Squares of displacements, or the reason why they are not held.
 #[derive(Debug, Clone)]
 enum Jumps {
     Held(Vec<f64>),
@@ -56,11 +56,11 @@ impl Default for Jumps {
     }
 }
 
-/// What was gathered of a stretch; its readings are not in its record yet.
+/// The result for a stretch; the readings are not in its record yet.
 pub(super) struct Surveyed {
     pub(super) record: Result<PoseRecord, ModelError>,
     pub(super) statistics: Vec<BeamStatistics>,
-    /// Bodies whose markers are to be averaged still.
+    /// Bodies whose markers remain to be averaged.
     pub(super) unwatched: Vec<Unwatched>,
 }
 
@@ -74,7 +74,7 @@ pub(super) struct Unwatched {
     median: Middle,
 }
 
-/// The median of squared jumps.
+/// The median of squared displacements.
 #[derive(Debug, Clone)]
 enum Middle {
     Known(Option<f64>),
@@ -131,7 +131,7 @@ impl Followed {
 }
 
 impl Survey {
-    /// Lets the oldest frames go, until so many messages wait.
+    /// Discards the oldest frames until N messages are waiting.
     fn follow(&mut self, capture: &mut Capture, left: usize, known: Known<'_>) {
         let bodies = known.bodies;
         let all: Vec<usize> = (0..bodies.all.len()).collect();
@@ -213,7 +213,7 @@ impl Keep for Survey {
     }
 }
 
-/// The markers of bodies over a stretch whose frames were let go.
+/// The markers of bodies over a stretch whose frames were discarded.
 pub(super) fn watch(
     source: &Source,
     stretch: usize,

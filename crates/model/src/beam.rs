@@ -1,4 +1,4 @@
-//! A beam of the bare scanner and what a mirror makes of it: direction, deflection, exit direction.
+//! Beams of the bare scanner and their deflection by a mirror: base direction, deflection, exit direction.
 
 use nalgebra::{Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
@@ -16,7 +16,7 @@ pub fn spherical(azimuth: f64, elevation: f64) -> Unit<Vector3<f64>> {
     Unit::new_unchecked(Vector3::new(cos_e * cos_a, cos_e * sin_a, sin_e))
 }
 
-/// What the mirror does to one beam: the three numbers that a calibration is about.
+/// What the mirror does to one beam: the three numbers that a calibration determines.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Deflection {
     /// Azimuth added by the mirror, in radians.
@@ -25,13 +25,13 @@ pub struct Deflection {
     /// Elevation of the outgoing ray above the scan plane, in radians.
     #[doc(alias = "phi")]
     pub elevation: f64,
-    /// Distance from the sensor origin to the deflection point, in metres.
+    /// Distance from the sensor origin to the deflection point, in meters.
     #[doc(alias = "d")]
     pub distance: f64,
 }
 
 impl Deflection {
-    /// The deflection that leaves a beam as it is.
+    /// The deflection of an undeflected beam.
     pub const NONE: Self = Self {
         azimuth: 0.0,
         elevation: 0.0,
@@ -49,9 +49,9 @@ impl Deflection {
         Point3::from(direction(beam_azimuth).into_inner() * self.distance)
     }
 
-    /// The deflection of a beam that leaves in a given direction; the added azimuth is within (−π, π].
+    /// The deflection of a beam that exits in a given direction; the added azimuth is within (−π, π].
     pub fn from_exit(beam_azimuth: f64, exit: &Unit<Vector3<f64>>, distance: f64) -> Self {
-        // In the frame turned by θ_b the added azimuth is read off directly, without a wrap-around.
+        // In a frame rotated by θ_b, the added azimuth is read off directly, without wrap-around.
         let (sin, cos) = libm::sincos(beam_azimuth);
         let along = exit.x * cos + exit.y * sin;
         let across = exit.y * cos - exit.x * sin;
@@ -63,7 +63,7 @@ impl Deflection {
     }
 }
 
-/// Angle between two directions, in radians: exact for small angles, where an arc cosine is not.
+/// Angle between two directions, in radians: accurate for small angles, unlike an arc cosine.
 pub fn angle_between(a: &Unit<Vector3<f64>>, b: &Unit<Vector3<f64>>) -> f64 {
     libm::atan2(a.cross(b).norm(), a.dot(b))
 }

@@ -1,4 +1,4 @@
-//! From a planar scan to points in space: Cooper, Eqs. (9) and (10); and what such a cloud is.
+//! Point clouds: the lift of a planar scan into space, Cooper, Eqs. (9) and (10), and the cloud it gives.
 
 use crate::beam::{self, Deflection};
 use nalgebra::{Point3, Rotation3, Vector3};
@@ -16,10 +16,10 @@ pub enum CloudFrame {
 }
 
 impl CloudFrame {
-    /// All of them.
+    /// All frames.
     pub const ALL: [Self; 3] = [Self::Sensor, Self::Rig, Self::Room];
 
-    /// The word that files and commands use.
+    /// The word used in files and commands.
     pub fn word(self) -> &'static str {
         match self {
             Self::Sensor => "sensor",
@@ -28,7 +28,7 @@ impl CloudFrame {
         }
     }
 
-    /// What it is, in a line.
+    /// A one-line description.
     pub fn about(self) -> &'static str {
         match self {
             Self::Sensor => "The laser base frame",
@@ -41,15 +41,15 @@ impl CloudFrame {
 /// A point and the reading it comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CloudPoint {
-    /// Where it is, in metres.
+    /// Position, in meters.
     pub position: Point3<f64>,
     /// Beam.
     pub beam: usize,
-    /// Scan of the stretch, from 0.
+    /// Index of the scan in its stretch, from 0.
     pub scan: usize,
 }
 
-/// A cloud and what is not in it.
+/// A point cloud, with counts of the readings it omits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointCloud {
     /// Its frame.
@@ -58,29 +58,29 @@ pub struct PointCloud {
     pub pose: usize,
     /// Whether the mounting was taken from the drawing because the calibration has none.
     pub mount_is_nominal: bool,
-    /// The points, scan after scan.
+    /// The points, scan by scan.
     pub points: Vec<CloudPoint>,
-    /// Readings that are no ranges: no return, too close, invalid.
+    /// Number of readings that are not ranges: no return, too close, invalid.
     pub without_range: usize,
-    /// Ranges of elements that the calibration gives no direction.
+    /// Number of ranges of elements for which the calibration has no direction.
     pub without_direction: usize,
-    /// Elements that the calibration gives no direction.
+    /// Number of elements for which the calibration has no direction.
     pub unsolved_elements: usize,
 }
 
-/// The rotation that takes the base beam's direction to the outgoing one: Rz(θ_b + θ_a)·Ry(−φ)·Rz(−θ_b).
+/// The rotation from the base beam's direction to the exit direction: Rz(θ_b + θ_a)·Ry(−φ)·Rz(−θ_b).
 ///
-/// The 3-2 sequence of Eq. 9, written for a right-handed frame in which positive elevation points up.
+/// The 3-2 sequence of Eq. (9), written for a right-handed frame in which positive elevation points up.
 pub fn rotation(deflection: &Deflection, beam_azimuth: f64) -> Rotation3<f64> {
     Rotation3::from_axis_angle(&Vector3::z_axis(), beam_azimuth + deflection.azimuth)
         * Rotation3::from_axis_angle(&Vector3::y_axis(), -deflection.elevation)
         * Rotation3::from_axis_angle(&Vector3::z_axis(), -beam_azimuth)
 }
 
-/// Where a range of a deflected beam lies, in the sensor frame: PC = R·(P_0 − P_L1) + P_L1 — Eq. (9).
+/// The point measured by a range of a deflected beam, in the sensor frame: PC = R·(P_0 − P_L1) + P_L1 — Eq. (9).
 ///
-/// P_0 is the point at that range in the scan plane. A range short of the mirror stays in the plane: it is a
-/// reading of the structure.
+/// P_0 is the point at that range in the scan plane. A range shorter than the distance to the mirror stays in the
+/// plane: it is a reading of the structure.
 ///
 /// ```
 /// use catoptric_model::{cloud, Deflection};

@@ -1,4 +1,4 @@
-//! A recorded experiment: the session and, for every pose of a board, its scans and tracked bodies.
+//! A recorded experiment: the session, and the scans and tracked bodies of every board pose.
 //!
 //! A [`Stretch`] is what the laboratory records, frame by frame; a [`PoseRecord`] is what a calibration needs of it.
 
@@ -14,18 +14,18 @@ use crate::tracking::{Track, Watched};
 /// Name of the rig as a motion-capture subject.
 pub const RIG_SUBJECT: &str = "rig";
 
-/// Whole nanoseconds of a time in seconds that is finite and not negative: the resolution of a recording.
+/// A finite, non-negative time in seconds as whole nanoseconds, the resolution of a recording.
 pub fn nanoseconds(seconds: f64) -> u64 {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "as is said"
+        reason = "the time is finite and not negative"
     )]
     let ns = (seconds * 1e9).round() as u64;
     ns
 }
 
-/// One stretch of scans as it was recorded, with nothing moving unless it is a flight.
+/// One stretch of scans as recorded; nothing moves, except in a flight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stretch {
     /// What the experimenter noted.
@@ -36,67 +36,67 @@ pub struct Stretch {
     pub scan_period_s: f64,
     /// Beams of a scan.
     pub beams: usize,
-    /// Readings in metres, scan after scan; −∞ too close, +∞ no return, NaN invalid (REP-117).
+    /// Readings in meters, scan after scan; −∞ too close, +∞ no return, NaN invalid (REP-117).
     pub ranges: Vec<f64>,
-    /// Every reading's echoes in metres, nearest first and in the order of `ranges`, where they were recorded too.
+    /// Echoes of every reading in meters, nearest first and in the order of `ranges`, if they were recorded.
     pub echoes: Option<Vec<Vec<f64>>>,
     /// The tracked bodies, the rig first.
     pub tracks: Vec<Track>,
 }
 
-/// Scans of a stretch in a row, with what motion capture saw from the first of them until the one after the last.
+/// Consecutive scans of a stretch, with the motion-capture frames from the first of them to the one after the last.
 ///
-/// The first excerpt of a stretch also has the frames before its first scan, the last those after its last. A stretch of
-/// any length can be recorded excerpt by excerpt.
+/// The first excerpt of a stretch also has the frames before its first scan, and the last those after its last. A
+/// stretch of any length can be recorded excerpt by excerpt.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Excerpt {
-    /// The scans and the frames. All else is that of the whole stretch: the label, and the time of its first scan.
+    /// The scans and frames. Everything else is that of the whole stretch: the label, and the time of its first scan.
     pub part: Stretch,
-    /// Number of the first of its scans in the whole stretch.
+    /// Index in the stretch of the first scan.
     pub first_scan: usize,
-    /// When and where each tracked body was solved for the first time in the whole stretch; `None` if it never was.
+    /// First solved pose of each tracked body in the whole stretch, with its time; `None` if it was never solved.
     pub first_seen: Vec<Option<(f64, Pose)>>,
 }
 
-/// One stretch of scans, and where motion capture saw rig and board.
+/// One stretch of scans, with the tracked poses of rig and board.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseRecord {
     /// What the experimenter noted.
     pub label: PoseLabel,
-    /// Rig as tracked, mean over the stretch; of a flight, as first seen.
+    /// Rig as tracked: mean over the stretch, or the first pose of a flight.
     pub room_from_rig: Pose,
-    /// Board as tracked, mean over the stretch; `None` where none was set up.
+    /// Board as tracked, mean over the stretch; `None` if none was set up.
     pub room_from_board: Option<Pose>,
-    /// Where the rig was during a flight; `None` where nothing moved.
+    /// Trajectory of the rig during a flight; `None` if nothing moved.
     pub motion: Option<Motion>,
-    /// The markers of rig and board over the stretch; none of a flight, nor where only poses were recorded.
+    /// The markers of rig and board over the stretch; empty for a flight, or if only poses were recorded.
     pub watched: Vec<Watched>,
-    /// What every beam read, scan after scan.
+    /// Readings of all beams, scan by scan.
     pub readings: Readings,
 }
 
-/// A recorded experiment: what a calibration is made from.
+/// A recorded experiment: the input of a calibration.
 ///
-/// It is small however many scans there are: readings stay in the recording, which is read again where a statistic needs
-/// them, unless the dataset was made in memory.
+/// Its size does not grow with the number of scans: readings stay in the recording, which is read again when a
+/// statistic needs them, unless the dataset was made in memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dataset {
     /// What the experimenter knows.
     pub session: Session,
     /// The stretches, in the order they were recorded.
     pub poses: Vec<PoseRecord>,
-    /// SHA-256 of the recording that it was read from, as hexadecimal digits; `None` for one that was made in memory.
+    /// SHA-256 of the recording it was read from, in hexadecimal; `None` for a dataset made in memory.
     pub id: Option<String>,
 }
 
 impl Stretch {
-    /// When and where each tracked body was solved for the first time.
+    /// First solved pose of each tracked body, with its time.
     pub fn first_seen(&self) -> Vec<Option<(f64, Pose)>> {
         let first = |track: &Track| track.frames.iter().find_map(|f| Some((f.time_s, f.pose?)));
         self.tracks.iter().map(first).collect()
     }
 
-    /// What a calibration needs of the stretch.
+    /// Extracts what a calibration needs of the stretch.
     ///
     /// # Errors
     /// [`ModelError::Inconsistent`] if motion capture never saw the rig.
@@ -116,7 +116,7 @@ impl Stretch {
         PoseRecord::new(self.label, motion, mean, watched, readings)
     }
 
-    /// Where the rig was seen, frame by frame.
+    /// Poses of the rig, frame by frame.
     fn motion(&self) -> Motion {
         let rig = self.tracks.iter().filter(|t| t.subject == RIG_SUBJECT);
         let frames = rig.flat_map(|t| &t.frames);
@@ -129,7 +129,7 @@ impl Stretch {
 }
 
 impl PoseRecord {
-    /// What was recorded of a stretch; `mean` says where a body was, on average.
+    /// Builds the record of a stretch; `mean` returns the mean pose of a body.
     ///
     /// # Errors
     /// [`ModelError::Inconsistent`] if motion capture never saw the rig.
@@ -162,7 +162,7 @@ impl PoseRecord {
         self.readings.beams()
     }
 
-    /// The scans, one after the other.
+    /// The scans in order.
     ///
     /// ```
     /// use catoptric_model::{PoseRecord, Unreadable};
@@ -187,11 +187,11 @@ impl PoseRecord {
 }
 
 impl Dataset {
-    /// Checks that the parts fit together.
+    /// Checks that the parts are consistent.
     ///
     /// # Errors
-    /// [`ModelError::Inconsistent`] names the first pose whose board is not in the session, that has no board where
-    /// it needs one, or whose number of readings is not scans × beams.
+    /// [`ModelError::Inconsistent`] names the first pose whose board is not in the session or is missing, or whose
+    /// number of readings is not scans × beams.
     pub fn check(&self) -> Result<(), ModelError> {
         let fail = |pose: &PoseRecord, what: String| {
             Err(ModelError::Inconsistent(format!(

@@ -1,32 +1,32 @@
-//! What the experimenter notes about a stretch of scans: what it was recorded for, and what was set up or tested.
+//! The experimenter's notes on a stretch of scans: its purpose, and what was set up or tested.
 
 use serde::{Deserialize, Serialize};
 
-/// What a stretch of scans was recorded for.
+/// The purpose of a stretch of scans.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PoseKind {
     /// Step 3: the structure before its mirrors were attached.
     Bare,
-    /// Step 4: the known room, no board in it.
+    /// Step 4: the known room, without a board.
     Room,
-    /// Steps 1 and 5: a board before beams that no mirror deflects.
+    /// Steps 1 and 5: a board in front of undeflected beams.
     Direct,
     /// Steps 7–10: a board in the fan of a facet.
     Facet,
-    /// The rig moves through the room while it scans: nothing a calibration is made from, something it is applied to.
+    /// The rig moves through the room while it scans: data that a calibration is applied to, not made from.
     Flight,
 }
 
-/// What is tested of the bare sensor (step 1).
+/// The test of the bare sensor (step 1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TestKind {
-    /// Size of the spot over the distance: Figures 2 and 3, Table 1.
+    /// Spot size over distance: Figures 2 and 3, Table 1.
     Spot,
-    /// Mean error and spread over the distance: Table 2.
+    /// Mean error and spread over distance: Table 2.
     Distance,
-    /// Error over the incidence: Figure 4, Table 3.
+    /// Error over incidence: Figure 4, Table 3.
     Angle,
     /// Error and spread over color and distance: Table 4.
     Color,
@@ -36,13 +36,13 @@ pub enum TestKind {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TestNote {
-    /// What it was for.
+    /// The test.
     pub kind: TestKind,
-    /// Number of the setting: stretches of one setting are trials of the same.
+    /// Number of the setting; stretches with the same setting are repeated trials.
     pub setting: usize,
     /// Number of the trial, from 1.
     pub trial: usize,
-    /// The spot as it was seen on the board.
+    /// The spot as seen on the board.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spot: Option<SpotNote>,
 }
@@ -51,23 +51,23 @@ pub struct TestNote {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SpotNote {
-    /// Neighbouring beams that make it.
+    /// Number of neighboring beams that form it.
     pub beams: usize,
-    /// Extent along the scan, in millimetres.
+    /// Extent along the scan, in millimeters.
     pub width_mm: f64,
-    /// Extent across the scan, in millimetres.
+    /// Extent across the scan, in millimeters.
     pub height_mm: f64,
 }
 
-/// What the experimenter noted about a stretch of scans: one message of `/session/pose`.
+/// The experimenter's notes on a stretch of scans: one message on `/session/pose`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PoseLabel {
     /// Number of the pose, from 0.
     pub pose: usize,
-    /// What it was recorded for.
+    /// Its purpose.
     pub kind: PoseKind,
-    /// Scans in the stretch.
+    /// Number of scans in the stretch.
     pub scans: usize,
     /// Board that was set up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -75,22 +75,22 @@ pub struct PoseLabel {
     /// Color of that board.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub color: Option<String>,
-    /// Facet whose fan the board stands in.
+    /// Facet in whose fan the board is placed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub facet: Option<String>,
-    /// First and last beam that the board was set up for.
+    /// First and last beam for which the board was set up.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beams: Option<[usize; 2]>,
     /// What was tested of the bare sensor.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub test: Option<TestNote>,
-    /// Flight that was flown.
+    /// Name of the flight.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flight: Option<String>,
 }
 
 impl PoseKind {
-    /// Whether it says what the mirrors do: they are attached, and nothing moves.
+    /// Whether it has information about the mirrors: they are attached, and nothing moves.
     pub fn is_evidence(self) -> bool {
         match self {
             Self::Room | Self::Direct | Self::Facet => true,
@@ -100,7 +100,7 @@ impl PoseKind {
 }
 
 impl PoseLabel {
-    /// The note of a stretch of which nothing more is to be noted.
+    /// A label with no optional entries.
     pub fn of(pose: usize, kind: PoseKind, scans: usize) -> Self {
         Self {
             pose,

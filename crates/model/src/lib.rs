@@ -1,17 +1,17 @@
 //! The vocabulary of a 2D LiDAR that sees in 3D through mirrors.
 //!
-//! A beam leaves the scanner at azimuth θ_b in the plane z = 0, meets a mirror at distance d and goes on in
-//! direction v; the reading it brings home from a board with plane (c, n) is (Cooper, Raquet, Patton 2018, Eq. 6)
+//! A beam leaves the scanner at azimuth θ_b in the plane z = 0, meets a mirror at distance d and continues in
+//! direction v; its reading of a board with plane (c, n) is (Cooper, Raquet, Patton 2018, Eq. (6))
 //!
 //! ```text
 //! r = d + s,   s = n·(c − P_L1) / (n·v),   P_L1 = d·(cos θ_b, sin θ_b, 0)
 //! v = (cos φ·cos(θ_b + θ_a), cos φ·sin(θ_b + θ_a), sin φ)
 //! ```
 //!
-//! This crate says what both the simulator and the estimator may know: it draws nothing at random and reads no
-//! file. The modules stand in the order in which light travels.
+//! This crate holds what both the simulator and the estimator may know: it has no randomness and reads no files. The
+//! modules are listed in the order in which light travels.
 //!
-//! Units are metres and radians, numbers are `f64`. Frames are right-handed with z up: `room` (motion capture),
+//! Units are meters and radians, numbers are `f64`. Frames are right-handed with z up: `room` (motion capture),
 //! `rig` (marker body on the superstructure), `sensor` (laser base frame, scan plane z = 0), `board` (target,
 //! plane z = 0) and `facet` (mirror, plane z = 0, reflecting side +z). A pose is named `a_from_b`.
 //!

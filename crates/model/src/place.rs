@@ -1,10 +1,10 @@
-//! Places in files: the path of a value, what is wrong with it, and the name that was probably meant.
+//! Locations in files: the path of a value, a problem with it, and the name that was probably meant.
 //!
-//! Whoever reads a file, a scene or a session, says the same way where in it something is wrong.
+//! Readers of scenes and of sessions use these types to report in the same form where something is wrong.
 
 use std::fmt;
 
-/// One step into a file.
+/// One step of a path into a file.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Segment {
     /// Into a table.
@@ -13,14 +13,14 @@ pub enum Segment {
     Index(usize),
 }
 
-/// The way to a value, written `superstructure.facet[2].name`.
+/// The path of a value, written `superstructure.facet[2].name`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
 pub struct Path(pub Vec<Segment>);
 
-/// Something that is wrong with a value.
+/// A problem with a value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
-    /// Which value it is about.
+    /// The value's path.
     pub path: Path,
     /// What was found and what is allowed.
     pub message: String,
@@ -41,25 +41,25 @@ pub fn nearest<'a>(found: &str, names: impl IntoIterator<Item = &'a str>) -> Opt
     names
         .into_iter()
         .map(|name| (distance(name), name))
-        // A third of the letters wrong is still a slip of the pen; more is another word.
+        // Up to a third of the letters wrong is a typo; more is a different word.
         .filter(|(d, name)| *d <= (name.chars().count().max(found.chars().count()) / 3).max(1))
         .min_by_key(|(d, _)| *d)
         .map(|(_, name)| name)
 }
 
 impl Path {
-    /// The way to a key of the outermost table.
+    /// The path of a key of the outermost table.
     pub fn of(key: &str) -> Self {
         Self::default().key(key)
     }
 
-    /// One step further, into a table.
+    /// Extends the path into a table.
     #[must_use]
     pub fn key(&self, key: &str) -> Self {
         self.step(Segment::Key(key.to_owned()))
     }
 
-    /// One step further, into an array.
+    /// Extends the path into an array.
     #[must_use]
     pub fn index(&self, index: usize) -> Self {
         self.step(Segment::Index(index))

@@ -1,43 +1,44 @@
-//! The readings of a stretch: in memory, or in a recording that is read again whenever they are wanted.
+//! The readings of a stretch: in memory, or in a recording that is read again on demand.
 //!
-//! What needs no second look at them is in [`BeamStatistics`], gathered scan by scan while they pass.
+//! Statistics that need only one pass over the readings are in [`BeamStatistics`], accumulated scan by scan.
 
 use crate::summary::{Moments, Summary};
 use std::borrow::Cow;
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 
-/// Readings that a recording gave once and gives no more: the file is gone, or not the one it was.
+/// Readings of a recording that can no longer be read: the file is gone or has changed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct Unreadable(
-    /// What happened, with the file.
+    /// The error, including the file.
     pub String,
 );
 
-/// The scans of a stretch, one after the other; nothing follows an error.
+/// The scans of a stretch in order; the iteration ends after an error.
 pub type Scans<'a> = Box<dyn Iterator<Item = Result<Cow<'a, [f64]>, Unreadable>> + Send + 'a>;
 
-/// A recording that stretches are read from, as often as is asked for.
+/// A recording from which stretches can be read repeatedly.
 pub trait ScanSource: Send + Sync {
-    /// The scans of a stretch, by its number in the order of the recording.
+    /// The scans of a stretch, given its index in the recording.
     fn scans(&self, stretch: usize) -> Scans<'_>;
 }
 
-/// What a beam read over a stretch, in numbers.
+/// Statistics of one beam over a stretch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BeamStatistics {
-    /// Readings that are not ranges.
+    /// Number of readings that are not ranges.
     pub missing: usize,
-    /// Those of them that were too close, −∞.
+    /// Number of those that were too close, −∞.
     pub too_close: usize,
     /// The ranges of all scans.
     pub all: Moments,
-    /// The ranges of the first half of the scans, and of the second; the middle one of an odd number is in the second.
+    /// The ranges of the first and of the second half of the scans; with an odd number, the middle scan is in the
+    /// second.
     pub halves: [Moments; 2],
-    /// The least range, in metres; ∞ without any.
+    /// The smallest range, in meters; ∞ without any.
     pub least: f64,
-    /// The largest range, in metres; −∞ without any.
+    /// The largest range, in meters; −∞ without any.
     pub largest: f64,
 }
 
@@ -64,18 +65,18 @@ impl BeamStatistics {
     }
 }
 
-/// The statistics of every beam while the scans of a stretch pass by, in their order.
+/// The statistics of every beam, accumulated scan by scan, in order.
 #[derive(Debug, Clone)]
 pub struct Gathered {
     beams: Vec<BeamStatistics>,
-    /// Scans that have passed.
+    /// Number of scans added.
     scans: usize,
-    /// The first scan of the second half.
+    /// Index of the first scan of the second half.
     half: usize,
 }
 
 impl Gathered {
-    /// Begins a stretch of so many beams and scans.
+    /// Begins a stretch with a given number of beams and scans.
     pub fn new(beams: usize, scans: usize) -> Self {
         Self {
             beams: vec![BeamStatistics::default(); beams],
@@ -84,7 +85,7 @@ impl Gathered {
         }
     }
 
-    /// Takes a scan in.
+    /// Adds a scan.
     pub fn add(&mut self, scan: &[f64]) {
         if self.scans == self.half {
             for beam in &mut self.beams {
@@ -114,29 +115,29 @@ impl Gathered {
     }
 }
 
-/// The readings of a stretch in metres; −∞ too close, +∞ no return, NaN invalid (REP-117).
+/// The readings of a stretch in meters; −∞ too close, +∞ no return, NaN invalid (REP-117).
 ///
-/// Two are equal if they hold equal readings; of recordings, which are not read for that, if their statistics are.
+/// Readings in memory are compared individually; readings in recordings, by their statistics.
 #[derive(Clone)]
 pub struct Readings {
     beams: usize,
     place: Place,
-    /// Gathered when they are first asked for.
+    /// Computed on first use.
     statistics: OnceLock<Arc<[BeamStatistics]>>,
 }
 
 #[derive(Clone)]
 enum Place {
-    /// In memory, scan after scan.
+    /// In memory, scan by scan.
     Memory(Vec<f64>),
-    /// In a recording: which, the number of the stretch, and its scans.
+    /// In a recording, with the index of the stretch and the number of its scans.
     Recording(Arc<dyn ScanSource>, usize, usize),
-    /// Nowhere: of so many scans every reading is invalid.
+    /// Not available: every reading of the given number of scans is invalid.
     Nowhere(usize),
 }
 
 impl Readings {
-    /// Readings in memory, scan after scan.
+    /// Readings in memory, scan by scan.
     pub fn in_memory(beams: usize, ranges: Vec<f64>) -> Self {
         Self {
             beams,
@@ -145,7 +146,7 @@ impl Readings {
         }
     }
 
-    /// Readings in a recording, by the number of their stretch, with the statistics that reading them once gave.
+    /// Readings in a recording, given the index of their stretch and the statistics from the first pass over them.
     pub fn recorded(
         source: Arc<dyn ScanSource>,
         stretch: usize,
@@ -159,7 +160,7 @@ impl Readings {
         }
     }
 
-    /// As many readings, all of them invalid.
+    /// The same number of readings, all invalid.
     pub fn left_out(&self) -> Self {
         Self {
             beams: self.beams,
@@ -173,7 +174,7 @@ impl Readings {
         self.beams
     }
 
-    /// Number of the readings.
+    /// Number of readings.
     pub fn len(&self) -> usize {
         match &self.place {
             Place::Memory(ranges) => ranges.len(),
@@ -181,12 +182,12 @@ impl Readings {
         }
     }
 
-    /// Whether there is none.
+    /// Whether there are no readings.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The readings, if they are in memory, scan after scan.
+    /// The readings scan by scan, if they are in memory.
     pub fn held(&self) -> Option<&[f64]> {
         match &self.place {
             Place::Memory(ranges) => Some(ranges),
@@ -194,7 +195,7 @@ impl Readings {
         }
     }
 
-    /// The same, to be changed.
+    /// The same, mutable.
     pub fn held_mut(&mut self) -> Option<&mut Vec<f64>> {
         self.statistics.take();
         match &mut self.place {
@@ -203,7 +204,7 @@ impl Readings {
         }
     }
 
-    /// The scans, one after the other.
+    /// The scans in order.
     pub fn scans(&self) -> Scans<'_> {
         match &self.place {
             Place::Memory(ranges) => {
@@ -228,7 +229,9 @@ impl Readings {
                     .chunks(self.beams.max(1))
                     .for_each(|scan| gathered.add(scan)),
                 Place::Nowhere(_) => gathered.beams.iter_mut().for_each(|b| b.missing = scans),
-                Place::Recording(..) => unreachable!("a recording's were gathered when it was read"),
+                Place::Recording(..) => {
+                    unreachable!("a recording's statistics were computed when it was read")
+                }
             }
             gathered.finish().into()
         })
@@ -262,7 +265,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn statistics_leave_codes_out_and_part_the_scans_in_two() {
+    fn statistics_omit_codes_and_split_the_scans_in_half() {
         let scans = vec![1.0, f64::INFINITY, 2.0, f64::NEG_INFINITY, 3.0, 5.0];
         let mut readings = Readings::in_memory(2, scans);
         let [first, second] = readings.statistics() else {
@@ -272,13 +275,13 @@ mod tests {
         assert_eq!(first.halves.map(|h| (h.count, h.mean)), [(1, 1.0), (2, 2.5)]);
         assert_eq!((second.missing, second.too_close), (2, 1));
         assert_eq!(second.halves.map(|h| h.count), [0, 1]);
-        // What was gathered does not outlive a change of the readings.
+        // Changing the readings discards the cached statistics.
         readings.held_mut().expect("they are in memory")[1] = 4.0;
         assert_eq!(readings.statistics()[1].missing, 1);
     }
 
     #[test]
-    fn readings_that_are_left_out_are_invalid() {
+    fn omitted_readings_are_invalid() {
         let none = Readings::in_memory(2, vec![1.0; 6]).left_out();
         assert_eq!((none.len(), none.statistics()[1].missing), (6, 3));
         let scans: Vec<_> = none.scans().map(|s| s.expect("nothing is read")).collect();

@@ -1,34 +1,34 @@
-//! How a scanner scans: where its beams point, in which sense it turns, and when each beam is read.
+//! Scan geometry: the azimuths of the beams, the direction of rotation, and the time at which each beam is read.
 //!
 //! ```text
 //! θ_b(i) = first + direction·i·step       direction +1 counter-clockwise, −1 clockwise, seen from above
 //! t(i)   = i·beam time                    seconds after the scan begins; beam time is step/(360°·rate) unless given
 //! ```
 //!
-//! Where the beams go all the way around, beams·step = 360° to within half a step, the scan closes: its first and its last
-//! beam are neighbors, and a run of beams may go over the seam, `[first, last]` with first > last.
+//! If the beams cover the full circle, beams·step = 360° to within half a step, the scan closes: its first and last
+//! beams are neighbors, and a run of beams may cross the seam, `[first, last]` with first > last.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Most beams of a scan: far more than any scanner has, and few enough to be held in memory.
+/// Maximum number of beams of a scan: far more than any scanner has, and few enough to fit in memory.
 pub const MOST_BEAMS: usize = 1 << 16;
 
-/// Part of a step by which two lists of azimuths may differ and still be one: what writing them as decimals leaves.
+/// Tolerance for equal azimuths, as a fraction of a step: the rounding of decimals in files.
 const SAME_PART_OF_STEP: f64 = 1e-3;
 
-/// The sense in which a scan turns, seen from above.
+/// The direction of rotation of a scan, seen from above.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ScanDirection {
-    /// Counter-clockwise: azimuths grow from beam to beam.
+    /// Counter-clockwise: azimuths increase from beam to beam.
     #[default]
     Ccw,
-    /// Clockwise: azimuths fall from beam to beam.
+    /// Clockwise: azimuths decrease from beam to beam.
     Cw,
 }
 
-/// Where the beams of a scan point: what a calibration is bound to.
+/// The azimuths of a scan's beams, to which a calibration is bound.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ScanAngles {
@@ -36,14 +36,14 @@ pub struct ScanAngles {
     pub first_deg: f64,
     /// Angle between neighboring beams, in degrees.
     pub step_deg: f64,
-    /// Beams of a scan.
+    /// Number of beams in a scan.
     pub beams: usize,
-    /// The sense in which it turns.
+    /// The direction of rotation.
     #[serde(default)]
     pub direction: ScanDirection,
 }
 
-/// How a scanner scans; every value is one that a scanner can have. The default is the UST-20LX's.
+/// Angles and timing of a scan; every value is physically possible. The default is the UST-20LX's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ScanGeometry {
     angles: ScanAngles,
@@ -51,11 +51,11 @@ pub struct ScanGeometry {
     beam_time_s: f64,
 }
 
-/// A number that no scan can have.
+/// A value that is impossible for a scan.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("`{key}` {problem}")]
 pub struct ScanError {
-    /// The key, as files name it.
+    /// The key as written in files.
     pub key: &'static str,
     /// What is wrong with it.
     pub problem: String,
@@ -72,7 +72,7 @@ impl ScanDirection {
 }
 
 impl ScanAngles {
-    /// Beams on either side of the x axis alike, counter-clockwise.
+    /// Beams placed symmetrically about the x axis, counter-clockwise.
     pub fn centered(step_deg: f64, beams: usize) -> Self {
         Self {
             first_deg: -0.5 * (beams as f64 - 1.0) * step_deg,
@@ -82,10 +82,10 @@ impl ScanAngles {
         }
     }
 
-    /// Whether a scan can have them.
+    /// Checks that a scan can have these angles.
     ///
     /// # Errors
-    /// [`ScanError`] names the first number that cannot be.
+    /// [`ScanError`] names the first impossible value.
     pub fn check(&self) -> Result<(), ScanError> {
         let fail = |key, problem: String| Err(ScanError { key, problem });
         if !(1..=MOST_BEAMS).contains(&self.beams) {
@@ -119,7 +119,8 @@ impl ScanAngles {
         Ok(())
     }
 
-    /// Whether both are of one scanner: as many beams, each in the same direction but for the rounding of decimals.
+    /// Whether both belong to the same scanner: as many beams, in the same directions to within the rounding of
+    /// decimals.
     pub fn same_as(&self, other: &Self) -> bool {
         let near = |a: f64, b: f64| (a - b).abs() <= SAME_PART_OF_STEP * self.step_deg;
         let steps = self.beams.saturating_sub(1) as f64;
@@ -147,7 +148,7 @@ impl fmt::Display for ScanAngles {
 }
 
 impl ScanGeometry {
-    /// A scan; without a beam time, its beams are spread evenly over the turn from one scan to the next.
+    /// A scan; without a beam time, its beams are spread evenly over the scan period.
     ///
     /// ```
     /// use catoptric_model::{ScanAngles, ScanDirection, ScanGeometry};
@@ -160,7 +161,7 @@ impl ScanGeometry {
     /// ```
     ///
     /// # Errors
-    /// [`ScanError`] names the first number that no scan can have.
+    /// [`ScanError`] names the first impossible value.
     pub fn new(angles: ScanAngles, scan_rate_hz: f64, beam_time_us: Option<f64>) -> Result<Self, ScanError> {
         angles.check()?;
         let fail = |key, problem: String| Err(ScanError { key, problem });
@@ -194,12 +195,12 @@ impl ScanGeometry {
         })
     }
 
-    /// Where its beams point.
+    /// The azimuths of its beams.
     pub fn angles(&self) -> &ScanAngles {
         &self.angles
     }
 
-    /// Beams of a scan.
+    /// Number of beams in a scan.
     pub fn beams(&self) -> usize {
         self.angles.beams
     }
@@ -237,9 +238,9 @@ impl ScanGeometry {
         [first.min(last), first.max(last)]
     }
 
-    /// Where in the scan an azimuth is, in steps from beam 0: less than half a step before it, or after.
+    /// Position of an azimuth in the scan, in steps from beam 0, from half a step before it.
     ///
-    /// Azimuths a turn apart are one; what is beyond the last beam is not in the scan.
+    /// Azimuths a full turn apart are equivalent; positions past the last beam are not in the scan.
     pub fn place(&self, azimuth: f64) -> f64 {
         let ScanAngles {
             first_deg,
@@ -258,7 +259,7 @@ impl ScanGeometry {
         if !place.is_finite() {
             return None;
         }
-        // Within a turn, so nothing is cut off.
+        // Within one turn, so the conversion does not truncate.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let beam = place as usize;
         match self.closes() {
@@ -268,13 +269,13 @@ impl ScanGeometry {
         }
     }
 
-    /// Whether beams go all the way around, so that the first and the last are neighbors.
+    /// Whether the beams cover the full circle, so that the first and the last are neighbors.
     pub fn closes(&self) -> bool {
         let around = self.angles.step_deg * self.beams() as f64;
         (around - 360.0).abs() <= 0.5 * self.angles.step_deg
     }
 
-    /// The beam before and the beam after one; `None` at an end of the scan.
+    /// The beams before and after a given one; `None` at an end of the scan.
     pub fn neighbors(&self, beam: usize) -> [Option<usize>; 2] {
         let (last, closes) = (self.beams() - 1, self.closes());
         let before = match beam {
@@ -289,7 +290,7 @@ impl ScanGeometry {
         [before, after]
     }
 
-    /// Beams from `a` to `b`, the shorter way where the scan closes; 0 for one and the same.
+    /// Number of steps from `a` to `b`, in the shorter direction if the scan closes; 0 if they are equal.
     pub fn apart(&self, a: usize, b: usize) -> usize {
         let straight = a.abs_diff(b);
         match self.closes() {
@@ -298,12 +299,12 @@ impl ScanGeometry {
         }
     }
 
-    /// Whether a run goes over the seam: where a scan does not close, there is none.
+    /// Whether a run crosses the seam; never if the scan does not close.
     fn over_seam(&self, [first, last]: [usize; 2]) -> bool {
         first > last && self.closes()
     }
 
-    /// The beams of a run that the scan has, in its order; first > last goes over the seam.
+    /// The beams of a run that exist in the scan, in order; first > last crosses the seam.
     pub fn run(&self, run: [usize; 2]) -> impl Iterator<Item = usize> + Clone + use<> {
         let (beams, [first, last]) = (self.beams(), run);
         let to_last = last.saturating_add(1).min(beams);
@@ -314,7 +315,7 @@ impl ScanGeometry {
         to_end.chain(from_start)
     }
 
-    /// Whether a run holds a beam.
+    /// Whether a run contains a beam.
     pub fn holds(&self, run: [usize; 2], beam: usize) -> bool {
         let [first, last] = run;
         match self.over_seam(run) {
@@ -323,7 +324,7 @@ impl ScanGeometry {
         }
     }
 
-    /// Steps from the first beam of a run to its last.
+    /// Number of steps from the first beam of a run to its last.
     pub fn length(&self, run: [usize; 2]) -> usize {
         let [first, last] = run;
         match self.over_seam(run) {
@@ -332,7 +333,7 @@ impl ScanGeometry {
         }
     }
 
-    /// Steps from the first beam of a run to a beam: negative for one that is before it.
+    /// Number of steps from the first beam of a run to a beam; negative if the beam is before it.
     pub fn along(&self, run: [usize; 2], beam: usize) -> f64 {
         let straight = beam as f64 - run[0] as f64;
         if !self.closes() {
@@ -341,13 +342,13 @@ impl ScanGeometry {
         let around = self.beams() as f64;
         let on = straight.rem_euclid(around);
         let beyond = on - self.length(run) as f64;
-        // What is outside belongs to the nearer end.
+        // Beams outside belong to the nearer end.
         if beyond <= around - on { on } else { on - around }
     }
 
-    /// Steps that an angle spans, rounded up.
+    /// Number of steps that an angle spans, rounded up.
     pub fn steps_in(&self, angle_deg: f64) -> usize {
-        // Small and positive; what rounding adds to a whole number is no step.
+        // Small and positive; rounding noise above a whole number does not add a step.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let steps = (angle_deg / self.angles.step_deg - SAME_PART_OF_STEP)
             .ceil()
@@ -355,7 +356,7 @@ impl ScanGeometry {
         steps
     }
 
-    /// How many beams one is away from a run; 0 inside.
+    /// Number of steps from a beam to a run; 0 inside.
     pub fn beside(&self, run: [usize; 2], beam: usize) -> usize {
         match self.holds(run, beam) {
             true => 0,
@@ -363,7 +364,7 @@ impl ScanGeometry {
         }
     }
 
-    /// A run and so many beams on either side, as far as the scan has them; a scan that closes gives all its beams at most.
+    /// A run extended by N beams on either side, within the scan; a scan that closes gives all its beams at most.
     pub fn widened(&self, [first, last]: [usize; 2], by: usize) -> [usize; 2] {
         let beams = self.beams();
         if !self.closes() {
@@ -375,9 +376,9 @@ impl ScanGeometry {
         [(first + beams - by) % beams, (last + by) % beams]
     }
 
-    /// The shortest run that holds all of some beams, which are given in ascending order; `None` for none.
+    /// The shortest run that contains the given beams, in ascending order; `None` for no beams.
     ///
-    /// In a scan that closes it leaves the largest gap out, and the one over the seam where two are as large.
+    /// If the scan closes, the run omits the largest gap, and the one across the seam in a tie.
     pub fn shortest_run(&self, beams: &[usize]) -> Option<[usize; 2]> {
         let (first, last) = (*beams.first()?, *beams.last()?);
         if !self.closes() {
@@ -406,14 +407,14 @@ impl ScanGeometry {
         self.beam_time_s
     }
 
-    /// When a beam is read, in seconds after its scan begins.
+    /// Time at which a beam is read, in seconds after its scan begins.
     pub fn time_of(&self, beam: usize) -> f64 {
         beam as f64 * self.beam_time_s
     }
 }
 
 impl Default for ScanGeometry {
-    /// The UST-20LX's (data sheet): 270° in steps of 0.25°, counter-clockwise, 40 scans per second.
+    /// The UST-20LX (data sheet): 270° in steps of 0.25°, counter-clockwise, 40 scans per second.
     fn default() -> Self {
         let scan_rate_hz = 40.0;
         let step_deg = 0.25;
@@ -436,7 +437,7 @@ mod tests {
             beams,
             direction,
         };
-        ScanGeometry::new(angles, 10.0, None).expect("a scanner can have it")
+        ScanGeometry::new(angles, 10.0, None).expect("a valid scan")
     }
 
     fn all_around() -> ScanGeometry {
@@ -508,7 +509,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ends_are_neighbors_where_the_scan_closes() {
+    fn the_ends_are_neighbors_if_the_scan_closes() {
         let around = all_around();
         assert!(around.closes() && !ScanGeometry::default().closes());
         assert_eq!(around.neighbors(0), [Some(1439), Some(1)]);
@@ -524,7 +525,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_go_over_the_seam() {
+    fn runs_may_cross_the_seam() {
         let around = all_around();
         let over: Vec<usize> = around.run([1438, 1]).collect();
         assert_eq!(over, [1438, 1439, 0, 1]);
@@ -543,14 +544,14 @@ mod tests {
         assert_eq!(around.shortest_run(&[]), None);
         let ust = ScanGeometry::default();
         assert_eq!(ust.shortest_run(&[0, 1, 1080]), Some([0, 1080]));
-        // Where the scan does not close, nothing goes over its ends.
+        // If the scan does not close, nothing crosses its ends.
         assert_eq!((ust.run([1070, 4]).count(), ust.length([1070, 4])), (0, 0));
         assert!(!ust.holds([1070, 4], 2));
         assert_eq!(ust.run([1070, 2000]).count(), 11);
     }
 
     #[test]
-    fn places_along_a_run_go_on_beyond_its_ends() {
+    fn positions_along_a_run_continue_beyond_its_ends() {
         let around = all_around();
         for (beam, place) in [(1438, 0.0), (0, 2.0), (1, 3.0), (4, 6.0), (1430, -8.0)] {
             assert_eq!(around.along([1438, 1], beam), place, "beam {beam}");
@@ -561,7 +562,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_scanner_has_is_refused() {
+    fn impossible_scans_are_rejected() {
         let good = *ScanGeometry::default().angles();
         let key = |angles, rate, time| ScanGeometry::new(angles, rate, time).map_err(|e| e.key);
         assert_eq!(key(ScanAngles { beams: 0, ..good }, 40.0, None), Err("beams"));
@@ -591,7 +592,7 @@ mod tests {
     }
 
     #[test]
-    fn angles_are_the_same_but_for_rounding() {
+    fn angles_are_the_same_to_within_rounding() {
         let one = *scan(-120.0, 360.0 / 1024.0, 682, ScanDirection::Ccw).angles();
         let rounded = ScanAngles {
             step_deg: 0.3515625,

@@ -1,11 +1,12 @@
-//! The median of numbers that are too many to be held: exact, from several passes over them.
+//! The exact median of more numbers than fit in memory, from several passes over them.
 
-/// Bits of a number that one pass decides.
+/// Number of bits that one pass determines.
 const BITS: u32 = 16;
 
-/// The upper median of numbers that pass by several times, always the same ones, in any order.
+/// The upper median of a sequence of numbers that is passed repeatedly, the same numbers in any order.
 ///
-/// Every pass counts, in a histogram over the next bits, the numbers that agree with the median in the bits known so far.
+/// Every pass counts, in a histogram over the next bits, the numbers that agree with the median in the bits known so
+/// far.
 ///
 /// ```
 /// use catoptric_model::selection::Median;
@@ -20,7 +21,7 @@ const BITS: u32 = 16;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Median {
-    /// The bits that are known, and how many they are.
+    /// The known bits, and their number.
     prefix: u64,
     known: u32,
     /// The median's rank among the numbers that begin with them, from the second pass on.
@@ -42,10 +43,10 @@ impl Default for Median {
 }
 
 impl Median {
-    /// Takes a number of this pass in.
+    /// Adds a number in the current pass.
     pub fn add(&mut self, number: f64) {
         let key = key(number);
-        // No bits at all cannot be shifted out.
+        // Shifting by the full width is not allowed.
         if self.known == 0 || key >> (u64::BITS - self.known) == self.prefix {
             let next = (key >> (u64::BITS - self.known - BITS)) & ((1 << BITS) - 1);
             // The mask leaves sixteen bits.
@@ -115,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_the_number_that_sorting_finds() {
+    fn the_median_equals_the_one_found_by_sorting() {
         let mut state = 1_u64;
         for count in [1, 2, 3, 10, 101, 1000] {
             let mut numbers: Vec<f64> = (0..count)

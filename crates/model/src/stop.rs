@@ -1,9 +1,9 @@
-//! A request to stop, shared between whoever asks and whoever works.
+//! A request to stop, shared between the caller and a worker.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A request to stop that long work looks at often. Clones share it; once made, it stands.
+/// A request to stop, which long work polls often. Clones share it; it cannot be withdrawn.
 ///
 /// ```
 /// use catoptric_model::Stop;
@@ -23,17 +23,17 @@ pub struct Stop(Arc<AtomicBool>);
 pub struct Stopped;
 
 impl Stop {
-    /// Asks the work to stop.
+    /// Requests a stop.
     pub fn request(&self) {
         self.0.store(true, Ordering::SeqCst);
     }
 
-    /// Whether the work was asked to stop.
+    /// Whether a stop was requested.
     pub fn is_requested(&self) -> bool {
         self.0.load(Ordering::SeqCst)
     }
 
-    /// An error once the work was asked to stop.
+    /// Returns an error once a stop was requested.
     ///
     /// # Errors
     /// [`Stopped`] after [`request`](Self::request).

@@ -1,13 +1,13 @@
-//! What motion capture says of a body: its track frame by frame, the pose that its markers solve to, and whether they
-//! stayed where they were.
+//! Motion-capture data of a body: its track frame by frame, the pose solved from its markers, and the check that they
+//! stayed in place.
 
 use crate::frame::Pose;
 use nalgebra::{Matrix3, Point3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-/// Parts of a stretch in which markers are averaged, at most.
+/// Maximum number of parts of a stretch over which markers are averaged.
 const MOST_PARTS: usize = 8;
 
-/// Frames of a part, at least.
+/// Minimum number of frames in a part.
 const LEAST_FRAMES: usize = 2;
 
 /// Median of χ² with three degrees of freedom.
@@ -18,13 +18,13 @@ const MEDIAN_SQUARE: f64 = 2.365_973_884_375_338;
 pub struct TrackedFrame {
     /// Time since the recording began, in seconds.
     pub time_s: f64,
-    /// `room_from_body` as solved from the markers; `None` where too few were seen.
+    /// `room_from_body` as solved from the markers; `None` if too few were seen.
     pub pose: Option<Pose>,
-    /// The markers in the order of the body's template, in metres; `None` where one was not seen.
+    /// The markers in the order of the body's template, in meters; `None` for one that was not seen.
     pub markers: Vec<Option<Point3<f64>>>,
 }
 
-/// What motion capture recorded of one body.
+/// The motion-capture recording of one body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Track {
     /// Name of the body: the rig's or a board's.
@@ -33,12 +33,12 @@ pub struct Track {
     pub frames: Vec<TrackedFrame>,
 }
 
-/// A marker averaged over some frames.
+/// A marker averaged over several frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeanMarker {
-    /// Its mean place in the room frame, in metres; the origin if it was never seen.
+    /// Its mean position in the room frame, in meters; the origin if it was never seen.
     pub place: Point3<f64>,
-    /// Frames in which it was seen.
+    /// Number of frames in which it was seen.
     pub count: usize,
 }
 
@@ -47,16 +47,16 @@ pub struct MeanMarker {
 pub struct Watched {
     /// Name of the body.
     pub subject: String,
-    /// Equal parts of the stretch in order of time, and in each the markers in the order of the body's template.
+    /// Equal parts of the stretch in order of time; in each, the markers in the order of the body's template.
     pub parts: Vec<Vec<MeanMarker>>,
-    /// How far a marker jumps about from frame to frame along one axis, 1σ, in metres; one movement does not count.
+    /// Jitter of a marker from frame to frame along one axis, 1σ, in meters; insensitive to a single displacement.
     pub jitter: f64,
 }
 
 impl Track {
     /// Mean of the solved poses; `None` if the body was never seen.
     ///
-    /// Positions are averaged, and quaternions after bringing them to one sign: exact to second order in the spread,
+    /// Positions are averaged, as are quaternions after aligning their signs: exact to second order in the spread,
     /// which is far below a milliradian here.
     pub fn mean_pose(&self) -> Option<Pose> {
         let mut mean = MeanPose::default();
@@ -68,7 +68,7 @@ impl Track {
     }
 }
 
-/// The mean of poses that are taken in one by one, as [`Track::mean_pose`] forms it.
+/// The mean of poses that are added one at a time, as in [`Track::mean_pose`].
 #[derive(Debug, Clone, Copy, Default)]
 pub struct MeanPose {
     /// The first pose's rotation, and the sums.
@@ -77,7 +77,7 @@ pub struct MeanPose {
 }
 
 impl MeanPose {
-    /// Takes a pose in.
+    /// Adds a pose.
     pub fn add(&mut self, pose: &Pose) {
         self.count += 1.0;
         let q = pose.rotation.into_inner();
@@ -100,8 +100,8 @@ impl MeanPose {
     }
 }
 
-/// The pose that takes a template to the points seen, in the sense of least squares (Kabsch); `None` for points seen
-/// too few or on a line.
+/// The least-squares pose that maps a template to the observed points (Kabsch); `None` if the points are too few or
+/// collinear.
 pub fn solve_pose(template: &[Point3<f64>], seen: &[Option<Point3<f64>>]) -> Option<Pose> {
     let pairs: Vec<_> = template
         .iter()
@@ -120,11 +120,11 @@ pub fn solve_pose(template: &[Point3<f64>], seen: &[Option<Point3<f64>>]) -> Opt
         .sum();
     let svd = covariance.svd(true, true);
     let (u, v_t) = (svd.u?, svd.v_t?);
-    // Points on a line leave the turn about it open.
+    // Collinear points leave the rotation about their line undetermined.
     if svd.singular_values[1] <= 1e-9 * svd.singular_values[0] {
         return None;
     }
-    // The rotation, not the reflection that may fit a plane template as well.
+    // A rotation, not the reflection that may fit a plane template equally well.
     let sign = (u.determinant() * v_t.determinant()).signum();
     let rotation = u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, sign)) * v_t;
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation));
@@ -135,7 +135,7 @@ pub fn solve_pose(template: &[Point3<f64>], seen: &[Option<Point3<f64>>]) -> Opt
 }
 
 impl Watched {
-    /// A body over the frames of its track; `None` where no marker was recorded.
+    /// A body over the frames of its track; `None` if no marker was recorded.
     pub fn of(track: &Track) -> Option<Self> {
         let markers = track.frames.iter().map(|f| f.markers.len()).max()?;
         if markers == 0 {
@@ -172,17 +172,17 @@ impl Watched {
     }
 }
 
-/// The markers of a body, frame by frame, while they are averaged over parts of a stretch.
+/// The markers of a body, averaged frame by frame over parts of a stretch.
 #[derive(Debug, Clone)]
 pub struct Watching {
-    /// Frames of the stretch, and those that have passed.
+    /// Number of frames in the stretch, and number added so far.
     frames: usize,
     passed: usize,
-    /// In every part and of every marker: the sum of its places, and the frames in which it was seen.
+    /// For every part and marker: the sum of its positions, and the number of frames in which it was seen.
     parts: Vec<Vec<(Vector3<f64>, usize)>>,
 }
 
-/// How far the markers of a body jump from one frame to the next.
+/// The displacements of the markers from one frame to the next.
 #[derive(Debug, Clone, Default)]
 pub struct Jumping {
     before: Vec<Option<Point3<f64>>>,
@@ -195,7 +195,7 @@ pub fn median_jump(squares: &mut [f64]) -> Option<f64> {
 }
 
 impl Jumping {
-    /// Takes the markers of a frame in; `jump` is given the square of how far each went since the frame before, in m².
+    /// Adds the markers of a frame; `jump` receives each squared displacement since the frame before, in m².
     pub fn add(&mut self, markers: &[Option<Point3<f64>>], mut jump: impl FnMut(f64)) {
         for (from, to) in self.before.iter().zip(markers) {
             if let (Some(from), Some(to)) = (from, to) {
@@ -208,7 +208,7 @@ impl Jumping {
 }
 
 impl Watching {
-    /// Begins a stretch of so many frames of so many markers.
+    /// Begins a stretch with a given number of frames and markers.
     pub fn new(frames: usize, markers: usize) -> Self {
         let parts = (frames / LEAST_FRAMES).clamp(1, MOST_PARTS);
         Self {
@@ -218,7 +218,7 @@ impl Watching {
         }
     }
 
-    /// Takes the markers of a frame in.
+    /// Adds the markers of a frame.
     pub fn add(&mut self, markers: &[Option<Point3<f64>>]) {
         let parts = self.parts.len();
         let ends = |part: usize| (part + 1) * self.frames / parts;
@@ -232,8 +232,8 @@ impl Watching {
         }
     }
 
-    /// What was watched; jumps between successive frames have twice the variance of a frame, and the median of their
-    /// squares, `None` without any, does not see a few large ones.
+    /// Returns the averages. Jumps between successive frames have twice the variance of a frame, and the median of
+    /// their squares, `None` without any, is insensitive to a few large ones.
     pub fn finish(self, subject: String, median_jump: Option<f64>) -> Watched {
         let mean = |(sum, count): (Vector3<f64>, usize)| MeanMarker {
             place: Point3::from(sum / count.max(1) as f64),
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn too_few_or_collinear_markers_give_none() {
+    fn too_few_or_collinear_markers_give_no_pose() {
         let two = [
             Some(Point3::origin()),
             None,

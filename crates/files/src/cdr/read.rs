@@ -1,4 +1,4 @@
-//! Reading a message, whatever its bytes are.
+//! Decoding CDR messages; the bytes may be arbitrary.
 
 use super::{CdrError, LITTLE_ENDIAN};
 
@@ -16,14 +16,14 @@ impl<'a> CdrReader<'a> {
     /// [`CdrError`] if it does not begin with the header of little-endian CDR.
     pub fn new(message: &'a [u8]) -> Result<Self, CdrError> {
         match message.split_at_checked(LITTLE_ENDIAN.len()) {
-            // The last two bytes are options that say nothing here.
+            // The last two bytes are options, which are not used here.
             Some((header, body)) if header[..2] == LITTLE_ENDIAN[..2] => Ok(Self { body, at: 0 }),
             Some((header, _)) => Err(CdrError::Encapsulation(header.to_vec())),
             None => Err(CdrError::Encapsulation(message.to_vec())),
         }
     }
 
-    /// The next bytes, whatever their alignment.
+    /// The next bytes, without alignment.
     fn take(&mut self, wanted: usize) -> Result<&'a [u8], CdrError> {
         let truncated = CdrError::Truncated {
             at: self.at,
@@ -36,7 +36,7 @@ impl<'a> CdrReader<'a> {
         Ok(bytes)
     }
 
-    /// The next bytes at a multiple of their number.
+    /// The next bytes, aligned to their number.
     fn aligned<const N: usize>(&mut self) -> Result<[u8; N], CdrError> {
         self.at = self.at.next_multiple_of(N);
         let mut value = [0; N];
@@ -47,7 +47,7 @@ impl<'a> CdrReader<'a> {
     /// Reads a byte.
     ///
     /// # Errors
-    /// [`CdrError::Truncated`] past the end, as for every number.
+    /// [`CdrError::Truncated`] past the end, as for all numbers.
     pub fn u8(&mut self) -> Result<u8, CdrError> {
         self.aligned().map(u8::from_le_bytes)
     }
@@ -95,7 +95,7 @@ impl<'a> CdrReader<'a> {
     /// Reads the length of a sequence whose elements take at least `smallest` bytes each.
     ///
     /// # Errors
-    /// [`CdrError::Truncated`] if so many cannot follow: a corrupt length must not make the reader allocate for it.
+    /// [`CdrError::Truncated`] if the body is too short for them: a corrupt length must not cause a large allocation.
     pub fn length(&mut self, smallest: usize) -> Result<usize, CdrError> {
         let length = self.u32()? as usize;
         let wanted = length.saturating_mul(smallest);
@@ -114,7 +114,7 @@ impl<'a> CdrReader<'a> {
     /// # Errors
     /// [`CdrError::Truncated`] past the end.
     pub fn f32_sequence(&mut self) -> Result<impl ExactSizeIterator<Item = f32> + 'a, CdrError> {
-        // The length is aligned as they are.
+        // The length has the same alignment as the elements.
         let length = self.length(size_of::<f32>())?;
         let (numbers, _) = self.take(length * size_of::<f32>())?.as_chunks();
         Ok(numbers.iter().map(|bytes| f32::from_le_bytes(*bytes)))
@@ -128,7 +128,7 @@ impl<'a> CdrReader<'a> {
         let length = self.length(1)?;
         let at = self.at;
         match self.take(length)? {
-            // Some writers leave the zero of an empty string out.
+            // Some writers omit the zero of an empty string.
             [] => Ok(""),
             [text @ .., 0] => std::str::from_utf8(text).map_err(|_| CdrError::BadString { at }),
             _ => Err(CdrError::BadString { at }),

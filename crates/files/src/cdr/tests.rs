@@ -1,13 +1,13 @@
-//! Bytes counted by hand, and bytes that are no message.
+//! Hand-computed bytes, and invalid messages.
 
 use super::*;
 
 #[test]
-fn bytes_are_those_counted_by_hand() {
+fn bytes_match_the_hand_computed_ones() {
     let mut cdr = CdrWriter::new();
     cdr.u8(7);
     cdr.u32(0x0102_0304); // three bytes of padding
-    cdr.string("ab"); // no padding: the length stands at 8
+    cdr.string("ab"); // no padding: the length is at 8
     cdr.f64(1.0); // the string ends at 15: one byte of padding
     cdr.i8(-1);
     cdr.f32(-2.0); // three bytes of padding

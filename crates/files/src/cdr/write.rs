@@ -1,4 +1,4 @@
-//! Writing a message.
+//! Encoding CDR messages.
 
 use super::LITTLE_ENDIAN;
 
@@ -73,14 +73,14 @@ impl CdrWriter {
     /// Appends the length of a sequence.
     ///
     /// # Panics
-    /// If it does not fit into 32 bits: no message holds four thousand million elements.
+    /// If it does not fit into 32 bits: no message has four billion elements.
     pub fn length(&mut self, length: usize) {
         self.u32(u32::try_from(length).expect("a sequence has fewer than 2³² elements"));
     }
 
     /// Appends a sequence of 32-bit numbers.
     pub fn f32_sequence(&mut self, values: impl ExactSizeIterator<Item = f32>) {
-        // The length is aligned as they are.
+        // The length has the same alignment as the elements.
         self.length(values.len());
         let begin = self.bytes.len();
         self.bytes.resize(begin + values.len() * size_of::<f32>(), 0);

@@ -1,4 +1,4 @@
-//! A tree of values against the JSON Schema of its type: every departure, not only the first.
+//! Validation of a tree of values against the JSON Schema of its type: reports every violation, not only the first.
 
 mod choice;
 mod number;
@@ -9,18 +9,18 @@ use super::tree::{Node, Source, Value};
 use catoptric_model::place::{Path, Segment};
 use serde_json::Value as Json;
 
-/// A departure from the schema.
+/// A violation of the schema.
 #[derive(Debug)]
 pub(super) struct Finding {
     pub(super) source: Source,
     pub(super) path: Path,
     pub(super) message: String,
     pub(super) help: Option<String>,
-    /// Whether something is not there at all, as much is after a syntax error.
+    /// Whether something is missing, as much is after a syntax error.
     pub(super) missing: bool,
 }
 
-/// Every departure of a tree from a schema.
+/// Returns every violation of a schema by a tree.
 pub(super) fn check(root: &Node, schema: &Json) -> Vec<Finding> {
     let mut walk = Walk {
         schema,
@@ -56,7 +56,7 @@ impl<'a> Walk<'a> {
             self.value(node, target, path);
         }
         if let Some(alternatives) = schema.get("anyOf").and_then(Json::as_array) {
-            // An optional value: the value's own schema beside that of null.
+            // An optional value: its own schema, or null.
             let is_null = |s: &Json| s.get("type").is_some_and(|t| t == "null");
             let own = alternatives.iter().find(|s| !is_null(s));
             if let (Some(own), false) = (own, matches!(node.value, Value::Null)) {
@@ -84,7 +84,7 @@ impl<'a> Walk<'a> {
 
     fn typed(&mut self, node: &Node, kind: &str, schema: &'a Json, path: &Path) {
         match (kind, &node.value) {
-            // The word itself is looked at where the words are listed.
+            // The word itself is examined together with the list of words.
             ("string", Value::String(_)) | ("boolean", Value::Boolean(_)) => {}
             ("string", _) if schema.get("enum").is_some() => {}
             ("integer", Value::Integer(i)) => self.integer(node, *i, schema, path),

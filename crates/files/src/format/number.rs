@@ -1,4 +1,4 @@
-//! Numbers: whole or not, and within what is allowed.
+//! Numbers: integer or not, and within the allowed range.
 
 use super::super::tree::Node;
 use super::Walk;

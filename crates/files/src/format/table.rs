@@ -1,4 +1,4 @@
-//! Tables and lists: unknown keys, missing keys, how many entries.
+//! Tables and lists: unknown keys, missing keys, number of entries.
 
 use super::super::tree::{Node, Value};
 use super::units::{other_unit, split_unit};
@@ -62,7 +62,7 @@ impl<'a> Walk<'a> {
             .flatten()
         {
             let Some(name) = required.as_str() else { continue };
-            // A key that is there under a slip of the pen has been reported once.
+            // A key with a typo in its name has been reported already.
             if entries.iter().any(|(k, _)| k.name == name) || meant.contains(&name) {
                 continue;
             }
@@ -81,7 +81,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// What to do about a key that does not exist, and the one that was meant.
+    /// Help for an unknown key, and the key that was probably meant.
     fn unknown_key<'n>(&self, key: &str, child: &Node, names: &[&'n str]) -> (String, Option<&'n str>) {
         let stem = split_unit(key).map_or(key, |(stem, _)| stem);
         let same_stem = names
@@ -102,7 +102,7 @@ impl<'a> Walk<'a> {
         (help, None)
     }
 
-    /// Tables of the whole file that know a key.
+    /// Tables of the whole file that have a key of that name.
     fn tables_with(&self, key: &str) -> Vec<String> {
         let mut out = Vec::new();
         self.search(key, self.schema, &mut Vec::new(), &mut out);
@@ -130,7 +130,7 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// The table that holds a key.
+/// The table that contains a key.
 fn node_path(path: &Path) -> Option<Path> {
     let (_, before) = path.0.split_last()?;
     Some(Path(before.to_vec()))

@@ -1,8 +1,8 @@
-//! The units that keys carry in their names, and what is written with another unit.
+//! Units in the names of keys, and help for values in another unit.
 
 use super::super::tree::{Node, Value};
 
-/// Units that keys carry, with their dimension and their size in its SI unit.
+/// Units in the names of keys, with their dimension and their size in its SI unit.
 const UNITS: [(&str, &str, f64); 13] = [
     ("deg", "angle", std::f64::consts::PI / 180.0),
     ("rad", "angle", 1.0),
@@ -19,13 +19,13 @@ const UNITS: [(&str, &str, f64); 13] = [
     ("sr", "solid angle", 1.0),
 ];
 
-/// `tilt_deg` as ("tilt", "deg").
+/// Splits `tilt_deg` into ("tilt", "deg").
 pub(super) fn split_unit(key: &str) -> Option<(&str, &str)> {
     key.rsplit_once('_')
         .filter(|(_, unit)| UNITS.iter().any(|(u, _, _)| u == unit))
 }
 
-/// What follows a number in a message.
+/// The unit as printed after a number in a message.
 pub(super) fn unit_sign(key: &str) -> String {
     match split_unit(key) {
         Some((_, "deg")) => "°".to_owned(),
@@ -36,7 +36,7 @@ pub(super) fn unit_sign(key: &str) -> String {
     }
 }
 
-/// Help for a key that exists in another unit, with the value converted where that can be done.
+/// Help for a key that exists in another unit, with the value converted if possible.
 pub(super) fn other_unit(found: &str, name: &str, child: &Node) -> String {
     let unit = |key: &str| {
         let (_, unit) = split_unit(key)?;
@@ -79,7 +79,7 @@ pub(super) fn other_unit(found: &str, name: &str, child: &Node) -> String {
     help
 }
 
-/// Six significant places after the point: more than a person writes.
+/// Six decimal places: more than a person writes.
 fn rounded(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }

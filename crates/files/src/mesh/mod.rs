@@ -1,8 +1,8 @@
-//! Mesh files: STL, OBJ and PLY, as text and binary; and a PLY writer that loses nothing.
+//! Mesh files: STL, OBJ and PLY, as text and binary; and a lossless PLY writer.
 //!
-//! The format is told by the end of the file's name. Whatever is damaged is an error that names the line, or the byte
-//! in a binary file; nothing in a file can bring the reader down, and no size it claims is believed before the bytes
-//! are there. Polygons of more than three corners are cut into a fan.
+//! The extension determines the format. Damaged files give an error that names the line, or the byte in a binary file;
+//! no content can crash the reader, and sizes stated in a file are not trusted before the bytes are read. Polygons of
+//! more than three corners are split into a fan.
 
 mod obj;
 mod ply;
@@ -16,7 +16,7 @@ use nalgebra::Point3;
 use std::fs;
 use std::path::Path;
 
-/// What is wrong with a file, and where.
+/// Location of an error in a file.
 enum Fault {
     /// In a line, from 1.
     Line(usize, String),
@@ -32,14 +32,14 @@ type Parsed = Result<Mesh, Fault>;
 ///
 /// # Errors
 /// [`IoError::Read`] if the file cannot be read; [`IoError::Text`] with the line, [`IoError::Recording`] with the byte
-/// or [`IoError::Content`] if it is no mesh.
+/// or [`IoError::Content`] if it is not a valid mesh.
 pub fn read_mesh(path: impl AsRef<Path>) -> Result<Mesh, IoError> {
     let path = path.as_ref();
     let bytes = fs::read(path).map_err(|e| IoError::read(path, e))?;
     parse_mesh(&bytes, path)
 }
 
-/// Reads a mesh from the bytes of its file; `path` tells the format and names the file in errors.
+/// Reads a mesh from the bytes of its file; `path` determines the format and names the file in errors.
 ///
 /// ```
 /// use catoptric_files::mesh::parse_mesh;
@@ -105,7 +105,7 @@ fn triple<'a>(
     Ok(Point3::new(number()?, number()?, number()?))
 }
 
-/// Numbered lines of text, from 1; bytes that are no UTF-8 become marks that no number holds.
+/// Numbered lines of text, from 1; invalid UTF-8 becomes replacement characters, which no number contains.
 fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()))
 }
@@ -122,7 +122,7 @@ fn fan(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> {
 mod tests {
     use super::*;
 
-    /// A tetrahedron in every format.
+    /// The same tetrahedron in every format.
     fn files() -> Vec<(&'static str, Vec<u8>)> {
         let corners = [
             [0.0f32, 0.0, 0.0],

@@ -1,4 +1,4 @@
-//! OBJ: the vertices and faces of a text file; the rest of it is passed over.
+//! OBJ: the vertices and faces of a text file; everything else is ignored.
 
 use super::{Fault, Parsed, fan, finish, lines, triple};
 
@@ -22,14 +22,14 @@ pub(super) fn parse(bytes: &[u8]) -> Parsed {
                 }
                 triangles.extend(fan(&corners));
             }
-            // Normals, texture, groups, materials, lines and curves: nothing that light meets.
+            // Normals, textures, groups, materials, lines and curves do not affect the surface.
             _ => {}
         }
     }
     finish(vertices, triangles)
 }
 
-/// A corner such as `7`, `7/1/3` or `-1`, the last vertex so far, as a number from 0.
+/// A corner such as `7`, `7/1/3` or `-1` (the last vertex so far), as an index from 0.
 fn index(word: &str, count: usize) -> Result<u32, String> {
     let number = word.split('/').next().unwrap_or_default();
     let value: i64 = number

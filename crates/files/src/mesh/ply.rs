@@ -1,10 +1,10 @@
-//! PLY: a header of elements and their properties, then numbers as text or in either order of bytes.
+//! PLY: a header of elements and their properties, then numbers as text or in either byte order.
 
 use super::{Fault, Parsed, fan, finish};
 use catoptric_sim::Mesh;
 use nalgebra::Point3;
 
-/// A mesh as a binary PLY file of 64-bit numbers: read back it is the same mesh.
+/// A mesh as a binary PLY file of 64-bit numbers, which reads back as the same mesh.
 pub fn to_ply(mesh: &Mesh) -> Vec<u8> {
     let mut bytes = format!(
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\n\
@@ -36,7 +36,7 @@ enum Number {
     F64,
 }
 
-/// How a PLY file writes its numbers.
+/// Encoding of the numbers in a PLY file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Encoding {
     Text,
@@ -81,7 +81,7 @@ impl Number {
         }
     }
 
-    /// The number in bytes of its size, the least significant first.
+    /// The number from its bytes, least significant first.
     fn decode(self, bytes: [u8; 8]) -> f64 {
         let [a, b, c, d, ..] = bytes;
         match self {
@@ -97,7 +97,7 @@ impl Number {
     }
 }
 
-/// The numbers after a PLY header, one after the other.
+/// Reader of the numbers after a PLY header, in order.
 struct Body<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -151,11 +151,11 @@ impl Body<'_> {
         Ok(value)
     }
 
-    /// A whole number that is not negative.
+    /// A non-negative integer.
     fn next_index(&mut self, number: Number) -> Result<u32, Fault> {
         let value = self.next(number)?;
         if value.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&value) {
-            // In range and whole.
+            // In range and an integer.
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             return Ok(value as u32);
         }
@@ -175,7 +175,7 @@ pub(super) fn parse(bytes: &[u8]) -> Parsed {
     let mut vertices = Vec::new();
     let mut triangles = Vec::new();
     for element in &elements {
-        // An element that takes no bytes would let its count run on for ever.
+        // Elements of zero size would let a corrupt count loop forever.
         if element.properties.is_empty() && element.count > 0 {
             return Err(Fault::Whole(format!(
                 "element {} has no properties",
@@ -225,7 +225,7 @@ pub(super) fn parse(bytes: &[u8]) -> Parsed {
     finish(vertices, triangles)
 }
 
-/// Encoding, elements, where the numbers begin, and in which line.
+/// Encoding, elements, offset of the numbers, and their line.
 fn header(bytes: &[u8]) -> Result<(Encoding, Vec<Element>, usize, usize), Fault> {
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();

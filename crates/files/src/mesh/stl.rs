@@ -4,7 +4,7 @@ use super::{Fault, Parsed, finish, lines, triple};
 use nalgebra::Point3;
 use std::collections::HashMap;
 
-/// Vertices by their exact coordinates, so that triangles of a format without shared vertices share them again.
+/// Merges vertices with exactly equal coordinates, since the format does not share vertices between triangles.
 #[derive(Default)]
 struct Welder {
     vertices: Vec<Point3<f64>>,
@@ -13,7 +13,7 @@ struct Welder {
 
 impl Welder {
     fn index(&mut self, point: Point3<f64>) -> Option<u32> {
-        // Adding zero makes −0 and 0 one.
+        // Adding zero makes −0 and 0 equal.
         let key = [point.x, point.y, point.z].map(|c| (c + 0.0).to_bits());
         let next = u32::try_from(self.vertices.len()).ok()?;
         let vertices = &mut self.vertices;
@@ -33,14 +33,14 @@ impl Welder {
 const STL_HEADER: usize = 84;
 const STL_TRIANGLE: usize = 50;
 
-/// Reads either kind.
+/// Reads a text or binary file.
 pub(super) fn parse(bytes: &[u8]) -> Parsed {
     let count = bytes
         .get(80..STL_HEADER)
         .and_then(|b| b.try_into().ok())
         .map(|b| u32::from_le_bytes(b) as usize);
     let fits = |n: usize| n.checked_mul(STL_TRIANGLE).map(|size| size + STL_HEADER) == Some(bytes.len());
-    // A binary header may begin with "solid" as text does; its size is what tells.
+    // A binary header may begin with "solid" as text does; its size decides.
     let is_text = bytes.trim_ascii_start().starts_with(b"solid") && !count.is_some_and(fits);
     if is_text {
         return text(&String::from_utf8_lossy(bytes));

@@ -1,4 +1,4 @@
-//! Dataset folders: what is in them, when they may be replaced, and that none is left half written.
+//! Dataset folders: their contents, when they may be replaced, and that none is left half written.
 
 use super::*;
 use crate::dataset::{MANIFEST, OBSERVATIONS, RETURNS, SESSION, read_stretches};
@@ -101,11 +101,7 @@ fn a_changed_file_is_named() {
     let session = session(3);
     write_dataset(&out, false, &session, &[stretch(&session, 0, 2, 3, 5)]).expect("written");
     let text = fs::read_to_string(out.join(SESSION)).expect("session");
-    fs::write(
-        out.join(SESSION),
-        text.replace("there and back", "there, and back"),
-    )
-    .expect("edited");
+    fs::write(out.join(SESSION), text.replace("round trip", "round, trip")).expect("edited");
     let error = read_dataset(&out).expect_err("changed");
     assert!(
         error.to_string().contains("session.toml: changed since"),
@@ -113,7 +109,7 @@ fn a_changed_file_is_named() {
     );
     assert_eq!(error.exit_code(), 2);
 
-    // Somebody else's dataset, with a slip in it.
+    // A third-party dataset with a typo in it.
     fs::remove_file(out.join(MANIFEST)).expect("foreign");
     fs::write(
         out.join(SESSION),
@@ -144,7 +140,7 @@ fn an_interrupted_writer_leaves_nothing() {
     drop(writer);
     assert_eq!(tree(place.path()), Vec::<PathBuf>::new());
 
-    // One that is refused in the middle leaves the dataset that was there.
+    // A stretch that is rejected in the middle leaves the existing dataset untouched.
     let old = [stretch(&session, 0, 2, 3, 5)];
     write_dataset(&out, false, &session, &old).expect("written");
     let before = tree(place.path());
@@ -189,8 +185,8 @@ fn only_datasets_are_replaced_and_only_on_request() {
     assert!(matches!(error, IoError::Foreign { .. }), "{error}");
 }
 
-/// Writes the dataset that `tests/mcap_peers.py` reads: to the folder that `CATOPTRIC_PEER_DATASET` names, or for
-/// a moment.
+/// Writes the dataset that `tests/mcap_peers.py` reads: to the folder named by `CATOPTRIC_PEER_DATASET`, or
+/// temporarily.
 #[test]
 fn a_dataset_for_other_readers() {
     let place = tempfile::tempdir().expect("folder");

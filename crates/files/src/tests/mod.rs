@@ -1,4 +1,4 @@
-//! Recordings and datasets there and back. These tests do not prove that others can read what we write:
+//! Round trips of recordings and datasets. These tests do not show that third parties can read what we write:
 //! `tests/mcap_peers.py` does, on the dataset of the last test of `datasets`.
 
 mod datasets;
@@ -20,13 +20,13 @@ use std::path::Path;
 
 const NAME: &str = "x.mcap";
 
-/// A scan of so many beams, 40 times a second.
+/// A scan with a given number of beams, 40 times a second.
 fn scan(step_deg: f64, beams: usize) -> ScanGeometry {
     let angles = ScanAngles::centered(step_deg, beams);
-    ScanGeometry::new(angles, 40.0, None).expect("a scanner can have it")
+    ScanGeometry::new(angles, 40.0, None).expect("a valid scan")
 }
 
-/// A session with a rig, two boards and a scanner of so many beams.
+/// A session with a rig, two boards and a scanner with a given number of beams.
 fn session(beams: usize) -> Session {
     let marker = |name: &str, position_mm| Marker {
         name: name.to_owned(),
@@ -44,7 +44,7 @@ fn session(beams: usize) -> Session {
     };
     Session {
         schema_version: SCHEMA_VERSION,
-        name: "there and back".to_owned(),
+        name: "round trip".to_owned(),
         scanner: ScannerSheet {
             preset: "test".to_owned(),
             scan: scan(0.25, beams),
@@ -93,7 +93,7 @@ fn session(beams: usize) -> Session {
     }
 }
 
-/// A stream of numbers in 0…1 (Lehmer's generator with Park and Miller's multiplier).
+/// A sequence of numbers in 0…1 (Lehmer's generator with Park and Miller's multiplier).
 struct Numbers(u64);
 
 impl Numbers {
@@ -103,7 +103,7 @@ impl Numbers {
     }
 }
 
-/// Readings in whole millimetres as 32-bit numbers, with every code in between.
+/// Readings in whole millimeters as 32-bit numbers, with every code among them.
 fn ranges(numbers: &mut Numbers, count: usize) -> Vec<f64> {
     let code = |r: f64| match r {
         r if r < 0.02 => f64::NEG_INFINITY,
@@ -114,7 +114,7 @@ fn ranges(numbers: &mut Numbers, count: usize) -> Vec<f64> {
     (0..count).map(|_| code(numbers.next())).collect()
 }
 
-/// What motion capture sees of a body: now and then neither pose nor every marker.
+/// Motion capture of a body: occasionally without a pose or without every marker.
 fn track(numbers: &mut Numbers, subject: &str, template: &[Marker], start_s: f64, frames: usize) -> Track {
     let mut centre = || 2.0 * numbers.next() - 1.0;
     let turn = yaw_pitch_roll(centre(), centre(), centre());
@@ -142,7 +142,7 @@ fn track(numbers: &mut Numbers, subject: &str, template: &[Marker], start_s: f64
 fn stretch(session: &Session, pose: usize, scans: usize, frames: usize, seed: u64) -> Stretch {
     let mut numbers = Numbers(seed + 1);
     let start_s = 10.0 * pose as f64;
-    // A sum of decimals is not always the nearest number to its decimal, which times are read back as.
+    // The sum of two decimals is not always the number nearest to a decimal, as which times are read back.
     let whole = |t: f64| (t * 1e9).round() / 1e9;
     let mut tracks = vec![
         track(&mut numbers, "rig", &session.rig_markers, start_s, frames),
@@ -181,7 +181,7 @@ fn play(session: &Session, bytes: &[u8]) -> Result<Vec<Stretch>, IoError> {
     parse_recording(bytes, Path::new(NAME), session)
 }
 
-/// Equality that takes NaN for equal to NaN.
+/// Equality that treats NaN as equal to NaN.
 fn same(a: &[Stretch], b: &[Stretch]) -> bool {
     format!("{a:?}") == format!("{b:?}")
 }

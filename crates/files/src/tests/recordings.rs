@@ -1,4 +1,4 @@
-//! Recordings there and back, cut, flipped, dropped, and on a full disk.
+//! Recordings: round trips, truncation, flipped bits, dropped writers, and a full disk.
 
 use super::*;
 use proptest::prelude::*;
@@ -18,7 +18,7 @@ proptest! {
 }
 
 #[test]
-fn echoes_come_back_and_other_recordings_know_nothing_of_them() {
+fn echoes_are_read_back_and_other_recordings_have_none() {
     let session = session(5);
     let plain = stretch(&session, 0, 2, 3, 5);
     let mut several = stretch(&session, 1, 3, 3, 6);
@@ -56,7 +56,7 @@ fn a_recording_cut_anywhere_is_an_error() {
     }
 }
 
-/// What a flipped bit may do: be noticed, or stand where nothing of ours is, as in an index or a schema's text.
+/// A flipped bit is either detected, or in a part that we do not read, such as an index or a schema's text.
 #[test]
 fn a_flipped_bit_never_changes_a_reading_and_never_panics() {
     let session = session(3);
@@ -87,7 +87,7 @@ fn a_writer_that_is_dropped_leaves_no_whole_recording() {
 }
 
 #[test]
-fn a_full_disk_is_recognised_wherever_it_fills_up() {
+fn a_full_disk_is_recognized_wherever_it_fills_up() {
     struct Small(usize);
     impl Write for Small {
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
@@ -117,7 +117,7 @@ fn a_full_disk_is_recognised_wherever_it_fills_up() {
 }
 
 #[test]
-fn what_does_not_fit_the_session_is_refused() {
+fn stretches_inconsistent_with_the_session_are_rejected() {
     let session = session(3);
     let good = stretch(&session, 4, 2, 3, 5);
     let refuse = |change: &dyn Fn(&mut Stretch), what: &str| {
@@ -149,7 +149,7 @@ fn what_does_not_fit_the_session_is_refused() {
 }
 
 #[test]
-fn another_sessions_recording_is_refused() {
+fn another_sessions_recording_is_rejected() {
     let ours = session(5);
     let bytes = record(&ours, &[stretch(&ours, 0, 2, 3, 5)]);
     let error = play(&session(7), &bytes).expect_err("other beams").to_string();
@@ -160,7 +160,7 @@ fn another_sessions_recording_is_refused() {
     assert!(error.contains("in steps of"), "{error}");
 }
 
-/// Bodies that are never seen at one time, and no markers: the recording of a laboratory without labelled markers.
+/// Bodies that are never seen at the same time, and no markers: the recording of a laboratory without labeled markers.
 #[test]
 fn frames_without_markers_have_none() {
     let session = session(3);
@@ -185,26 +185,26 @@ fn a_clockwise_scan_has_a_negative_increment() {
         direction: ScanDirection::Cw,
         ..ScanAngles::centered(0.5, 5)
     };
-    session.scanner.scan = ScanGeometry::new(angles, 40.0, Some(12.5)).expect("a scanner can have it");
+    session.scanner.scan = ScanGeometry::new(angles, 40.0, Some(12.5)).expect("a valid scan");
     let stretches = [stretch(&session, 0, 2, 3, 5)];
     let bytes = record(&session, &stretches);
     assert!(same(&play(&session, &bytes).expect("read"), &stretches));
     let scan = messages::encode_scan(0, &session.scanner, 0.025, &[1.0; 5]);
     let number = |place: usize| {
-        // After the encapsulation, the stamp and the name of the frame with its length.
+        // After the encapsulation, the stamp, and the name of the frame with its length.
         let at = 4 + 8 + (4 + messages::LASER_FRAME.len() + 1).next_multiple_of(4) + 4 * place;
         f32::from_le_bytes(scan[at..at + 4].try_into().expect("four bytes"))
     };
     let expected = [60.0_f64, 58.0, -0.5].map(|degrees| messages::single(degrees.to_radians()));
     assert_eq!([0, 1, 2].map(number), expected);
     assert_eq!(number(3), 12.5e-6);
-    // The same azimuths the other way round are another scanner's.
+    // The same azimuths in reverse order belong to another scanner.
     let mut other = session.clone();
     let angles = ScanAngles {
         first_deg: 58.0,
         ..ScanAngles::centered(0.5, 5)
     };
-    other.scanner.scan = ScanGeometry::new(angles, 40.0, None).expect("a scanner can have it");
+    other.scanner.scan = ScanGeometry::new(angles, 40.0, None).expect("a valid scan");
     let error = play(&other, &bytes).expect_err("other angles").to_string();
     assert!(error.contains("in steps of"), "{error}");
 }

@@ -1,5 +1,5 @@
-//! Datasets whose readings stay in their recording: they are what holding everything would give, and what happens to the
-//! recording afterwards is noticed.
+//! Datasets whose readings stay in their recording: they equal datasets held in memory, and later changes to the
+//! recording are detected.
 
 use super::*;
 use crate::dataset::{OBSERVATIONS, parse_dataset};
@@ -7,13 +7,13 @@ use crate::survey::MOST_WAITING;
 use catoptric_model::{Dataset, PoseRecord, Readings};
 use std::fs;
 
-/// What holding everything gives.
+/// The records when everything is held in memory.
 fn held(session: &Session, bytes: &[u8]) -> Vec<PoseRecord> {
     let stretches = play(session, bytes).expect("read").into_iter();
     stretches.map(|s| s.into_record().expect("tracked")).collect()
 }
 
-/// Checks a dataset against records that hold their readings.
+/// Compares a dataset with records that hold their readings.
 fn assert_same(dataset: &Dataset, expected: &[PoseRecord]) {
     assert_eq!(dataset.poses.len(), expected.len());
     for (found, expected) in dataset.poses.iter().zip(expected) {
@@ -27,7 +27,7 @@ fn assert_same(dataset: &Dataset, expected: &[PoseRecord]) {
             readings: Readings::in_memory(found.beams(), scans),
             ..found.clone()
         };
-        // Not-a-number is equal to itself here.
+        // NaN equals itself here.
         assert_eq!(
             format!("{:?}", found.readings.held()),
             format!("{:?}", expected.readings.held())
@@ -45,7 +45,7 @@ fn assert_same(dataset: &Dataset, expected: &[PoseRecord]) {
     }
 }
 
-/// Stretches of all lengths: some share a chunk, one has several.
+/// Stretches of different lengths: some share a chunk, one has several.
 fn stretches(session: &Session) -> Vec<Stretch> {
     let lengths = [(2, 3), (0, 2), (900, 60), (1, 9), (5, 3)];
     (0..)
@@ -55,13 +55,13 @@ fn stretches(session: &Session) -> Vec<Stretch> {
 }
 
 #[test]
-fn a_survey_is_what_holding_everything_gives() {
+fn a_survey_equals_records_held_in_memory() {
     let session = session(400);
     let bytes = record(&session, &stretches(&session));
     let expected = held(&session, &bytes);
     let of_bytes = parse_dataset(session.clone(), bytes.clone()).expect("surveyed");
     assert_same(&of_bytes, &expected);
-    // Again, in another order, and from a file.
+    // Again, in a different order, and from a file.
     for pose in of_bytes.poses.iter().rev() {
         assert_eq!(pose.scans().count(), pose.label.scans);
     }
@@ -75,7 +75,7 @@ fn a_survey_is_what_holding_everything_gives() {
     assert_eq!(of_file.id, Some(file::sha256(&bytes)));
 }
 
-/// More frames than may wait: they are let go in order, counted, and read again for their averages.
+/// More frames than may wait: they are discarded in order, counted, and read again for their averages.
 #[test]
 fn a_long_stretch_of_motion_capture_is_averaged_as_a_short_one() {
     let session = session(3);
@@ -96,7 +96,7 @@ fn a_long_stretch_of_motion_capture_is_averaged_as_a_short_one() {
 }
 
 #[test]
-fn motion_capture_in_any_order_is_put_in_order_unless_it_comes_much_too_late() {
+fn motion_capture_in_any_order_is_sorted_unless_it_is_much_too_late() {
     let session = session(3);
     let bodies = bodies::Bodies::of(&session, Path::new(NAME)).expect("bodies");
     let mut capture = capture::Capture::default();
@@ -113,7 +113,7 @@ fn motion_capture_in_any_order_is_put_in_order_unless_it_comes_much_too_late() {
     assert!(late.contains("late"), "{late}");
 }
 
-/// Somebody else's recording may have no chunks at all.
+/// Third-party recordings may have no chunks at all.
 #[test]
 fn a_recording_without_chunks_is_surveyed_too() {
     let session = session(400);
@@ -132,7 +132,7 @@ fn a_recording_without_chunks_is_surveyed_too() {
 }
 
 #[test]
-fn a_recording_that_changes_or_goes_is_an_error_of_its_own() {
+fn a_recording_that_changes_or_disappears_is_a_separate_error() {
     let folder = tempfile::tempdir().expect("folder");
     let session = session(400);
     let bytes = record(&session, &stretches(&session));

@@ -1,15 +1,15 @@
-//! JSON as a tree: without places, since its reader keeps none.
+//! JSON as a tree: without positions, because its reader keeps none.
 
 use super::super::diagnostic::{Diagnostic, Place};
 use super::{Key, Node, Source, Value};
 use serde::de::{Deserialize, Deserializer, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 
-/// Reads JSON; a key that is given twice is an error, as in TOML.
+/// Reads JSON; a duplicate key is an error, as in TOML.
 pub(crate) fn from_json(text: &str) -> Result<Node, Diagnostic> {
     serde_json::from_str(text).map_err(|e| {
         let message = e.to_string();
-        // The position is told apart from the message.
+        // The position is split from the message.
         let message = message
             .split_once(" at line ")
             .map_or(message.as_str(), |(m, _)| m);

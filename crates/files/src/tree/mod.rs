@@ -1,4 +1,4 @@
-//! A file as a tree of values that know where they were written, before it becomes a typed value.
+//! A file as a tree of values with their positions, before conversion to a typed value.
 
 mod json;
 mod set;
@@ -11,25 +11,25 @@ pub(super) use self::json::from_json;
 pub(super) use self::set::apply_set;
 pub(super) use self::toml::from_toml;
 
-/// Where a value was written.
+/// Position of a value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Source {
-    /// Bytes of the file.
+    /// Byte range in the file.
     File(Range<usize>),
-    /// The `--set` of that number.
+    /// The `--set` with this index.
     Set(usize),
-    /// In a format that keeps no positions.
+    /// In a format without positions.
     Unknown,
 }
 
-/// A value and its place.
+/// A value and its position.
 #[derive(Debug, Clone)]
 pub(crate) struct Node {
     pub(crate) source: Source,
     pub(crate) value: Value,
 }
 
-/// A key of a table and its place.
+/// A key of a table and its position.
 #[derive(Debug, Clone)]
 pub(crate) struct Key {
     pub(crate) source: Source,
@@ -50,7 +50,7 @@ pub(crate) enum Value {
 }
 
 impl Value {
-    /// What it is, for a message.
+    /// A description for messages.
     pub(crate) fn describe(&self) -> String {
         match self {
             Self::Null => "null".to_owned(),
@@ -64,7 +64,7 @@ impl Value {
         }
     }
 
-    /// As a number, whole or not.
+    /// As a number, integer or not.
     pub(crate) fn number(&self) -> Option<f64> {
         match self {
             Self::Integer(i) => Some(*i as f64),
@@ -85,7 +85,7 @@ impl Node {
         }
     }
 
-    /// The value at a path, or the last one on the way to it that was written down.
+    /// The value at a path, or the last value along that path that was written down.
     pub(crate) fn nearest(&self, path: &Path) -> &Node {
         let mut at = self;
         for segment in &path.0 {
@@ -109,7 +109,7 @@ impl Node {
         }
     }
 
-    /// Without places, for serde.
+    /// Without positions, for serde.
     pub(crate) fn to_json(&self) -> serde_json::Value {
         use serde_json::Value as Json;
         match &self.value {

@@ -1,14 +1,14 @@
-//! One value of a tree set from the command line.
+//! Setting one value of a tree from the command line.
 
 use super::toml::node;
 use super::{Key, Node, Source, Value};
 use catoptric_model::place::{Segment, nearest};
 use toml::de::DeValue;
 
-/// The table whose entries are set by name alone.
+/// The table whose entries may be set by name alone.
 const PARAMETERS: &str = "parameters";
 
-/// Applies the `--set` of that number: `superstructure.facet.0.name=left`, `board[1].width_mm=500`.
+/// Applies the `--set` with a given index: `superstructure.facet.0.name=left`, `board[1].width_mm=500`.
 pub(crate) fn apply_set(root: &mut Node, argument: &str, number: usize) -> Result<(), String> {
     let source = Source::Set(number);
     let (path, text) = argument
@@ -39,7 +39,7 @@ pub(crate) fn apply_set(root: &mut Node, argument: &str, number: usize) -> Resul
                     ));
                 }
                 let index = found.unwrap_or_else(|| {
-                    // Tables that the file leaves to their defaults come into being here.
+                    // Tables that the file leaves at their defaults are created here.
                     let key = Key {
                         source: source.clone(),
                         name: step.clone(),
@@ -84,7 +84,7 @@ pub(crate) fn apply_set(root: &mut Node, argument: &str, number: usize) -> Resul
     Ok(())
 }
 
-/// A parameter that comes into being on the command line would change nothing.
+/// Rejects a new parameter on the command line, which would have no effect.
 fn known_parameter(root: &Node, name: &str) -> Result<(), String> {
     let table = root.child(&Segment::Key(PARAMETERS.to_owned())).map(|n| &n.value);
     let names: Vec<&str> = match table {

@@ -1,4 +1,4 @@
-//! TOML as a tree; what can still be read after a syntax error is read.
+//! TOML as a tree, as far as it can be read after a syntax error.
 
 use super::super::diagnostic::{Diagnostic, Place};
 use super::{Key, Node, Source, Value};
@@ -6,7 +6,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Reads TOML; what can still be read after a syntax error is read.
+/// Reads TOML, as far as possible after a syntax error.
 pub(crate) fn from_toml(text: &str) -> (Node, Vec<Diagnostic>) {
     let (root, errors) = DeTable::parse_recoverable(text);
     let diagnostics = errors.iter().map(|e| {
@@ -22,7 +22,7 @@ pub(crate) fn from_toml(text: &str) -> (Node, Vec<Diagnostic>) {
         }
     });
     let at = |span: Range<usize>| Source::File(span);
-    // The outermost table is reported without a span; it begins where the file does.
+    // The outermost table is reported without a span; it begins at the start of the file.
     let value = table(root.get_ref(), &at);
     let source = Source::File(0..0);
     (Node { source, value }, diagnostics.collect())
@@ -33,7 +33,7 @@ pub(super) fn node(spanned: &Spanned<DeValue<'_>>, at: &impl Fn(Range<usize>) ->
         DeValue::String(s) => Value::String(s.to_string()),
         DeValue::Integer(i) => match i128::from_str_radix(i.as_str(), i.radix()) {
             Ok(i) => Value::Integer(i),
-            // Beyond 128 bits it is out of every range anyway.
+            // A number of more than 128 bits is out of range anyway.
             Err(_) => Value::Float(f64::INFINITY),
         },
         DeValue::Float(f) => Value::Float(f.as_str().parse().unwrap_or(f64::NAN)),
