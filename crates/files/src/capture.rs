@@ -1,7 +1,7 @@
 //! Motion capture during a stretch: messages assembled into frames, in order of time.
 
 use super::bodies::Bodies;
-use super::messages::{LabelledMarker, NS_PER_S};
+use super::messages::{LabeledMarker, NS_PER_S};
 use catoptric_model::TrackedFrame;
 use catoptric_model::frame::Pose;
 use nalgebra::Point3;
@@ -29,7 +29,7 @@ impl Capture {
     pub(super) fn markers(
         &mut self,
         time: u64,
-        markers: &[LabelledMarker],
+        markers: &[LabeledMarker],
         bodies: &Bodies,
     ) -> Result<(), String> {
         self.check(time)?;

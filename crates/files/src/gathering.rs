@@ -2,7 +2,7 @@
 
 use super::bodies::Bodies;
 use super::capture::{Capture, seconds_between};
-use super::messages::{LabelledMarker, Scan};
+use super::messages::{LabeledMarker, Scan};
 use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::frame::Pose;
 use catoptric_model::session::ScannerSheet;
@@ -128,7 +128,7 @@ impl<R: Keep> Gathering<R> {
     pub(super) fn markers(
         &mut self,
         time: u64,
-        markers: &[LabelledMarker],
+        markers: &[LabeledMarker],
         known: Known<'_>,
     ) -> Result<(), String> {
         self.capture.markers(time, markers, known.bodies)?;

@@ -63,7 +63,7 @@ pub struct Scan {
 
 /// A marker with its label "subject/marker".
 #[derive(Debug, Clone, PartialEq)]
-pub struct LabelledMarker {
+pub struct LabeledMarker {
     /// Label.
     pub name: String,
     /// Index in the template of its body.
@@ -195,7 +195,7 @@ pub fn encode_pose(stamp: u64, room_from_body: &Pose) -> Vec<u8> {
 }
 
 /// A `mocap4r2_msgs/msg/Markers` in the room frame.
-pub fn encode_markers(stamp: u64, frame_number: u32, markers: &[LabelledMarker]) -> Vec<u8> {
+pub fn encode_markers(stamp: u64, frame_number: u32, markers: &[LabeledMarker]) -> Vec<u8> {
     let mut cdr = CdrWriter::new();
     write_header(&mut cdr, stamp, ROOM_FRAME);
     cdr.u32(frame_number);
@@ -315,7 +315,7 @@ pub fn decode_pose(message: &[u8]) -> Result<(u64, Pose), MessageError> {
 ///
 /// # Errors
 /// [`MessageError`] if the bytes are not one.
-pub fn decode_markers(message: &[u8]) -> Result<(u64, Vec<LabelledMarker>), MessageError> {
+pub fn decode_markers(message: &[u8]) -> Result<(u64, Vec<LabeledMarker>), MessageError> {
     /// Kind, index, length of the label and three coordinates, without padding.
     const SMALLEST: usize = 1 + 4 + 4 + 24;
     let (stamp, mut cdr) = open(message)?;
@@ -327,7 +327,7 @@ pub fn decode_markers(message: &[u8]) -> Result<(u64, Vec<LabelledMarker>), Mess
             let index = usize::try_from(cdr.i32()?).unwrap_or(0);
             let name = cdr.string()?.to_owned();
             let point = read_point(&mut cdr)?;
-            Ok(LabelledMarker { name, index, point })
+            Ok(LabeledMarker { name, index, point })
         })
         .collect::<Result<_, MessageError>>()?;
     Ok((stamp, markers))

@@ -20,7 +20,7 @@ use super::bodies::{Bodies, MARKERS_TOPIC};
 use super::container::Container;
 use super::definitions::{self, Definition};
 use super::error::IoError;
-use super::messages::{self, FrameTransform, LASER_FRAME, LabelledMarker, ROOM_FRAME};
+use super::messages::{self, FrameTransform, LASER_FRAME, LabeledMarker, ROOM_FRAME};
 pub use super::schedule::EPOCH_NS;
 use super::schedule::{Event, Simultaneous, schedule, simultaneous_frames};
 use catoptric_model::dataset::{RIG_SUBJECT, nanoseconds};
@@ -360,7 +360,7 @@ impl RecordingEncoder {
     }
 
     /// The markers seen at one time.
-    fn seen_markers(&self, stretch: &Stretch, frames: &Simultaneous) -> Vec<LabelledMarker> {
+    fn seen_markers(&self, stretch: &Stretch, frames: &Simultaneous) -> Vec<LabeledMarker> {
         let mut seen = Vec::new();
         for &(track, frame) in frames {
             let track = &stretch.tracks[track];
@@ -370,7 +370,7 @@ impl RecordingEncoder {
             let labels = &self.bodies.all[body].labels;
             for (index, (name, marker)) in labels.iter().zip(&track.frames[frame].markers).enumerate() {
                 let name = name.clone();
-                seen.extend(marker.map(|point| LabelledMarker { name, index, point }));
+                seen.extend(marker.map(|point| LabeledMarker { name, index, point }));
             }
         }
         seen

@@ -289,9 +289,9 @@ impl NominalFacet {
         for (a, b) in corners.iter().zip(corners.iter().cycle().skip(1)) {
             normal += a.coords.cross(&b.coords);
         }
-        let centre = corners.iter().map(|c| c.coords).sum::<Vector3<f64>>() / corners.len() as f64;
+        let center = corners.iter().map(|c| c.coords).sum::<Vector3<f64>>() / corners.len() as f64;
         Some(BoardPlane::new(
-            Point3::from(centre),
+            Point3::from(center),
             Unit::try_new(normal, f64::MIN_POSITIVE)?,
         ))
     }

@@ -69,9 +69,9 @@ pub(crate) fn finish<S: Simd, const R: usize, const CLOSING: bool>(
         pending: Pending::default(),
         kept: [none; R],
     };
-    let mut somes = [0; R];
+    let mut parts = [0; R];
     let rows = rays.count.div_ceil(LANES);
-    for (row, (numbers, some)) in found.iter().zip(&mut somes).enumerate().take(rows) {
+    for (row, (numbers, some)) in found.iter().zip(&mut parts).enumerate().take(rows) {
         let triangles = u32x16::simd_from(simd, *numbers);
         *some = !triangles.simd_eq(u32x16::splat(simd, NONE)).to_bitmask();
         *some &= (1 << LANES.min(rays.count - row * LANES)) - 1;
@@ -95,7 +95,7 @@ pub(crate) fn finish<S: Simd, const R: usize, const CLOSING: bool>(
     for (row, triangle) in found.iter().enumerate().take(rows) {
         emit(&MetInRow {
             row,
-            some: somes[row],
+            some: parts[row],
             triangle,
             distance: &state.distance.0[row],
             closing: &state.closing.0[row],

@@ -116,9 +116,9 @@ fn ranges(numbers: &mut Numbers, count: usize) -> Vec<f64> {
 
 /// Motion capture of a body: occasionally without a pose or without every marker.
 fn track(numbers: &mut Numbers, subject: &str, template: &[Marker], start_s: f64, frames: usize) -> Track {
-    let mut centre = || 2.0 * numbers.next() - 1.0;
-    let turn = yaw_pitch_roll(centre(), centre(), centre());
-    let place = Translation3::new(centre(), centre(), 1.0 + centre());
+    let mut center = || 2.0 * numbers.next() - 1.0;
+    let turn = yaw_pitch_roll(center(), center(), center());
+    let place = Translation3::new(center(), center(), 1.0 + center());
     let frames = (0..frames).map(|k| {
         let pose = Pose::from_parts(place, turn);
         let mut see = |m: &Marker| {
