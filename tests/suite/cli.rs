@@ -44,7 +44,7 @@ fn new_reports_where_it_cannot_write() {
     let output = run(folder.path(), &["new", "no/such/folder/scene.toml"]);
     assert_eq!(output.status.code(), Some(3));
     assert!(
-        stderr(&output).contains("cannot write no/such/folder/scene.toml"),
+        stderr(&output).contains("no/such/folder/scene.toml: cannot be written"),
         "{}",
         stderr(&output)
     );

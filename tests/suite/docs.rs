@@ -321,7 +321,9 @@ fn commands_of_the_program() -> Vec<(String, Vec<String>)> {
         let lines = shown.lines().map(str::to_owned).chain(code_words(&text));
         for line in lines.flat_map(|l| l.split("&&").map(|c| c.trim().to_owned()).collect::<Vec<_>>()) {
             if let Some(rest) = line.strip_prefix("catoptric ") {
-                commands.push((path.clone(), rest.split_whitespace().map(str::to_owned).collect()));
+                // What follows a pipe is somebody else's program.
+                let words = rest.split_whitespace().take_while(|word| *word != "|");
+                commands.push((path.clone(), words.map(str::to_owned).collect()));
             }
         }
     }

@@ -223,7 +223,7 @@ fn a_walk_error_that_is_not_believed_triggers_the_residual_test() {
     let wrong = assessed(ErrorModel::Both, 8.0);
     assert!(wrong.global_test.p_value < 1e-6, "{:?}", wrong.global_test);
     assert!(
-        wrong.verdict.contains("something acts that nobody believes in"),
+        wrong.verdict.contains("there is an error that the beliefs omit"),
         "{}",
         wrong.verdict
     );

@@ -5,7 +5,7 @@ use crate::beam::Deflection;
 use crate::bias::RangeBias;
 use crate::dataset::Dataset;
 use crate::error::ModelError;
-use crate::frame::PoseData;
+pub use crate::mount::MountEstimate;
 use crate::scan::ScanAngles;
 use crate::session::Session;
 use serde::{Deserialize, Serialize};
@@ -115,20 +115,6 @@ pub struct FacetEstimate {
     pub covariance: [[f64; 3]; 3],
 }
 
-/// Pose of the sensor in the rig.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MountEstimate {
-    /// Origin of the sensor in the rig frame, in meters.
-    pub translation_m: [f64; 3],
-    /// Rotation from sensor to rig (x, y, z, w).
-    pub rotation_xyzw: [f64; 4],
-    /// Covariance of a small motion of the sensor frame: three shifts in meters and three rotations in radians, about
-    /// the sensor's own axes.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub covariance: Option<[[f64; 6]; 6]>,
-}
-
 /// A calibration: one entry for each element that was analyzed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -193,17 +179,6 @@ impl BeamEstimate {
             elevation: self.elevation_rad?,
             distance: self.distance_m.unwrap_or(0.0),
         })
-    }
-}
-
-impl MountEstimate {
-    /// The pose `rig_from_sensor`.
-    pub fn pose(&self) -> crate::frame::Pose {
-        (&PoseData {
-            translation_m: self.translation_m,
-            rotation_xyzw: self.rotation_xyzw,
-        })
-            .into()
     }
 }
 

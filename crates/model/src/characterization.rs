@@ -3,8 +3,8 @@
 //! Tables 1 to 4 of the paper as measured, and the fitted parameters of Eqs. (3)–(5). Errors are *measured − true*.
 
 use crate::bias::RangeBias;
-use crate::calibration::MountEstimate;
 use crate::label::{SpotNote, TestKind};
+use crate::mount::MountEstimate;
 use serde::{Deserialize, Serialize};
 
 /// Version of `characterization.json`.

@@ -40,6 +40,7 @@ pub mod frame;
 pub mod label;
 pub mod mirror;
 pub mod motion;
+pub mod mount;
 pub mod paper;
 pub mod place;
 pub mod range;
