@@ -89,6 +89,9 @@ pub fn score<'t>(
 }
 
 /// Scores a calibration against the truth and its [`Knowable`], which several calibrations of a dataset can share.
+///
+/// # Errors
+/// [`Unreadable`] if the recording of the dataset can no longer be read.
 pub fn score_by(
     dataset: &Dataset,
     calibration: &Calibration,

@@ -61,6 +61,9 @@ impl Found {
     }
 
     /// Sorts the results of shards into the order of the study.
+    ///
+    /// # Errors
+    /// [`StudyError::Invalid`] if a run is missing or present twice.
     pub fn sort(&mut self, study: &Study) -> Result<(), StudyError> {
         // Each shard was complete and given once.
         self.runs = merge(study, std::mem::take(&mut self.runs))
@@ -95,6 +98,9 @@ impl Tables {
     }
 
     /// Writes the tables, the runs last.
+    ///
+    /// # Errors
+    /// [`StudyError::File`] if writing fails.
     pub fn write(&self, found: &Found) -> Result<(), StudyError> {
         write_file(&self.times, times_to_csv(&found.times)?.as_bytes())?;
         if let Some(elements) = &found.elements {
@@ -104,6 +110,9 @@ impl Tables {
     }
 
     /// Reads the tables and checks that the runs are exactly those of the given experiments.
+    ///
+    /// # Errors
+    /// [`StudyError`] if a table is missing, damaged or of other experiments.
     pub fn read(&self, study: &Study, jobs: &[Job]) -> Result<Found, StudyError> {
         let runs = parsed(&self.runs, |text| in_order(study, jobs, from_csv(text)?))?;
         let elements = if self.elements.exists() {
@@ -124,6 +133,9 @@ impl Tables {
     }
 
     /// Removes those that exist.
+    ///
+    /// # Errors
+    /// [`StudyError::File`] if a file cannot be removed.
     pub fn remove(&self) -> Result<(), StudyError> {
         for path in [&self.runs, &self.elements, &self.times] {
             match std::fs::remove_file(path) {

@@ -37,6 +37,9 @@ struct PlannedCell {
 
 impl Plan {
     /// Creates the plan of a part of a study.
+    ///
+    /// # Errors
+    /// [`StudyError::Invalid`] if a scene has no TOML form.
     pub fn of(study: &Study, shard: Part) -> Result<Self, StudyError> {
         let cells = study.cells.iter().map(|cell| {
             let text = scene::to_toml(&cell.scene).map_err(|e| {
@@ -67,11 +70,17 @@ impl Plan {
     }
 
     /// Reads the plan of a folder.
+    ///
+    /// # Errors
+    /// [`StudyError::File`] if it is missing or not a plan.
     pub fn read(folder: &Path) -> Result<Self, StudyError> {
         Ok(read_json(folder.join(FILE))?)
     }
 
     /// Claims a folder that is new, or belongs to the same part of the same study.
+    ///
+    /// # Errors
+    /// [`StudyError::Invalid`] if the folder contains something else, [`StudyError::File`] if writing fails.
     pub fn claim(&self, out: &Path) -> Result<(), StudyError> {
         if out.join(FILE).exists() {
             let there = Self::read(out)?;
@@ -124,6 +133,9 @@ impl Plan {
     }
 
     /// Reconstructs the study with its names and values, but not its scenes, which merging does not need.
+    ///
+    /// # Errors
+    /// [`StudyError::Invalid`] if a contestant is unknown.
     pub fn study(&self) -> Result<Study, StudyError> {
         let scene = scene::parse(Template::Prototype.text(), "prototype.toml", &[])?;
         let contestant = |name: &String| {
