@@ -282,7 +282,9 @@ fn commands_of_the_program() -> Vec<(String, Vec<String>)> {
         let shown = code_blocks(&text, "sh").concat();
         let lines = shown.lines().map(str::to_owned).chain(code_words(&text));
         for line in lines.flat_map(|l| l.split("&&").map(|c| c.trim().to_owned()).collect::<Vec<_>>()) {
-            if let Some(rest) = line.strip_prefix("catoptric ") {
+            // What the output is piped into has options of its own.
+            let own = line.split(" | ").next().unwrap();
+            if let Some(rest) = own.strip_prefix("catoptric ") {
                 commands.push((path.clone(), rest.split_whitespace().map(str::to_owned).collect()));
             }
         }
