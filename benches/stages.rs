@@ -1,4 +1,4 @@
-//! How long each stage of the main job takes: compiling a rig, looking at a layout, tracing, detecting, drawing, writing, fitting
+//! Duration of each stage of a run: compiling a rig, analyzing a layout, tracing, detecting, drawing noise, writing, fitting
 //! an element, calibrating.
 //!
 //! Compare two versions with criterion's `--save-baseline` and `--baseline`; absolute times depend on the machine.
@@ -7,16 +7,17 @@
 use catoptric::calib::observations::{BoardView, Observation};
 use catoptric::calib::solve::{self, BareDistance, Element};
 use catoptric::calib::{self, Method, Options};
-use catoptric::io::RecordingWriter;
+use catoptric::files::RecordingWriter;
 use catoptric::layout::{Detail, Layout, analyze};
-use catoptric::model::{BoardPlane, Deflection, RawRange, beam, range};
-use catoptric::sim::detect::{self, Pulse};
+use catoptric::model::{BoardPlane, Deflection, RawRange, range};
+use catoptric::sim::build::Structure;
+use catoptric::sim::light::{Mirrors, Setting};
 use catoptric::sim::noise::{Columns, Purpose};
-use catoptric::sim::optics::{Mirrors, Setting};
-use catoptric::sim::reading::Sensor;
+use catoptric::sim::receive::Sensor;
+use catoptric::sim::receive::detect::{self, Pulse};
 use catoptric::sim::scene::{FacetShape, PolygonShape};
-use catoptric::sim::structure::Structure;
 use catoptric::sim::{Laboratory, Scene};
+use catoptric_fixtures::ust20lx;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::{Unit, Vector3};
 use std::hint::black_box;
@@ -26,13 +27,13 @@ fn prototype() -> Scene {
     toml::from_str(include_str!("../scenes/prototype.toml")).unwrap()
 }
 
-/// Number of the first stretch with a board before a facet.
+/// Number of the first stretch with a board in front of a facet.
 const FACET_STRETCH: usize = 11;
 
 fn simulate(c: &mut Criterion) {
     let laboratory = Laboratory::new(&prototype(), 1).unwrap();
     let mut group = c.benchmark_group("simulate");
-    let sub_rays = (beam::COUNT * laboratory.sub_rays()) as u64;
+    let sub_rays = (ust20lx::COUNT * laboratory.sub_rays()) as u64;
     group.throughput(Throughput::Elements(sub_rays));
     group.bench_function("trace one pose, sub-rays", |b| {
         b.iter(|| laboratory.returns(FACET_STRETCH).unwrap())
@@ -45,26 +46,26 @@ fn simulate(c: &mut Criterion) {
     group.finish();
 }
 
-/// The structure's part in all ways, once for a laboratory.
+/// The part of all paths that is on the structure, computed once per laboratory.
 fn compile(c: &mut Criterion) {
     let scene = prototype();
     let sensor = Sensor::new(&scene).unwrap();
     let structure = Structure::as_built(&scene, 1).unwrap();
     let bare = Setting::new(&scene, &structure, Mirrors::Attached, Vec::new()).unwrap();
     let mut group = c.benchmark_group("compile");
-    group.throughput(Throughput::Elements((beam::COUNT * sensor.sub_rays()) as u64));
+    group.throughput(Throughput::Elements((ust20lx::COUNT * sensor.sub_rays()) as u64));
     group.bench_function("rig of the prototype, sub-rays", |b| {
         b.iter(|| sensor.compile(&bare))
     });
     group.finish();
 }
 
-/// A layout as a whole, and after one facet was moved a little.
+/// A layout as a whole, and after one facet was moved slightly.
 fn layout(c: &mut Criterion) {
     let scene = prototype();
     let mut moved = scene.clone();
     let facet = &mut moved.superstructure.facet[3];
-    let corners = catoptric::sim::layout::corners(&facet.shape).unwrap();
+    let corners = catoptric::sim::build::layout::corners(&facet.shape, &Default::default()).unwrap();
     let corners_mm = corners
         .iter()
         .map(|c| [c.x * 1e3 + 0.3, c.y * 1e3 - 0.2, c.z * 1e3]);
@@ -80,24 +81,23 @@ fn layout(c: &mut Criterion) {
         group.bench_function(format!("{name}, one facet edited"), |b| {
             b.iter(|| known.edited(&moved).unwrap().analysis().unwrap());
         });
-        group.bench_function(
-            format!("{name}, one facet edited, without what is said of it"),
-            |b| {
-                b.iter(|| known.edited(&moved).unwrap());
-            },
-        );
+        group.bench_function(format!("{name}, one facet edited, without its results"), |b| {
+            b.iter(|| known.edited(&moved).unwrap());
+        });
     }
     group.finish();
 }
 
-/// A scan in flight: every beam from another place, nothing kept but the rig.
+/// A scan in flight: every beam from a different pose, with nothing reused but the rig.
 fn fly(c: &mut Criterion) {
     let mut scene = prototype();
     scene.flight.push(toml::from_str(FLIGHT).unwrap());
     let laboratory = Laboratory::new(&scene, 1).unwrap();
     let sight = laboratory.sight(laboratory.stretches() - 1).unwrap();
     let mut group = c.benchmark_group("fly");
-    group.throughput(Throughput::Elements((beam::COUNT * laboratory.sub_rays()) as u64));
+    group.throughput(Throughput::Elements(
+        (ust20lx::COUNT * laboratory.sub_rays()) as u64,
+    ));
     group.bench_function("trace and detect a scan, sub-rays", |b| {
         b.iter(|| sight.returns(20))
     });
@@ -112,7 +112,7 @@ waypoint = [
 ]
 "#;
 
-/// A beam on one slanted plane, and one that an edge cuts.
+/// A beam on one slanted plane, and beams cut by an edge.
 fn detection(c: &mut Criterion) {
     let beam = |apart: f64| -> Vec<Pulse> {
         let range = |i: u32| 2.0 + 0.001 * f64::from(i) + if i > 9 { apart } else { 0.0 };
@@ -142,10 +142,10 @@ fn noise(c: &mut Criterion) {
     let mut columns = Columns::default();
     let mut normals = Vec::new();
     let mut group = c.benchmark_group("noise");
-    group.throughput(Throughput::Elements(beam::COUNT as u64));
+    group.throughput(Throughput::Elements(ust20lx::COUNT as u64));
     group.bench_function("normal deviates of a scan", |b| {
         b.iter(|| {
-            columns.draw(beam::COUNT, 1, Purpose::Reading, black_box(7));
+            columns.draw(ust20lx::COUNT, 1, Purpose::Reading, black_box(7));
             columns.normals(0, &mut normals);
         });
     });
@@ -153,7 +153,7 @@ fn noise(c: &mut Criterion) {
     let returns = laboratory.returns(FACET_STRETCH).unwrap();
     let first_seen = laboratory.first_seen(FACET_STRETCH);
     let drawn = laboratory.draw(FACET_STRETCH, 0..64);
-    group.throughput(Throughput::Elements(64 * beam::COUNT as u64));
+    group.throughput(Throughput::Elements(64 * ust20lx::COUNT as u64));
     group.bench_function("readings of 64 scans", |b| {
         b.iter(|| {
             let mut recorder = laboratory.excerpt_recorder(&drawn);
@@ -166,7 +166,7 @@ fn noise(c: &mut Criterion) {
     group.finish();
 }
 
-/// Into memory: encoding on one thread, chunks compressed on all.
+/// To memory: encoding on one thread, compression of chunks on all.
 fn write(c: &mut Criterion) {
     let laboratory = Laboratory::new(&prototype(), 1).unwrap();
     let session = laboratory.session().unwrap();
@@ -188,7 +188,7 @@ fn calibrate(c: &mut Criterion) {
     let mut group = c.benchmark_group("calibrate");
     group
         .sample_size(10)
-        .throughput(Throughput::Elements(beam::COUNT as u64));
+        .throughput(Throughput::Elements(ust20lx::COUNT as u64));
     for method in Method::ALL {
         group.bench_function(method.name(), |b| {
             b.iter(|| calib::calibrate(&dataset, method, &Options::default()).unwrap());
@@ -197,7 +197,7 @@ fn calibrate(c: &mut Criterion) {
     group.finish();
 }
 
-/// Two angles by the paper's method, from a start 0.05 rad away, with the believed biases.
+/// Both angles by the paper's method, from a start 0.05 rad away, with the believed biases.
 fn fit(c: &mut Criterion) {
     let bias = Laboratory::new(&prototype(), 1)
         .unwrap()
@@ -238,7 +238,7 @@ fn fit(c: &mut Criterion) {
     group.finish();
 }
 
-/// The i-th of ten boards around a ray, 0.5 m to 4 m away and tilted by up to 30°, read some millimetres too near or far.
+/// The i-th of ten boards around a ray, 0.5 m to 4 m away and tilted by up to 30°, with a range error of a few millimeters.
 fn board(truth: &Deflection, v: &Vector3<f64>, i: u8) -> Observation<'static> {
     let turn = f64::from(i) * 2.4;
     let tilt = Vector3::new(turn.cos(), turn.sin(), (0.7 * turn).cos()) * 0.35;

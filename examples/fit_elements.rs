@@ -1,11 +1,11 @@
-//! Fits the two angles of many elements from ranges to planes, read from a table, and says how long that takes.
+//! Fits the two angles of many elements to ranges of planes, read from a table, and reports how long that takes.
 //!
 //! ```text
 //! fit_elements ROWS.csv ANSWERS.csv       rows: element, base_azimuth, distance, start_azimuth, start_elevation,
 //!                                               nx, ny, nz, px, py, pz, range
 //! ```
-//! Angles in radians, metres; a plane by its normal and a point, in the sensor frame. The rows of an element follow each
-//! other. One line of JSON on standard output; `benches/peers/elements.py` compares it with other solvers.
+//! Angles are in radians, lengths in meters; a plane has a normal and a point, in the sensor frame. The rows of an element
+//! are consecutive. Prints one line of JSON; `benches/peers/elements.py` compares it with other solvers.
 
 use catoptric::calib::Options;
 use catoptric::calib::observations::{BoardView, Observation};
@@ -16,10 +16,10 @@ use std::error::Error;
 use std::io::Write;
 use std::time::Instant;
 
-/// Times that all elements are solved; the median counts.
+/// Number of times that all elements are solved; the median counts.
 const ROUNDS: usize = 7;
 
-/// An element as read.
+/// An element as read from the table.
 struct Given<'a> {
     azimuth: f64,
     distance: f64,

@@ -1,7 +1,7 @@
 //! The program `catoptric`: see `catoptric --help`.
 
-mod cli;
+use std::process::ExitCode;
 
-fn main() -> std::process::ExitCode {
-    cli::main()
+fn main() -> ExitCode {
+    ExitCode::from(catoptric_cli::run(std::env::args_os()))
 }

@@ -4,7 +4,7 @@
     python tests/export_peers.py STEM
 
 STEM.stl, STEM.glb, STEM.csv and STEM.urdf are one scene, exported with the defaults. `trimesh` must find every body of the
-STL closed and outward, in millimetres, and the GLB of the same size in metres; the table and the frames must agree with
+STL closed and outward, in millimeters, and the GLB of the same size in meters; the table and the frames must agree with
 them. Ends with exit code 1 at the first thing that is wrong.
 """
 
@@ -42,7 +42,7 @@ def main():
             rows[row["facet"]] = row
     check(corners, "the table is empty")
 
-    # Every corner of the drawing is a vertex of the STL, to a micrometre.
+    # Every corner of the drawing is a vertex of the STL, to a micrometer.
     for facet, points in corners.items():
         for point in points:
             nearest = np.linalg.norm(solid.vertices - np.array(point), axis=1).min()

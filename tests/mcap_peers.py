@@ -168,9 +168,9 @@ def check_scan(scan, scanner, where):
     finite = ranges[np.isfinite(ranges)]
     inside = (finite >= np.float32(scanner["range_min_m"])) & (finite <= np.float32(scanner["range_max_m"]))
     check(inside.all(), f"{where}: a finite range outside [range_min, range_max]: {finite[~inside][:3]}")
-    millimetres = np.round(finite * 1e3)
-    whole = finite == (millimetres / 1e3).astype(np.float32)
-    check(whole.all(), f"{where}: a range that is not whole millimetres: {finite[~whole][:3]}")
+    millimeters = np.round(finite * 1e3)
+    whole = finite == (millimeters / 1e3).astype(np.float32)
+    check(whole.all(), f"{where}: a range that is not whole millimeters: {finite[~whole][:3]}")
     return ranges
 
 

@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Casts the same rays into the same meshes with this project and with what others offer, and prints the ratios.
+"""Casts the same rays into the same meshes with this project and with other engines, and prints the ratios.
 
-    benches/peers/compare.py                              # all sizes and engines, some minutes
-    benches/peers/compare.py --meshes lab,10k --rounds 1  # a short look
+    benches/peers/compare.py                              # all sizes and engines, several minutes
+    benches/peers/compare.py --meshes lab,10k --rounds 1  # a quick comparison
     benches/peers/compare.py --simulate --meshes 10k,1m   # the whole simulator in those rooms, files included
 
-Needs cargo and NumPy. Embree is measured where g++ and Debian's `libembree-dev` are there, Open3D and Mitsuba where
-the PyPI packages `open3d` and `mitsuba` are; what is missing is named and left out. Engines take turns round by round,
-so that a machine that is slow for a while is slow for all of them; compare ratios, not rates of different days. Before
-a rate counts, its distances are compared with those of parry in f64.
+Needs cargo and NumPy. Embree is measured if g++ and Debian's `libembree-dev` are installed, Open3D and Mitsuba if the
+PyPI packages `open3d` and `mitsuba` are; missing engines are named and skipped. Engines alternate round by round, so a
+temporary slowdown of the machine affects all of them; compare ratios, not rates from different days. The distances of
+every engine are compared with those of parry in f64.
 """
 
 import argparse
@@ -30,11 +30,11 @@ OURS = ["beam128", "beam16", "single", "polygons128", "polygons16"]
 PEERS = ["embree16", "embree1", "open3d", "mitsuba", "parry"]
 
 
-# ---- inputs: a cluttered room, the same things in it at every size --------------------------------------------------
+# ---- inputs: a cluttered room with the same objects at every size ----------------------------------------------------
 
 
 def patch(np, corner, along, up, columns, rows):
-    """A parallelogram as a net of triangles."""
+    """A parallelogram as a grid of triangles."""
     u, v = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1), indexing="ij")
     points = np.asarray(corner) + u[..., None] * np.asarray(along) + v[..., None] * np.asarray(up)
     number = np.arange(u.size).reshape(u.shape)
@@ -49,7 +49,7 @@ def turn(np, draw):
 
 
 def cube(np, n, bend=None):
-    """Six nets over a cube of side 2; `bend` moves its points."""
+    """Six grids over a cube of side 2; `bend` moves their points."""
     out = []
     for axis in range(3):
         for side in (-1.0, 1.0):
@@ -65,7 +65,7 @@ def room(np, triangles):
     x, y, z = np.diag(ROOM)
     parts = []
     if triangles < 100:
-        # A laboratory: the room, boards and two mirrors.
+        # A laboratory: a room, boards and two mirrors.
         parts += [(p * np.array(ROOM) / 2 + np.array(ROOM) / 2, t) for p, t in cube(np, 1)]
         for k in range(12):
             around = 2 * np.pi * k / 12
@@ -101,7 +101,7 @@ def room(np, triangles):
 
 
 def rays(np):
-    """A scanner at many places: beams in order, each an even spiral of sub-rays over 20 × 2 mrad; and rays anywhere."""
+    """A scanner in many poses: beams in order, each an even spiral of sub-rays over 20 × 2 mrad; and random rays."""
     draw = np.random.default_rng(12)
     k = np.arange(SUB_RAYS)
     radius, around = np.sqrt((k + 0.5) / SUB_RAYS), k * np.pi * (3 - 5**0.5)
@@ -129,7 +129,7 @@ def make_inputs(np, folder, meshes):
         all_rays.tofile(folder / f"{name}.rays.f32")
 
 
-# ---- peers from PyPI, each in a process of its own ------------------------------------------------------------------
+# ---- peers from PyPI, each in its own process -----------------------------------------------------------------------
 
 
 def python_peer(folder, mesh, engine, rays_name, threads, seconds):
@@ -179,7 +179,7 @@ def python_peer(folder, mesh, engine, rays_name, threads, seconds):
     print(json.dumps({"mrays": len(all_rays) / statistics.median(times) / 1e6, "build_s": build}))
 
 
-# ---- the whole simulator: a scanner that flies, every pulse traced, detected and written ------------------------------
+# ---- the whole simulator: a flying scanner, every pulse traced, detected and written -----------------------------------
 
 SCENE = """
 schema_version = 1
@@ -208,7 +208,7 @@ waypoint = [
     {{ time_s = {seconds}, position_m = [6.0, 4.8, 1.8], yaw_deg = 170, pitch_deg = 25, roll_deg = 30 }},
 ]
 """
-# Lengths of the flights, in seconds: what the shorter one takes too, reading and indexing above all, is taken off.
+# Durations of the flights in seconds. Time that the shorter one takes too, mainly reading and indexing, is subtracted.
 FLIGHTS = (1, 9)
 SCANS_PER_S = 40
 
@@ -235,7 +235,7 @@ end_header
 
 
 def clock(threads):
-    """On one thread the processor's time, which others on the machine do not change much."""
+    """Processor time on one thread, which other load on the machine hardly changes; otherwise elapsed time."""
     children = resource.getrusage(resource.RUSAGE_CHILDREN)
     return children.ru_utime + children.ru_stime if threads == 1 else time.perf_counter()
 
@@ -245,7 +245,7 @@ def simulate(np, folder, arguments):
     if not program:
         subprocess.run(["cargo", "build", "--release"], cwd=HERE, check=True)
         program = HERE.parent.parent / "target" / "release" / "catoptric"
-    print(f"\nthe whole simulator, 19 sub-rays a pulse, {arguments.threads} thread(s)\n")
+    print(f"\nthe whole simulator, 19 sub-rays per pulse, {arguments.threads} thread(s)\n")
     print("| mesh | files | k pulses/s | M sub-rays/s | start, s |")
     print("|---|---|---|---|---|")
     for mesh in arguments.meshes.split(","):
@@ -296,10 +296,10 @@ def main():
     parser.add_argument("--engines", default=",".join(OURS + PEERS))
     parser.add_argument("--rays", default="scan,random")
     parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--seconds", type=float, default=1.0, help="of one engine in one round")
+    parser.add_argument("--seconds", type=float, default=1.0, help="per engine and round")
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--simulate", action="store_true", help="measure the whole simulator instead")
-    parser.add_argument("--program", type=Path, help="for --simulate, another catoptric than that of this tree")
+    parser.add_argument("--program", type=Path, help="for --simulate: a catoptric other than that of this tree")
     parser.add_argument("--peer", nargs=3, metavar=("MESH", "ENGINE", "RAYS"), help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.peer:
@@ -321,7 +321,7 @@ def main():
         "mitsuba": importlib.util.find_spec("mitsuba"),
     }
     for engine in [e for e in engines if not there.get(e, True)]:
-        print(f"{engine}: not here, left out", file=sys.stderr)
+        print(f"{engine}: not installed, skipped", file=sys.stderr)
         engines.remove(engine)
 
     def run(mesh, engine, rays_name):
@@ -340,7 +340,7 @@ def main():
 
     for rays_name in arguments.rays.split(","):
         for mesh in meshes:
-            # Every triangle as a polygon is for the laboratory alone.
+            # Triangles as polygons are only for the laboratory.
             taking_part = [e for e in engines if not e.startswith("polygons") or mesh == "lab"]
             results = {engine: [] for engine in taking_part}
             for _ in range(arguments.rounds):
@@ -351,7 +351,7 @@ def main():
             expected = read(judge)
             base = taking_part[0]
             print(f"\n{mesh}, {rays_name} rays, {arguments.threads} thread(s)\n")
-            print(f"| engine | M rays/s | {base} is … times as fast | build, s | > 1 mm from {judge} | greatest other difference |")
+            print(f"| engine | M rays/s | {base} is … times as fast | build, s | > 1 mm from {judge} | largest other difference |")
             print("|---|---|---|---|---|---|")
             for engine, found in results.items():
                 ratios = [a["mrays"] / b["mrays"] for a, b in zip(results[base], found)]

@@ -2,8 +2,8 @@
 
     python benches/peers/elements.py [--rounds 3] [--elements 1081]
 
-Needs numpy and scipy, and takes pyceres along if it is there. All must agree on the angles. Compare ratios: absolute times
-are the machine's.
+Needs numpy and scipy, and includes pyceres if it is installed. All must agree on the angles. Compare ratios: absolute
+times depend on the machine.
 """
 
 import argparse
@@ -77,7 +77,7 @@ def ceres_solver(pyceres):
     def solve(base, offset, n, z, start):
         options = pyceres.SolverOptions()
         options.num_threads, options.logging_type = 1, pyceres.LoggingType.SILENT
-        # Its own tolerances stop a hundredth of the noise short of the minimum.
+        # The default tolerances stop short of the minimum by a hundredth of the noise.
         options.function_tolerance = options.parameter_tolerance = options.gradient_tolerance = 1e-12
         found = start.copy()
         for i in range(len(base)):
@@ -126,7 +126,7 @@ def main():
                 if not (apart < AGREEMENT_RAD).mean() > 0.99:
                     raise SystemExit(f"{name} disagrees on {(~(apart < AGREEMENT_RAD)).sum()} of {len(base)} elements")
     best = statistics.median(times["catoptric"])
-    print(f"{'solver':32} {'us per element':>15} {'times as long':>14}")
+    print(f"{'solver':32} {'us per element':>15} {'relative time':>14}")
     for name, values in times.items():
         print(f"{name:32} {statistics.median(values):15.2f} {statistics.median(values) / best:14.1f}")
 

@@ -1,4 +1,4 @@
-// Embree on the inputs of compare.py:  embree FOLDER MESH embree1|embree16 RAYS THREADS SECONDS
+// Embree on the inputs of compare.py: embree FOLDER MESH embree1|embree16 RAYS THREADS SECONDS
 #include <embree3/rtcore.h>
 
 #include <algorithm>
@@ -25,7 +25,7 @@ double seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-void one_by_one(RTCScene scene, const float *ray, double *way, size_t count) {
+void one_by_one(RTCScene scene, const float *ray, double *distance, size_t count) {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   for (size_t i = 0; i < count; i++, ray += 6) {
@@ -34,11 +34,11 @@ void one_by_one(RTCScene scene, const float *ray, double *way, size_t count) {
     hit.ray.dir_x = ray[3], hit.ray.dir_y = ray[4], hit.ray.dir_z = ray[5];
     hit.ray.tfar = INFINITY, hit.ray.mask = ~0u, hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(scene, &context, &hit);
-    way[i] = hit.ray.tfar;
+    distance[i] = hit.ray.tfar;
   }
 }
 
-void by_sixteen(RTCScene scene, const float *ray, double *way, size_t count, bool coherent) {
+void by_sixteen(RTCScene scene, const float *ray, double *distance, size_t count, bool coherent) {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   if (coherent) context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
@@ -55,14 +55,14 @@ void by_sixteen(RTCScene scene, const float *ray, double *way, size_t count, boo
       hit.hit.geomID[k] = hit.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
     }
     rtcIntersect16(valid, scene, &context, &hit);
-    for (size_t k = 0; k < 16 && first + k < count; k++) way[first + k] = hit.ray.tfar[k];
+    for (size_t k = 0; k < 16 && first + k < count; k++) distance[first + k] = hit.ray.tfar[k];
   }
 }
 
 int main(int, char **argument) {
   const std::string folder = argument[1], mesh = argument[2], engine = argument[3], set = argument[4];
   const int threads = std::atoi(argument[5]);
-  const double least = std::atof(argument[6]);
+  const double min_seconds = std::atof(argument[6]);
   const auto vertices = words<float>(folder + "/" + mesh + ".vertices.f32");
   const auto triangles = words<unsigned>(folder + "/" + mesh + ".triangles.u32");
   const auto rays = words<float>(folder + "/" + set + ".rays.f32");
@@ -79,16 +79,16 @@ int main(int, char **argument) {
   rtcAttachGeometry(scene, geometry);
   rtcCommitScene(scene);
   const double build = seconds() - start;
-  std::vector<double> ways(count), times;
+  std::vector<double> distances(count), times;
   double sum = 0;
-  while (times.size() < 2 || sum < least) {
+  while (times.size() < 2 || sum < min_seconds) {
     std::atomic<size_t> next{0};
     auto work = [&] {
-      _mm_setcsr(_mm_getcsr() | 0x8040); // Denormal numbers are zero, as Embree's manual asks.
+      _mm_setcsr(_mm_getcsr() | 0x8040); // Flush denormals to zero, as Embree's manual recommends.
       for (size_t first; (first = block * next++) < count;) {
         const size_t some = std::min(block, count - first);
-        if (engine == "embree1") one_by_one(scene, &rays[6 * first], &ways[first], some);
-        else by_sixteen(scene, &rays[6 * first], &ways[first], some, set == "scan");
+        if (engine == "embree1") one_by_one(scene, &rays[6 * first], &distances[first], some);
+        else by_sixteen(scene, &rays[6 * first], &distances[first], some, set == "scan");
       }
     };
     start = seconds();
@@ -101,6 +101,6 @@ int main(int, char **argument) {
   }
   std::sort(times.begin(), times.end());
   std::ofstream(folder + "/" + engine + "." + mesh + "." + set + ".f64", std::ios::binary)
-      .write(reinterpret_cast<const char *>(ways.data()), count * 8);
+      .write(reinterpret_cast<const char *>(distances.data()), count * 8);
   std::printf("{\"mrays\": %.3f, \"build_s\": %.4f}\n", count / times[times.size() / 2] / 1e6, build);
 }

@@ -1,20 +1,20 @@
-//! Our side of the comparison with other ray casters: closest hits on meshes that `compare.py` made.
+//! Our side of the comparison with other ray casters: nearest hits on the meshes that `compare.py` makes.
 //!
 //! `cargo bench --bench peers -- FOLDER MESH ENGINE RAYS THREADS SECONDS` prints one line of JSON and writes the
-//! distances beside the inputs. Engines are `beam` (so many rays as one beam), `single` (each by itself), `polygons`
-//! (every triangle a polygon of a world, so many rays as one beam) and `parry` (in f64).
+//! distances next to the inputs. Engines are `beamN` (N rays at a time as one beam), `single` (each ray separately),
+//! `polygonsN` (every triangle as a polygon of a world, N rays at a time as one beam) and `parry` (in f64).
 #![allow(missing_docs, clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
+use catoptric::cast::Mesh;
+use catoptric::cast::Ray;
+use catoptric::cast::{Contact, Met, Polygon, Rays, Shape, Triangles, World};
 use catoptric::model::Pose;
-use catoptric::sim::cast::{Contact, Met, Polygon, Rays, Shape, Triangles, World};
-use catoptric::sim::footprint::Ray;
-use catoptric::sim::mesh::Mesh;
 use nalgebra::{Point3, Unit, Vector3};
 use std::fs;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-/// Numbers of a file of little-endian words.
+/// Reads a file of little-endian 32-bit words.
 fn words<T>(path: &str, from: fn([u8; 4]) -> T) -> Vec<T> {
     let bytes = fs::read(path).unwrap_or_else(|e| panic!("{path}: {e}"));
     bytes
@@ -30,46 +30,46 @@ fn resident_mb() -> f64 {
         .map_or(0.0, |kb| kb / 1024.0)
 }
 
-/// Rays that a thread takes at a time.
+/// Number of rays that a thread takes at a time.
 const BLOCK: usize = 256;
 
-/// Casts some rays together.
+/// Casts rays together and writes their distances.
 type Caster<'a> = Box<dyn Fn(&Rays, &mut Found, &mut [f64]) + Sync + 'a>;
 
-/// Room for what they meet.
+/// Buffers for their hits.
 #[derive(Default)]
 struct Found {
     met: Vec<Option<Met>>,
     contacts: Vec<Option<Contact>>,
 }
 
-/// A ray of the file, from its six numbers.
+/// A ray from its six numbers in the file.
 fn ray(r: &[f32]) -> Ray {
     Ray {
         origin: Point3::new(r[0].into(), r[1].into(), r[2].into()),
-        // As it is in the file, so that all engines cast the same ray.
+        // Not normalized again, so that all engines cast the same ray.
         direction: Unit::new_unchecked(Vector3::new(r[3].into(), r[4].into(), r[5].into())),
     }
 }
 
-/// Seconds for all rays once, in blocks that threads take as they come. As every engine does, it starts from the rays
-/// of the file, six numbers in f32 each.
-fn pass(cast: &Caster<'_>, together: usize, rays: &[f32], ways: &mut [f64], threads: usize) -> f64 {
+/// Seconds for one pass over all rays, in blocks that threads take as they become free. Like every engine, it starts
+/// from the rays of the file, six numbers in f32 each.
+fn pass(cast: &Caster<'_>, together: usize, rays: &[f32], distances: &mut [f64], threads: usize) -> f64 {
     let next = AtomicUsize::new(0);
-    let blocks: Vec<_> = ways.chunks_mut(BLOCK).map(std::sync::Mutex::new).collect();
+    let blocks: Vec<_> = distances.chunks_mut(BLOCK).map(std::sync::Mutex::new).collect();
     let start = Instant::now();
     let work = || {
         let (mut own, mut found) = (Rays::default(), Found::default());
         loop {
             let number = next.fetch_add(1, Ordering::Relaxed);
             let Some(block) = blocks.get(number) else { break };
-            let mut ways = block.lock().unwrap();
+            let mut distances = block.lock().unwrap();
             let first = BLOCK * number;
-            let rays = rays[6 * first..6 * (first + ways.len())].chunks(6 * together);
-            for (rays, ways) in rays.zip(ways.chunks_mut(together)) {
+            let rays = rays[6 * first..6 * (first + distances.len())].chunks(6 * together);
+            for (rays, distances) in rays.zip(distances.chunks_mut(together)) {
                 own.clear();
                 own.extend(rays.chunks_exact(6).map(ray));
-                cast(&own, &mut found, ways);
+                cast(&own, &mut found, distances);
             }
         }
     };
@@ -85,8 +85,8 @@ fn pass(cast: &Caster<'_>, together: usize, rays: &[f32], ways: &mut [f64], thre
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
     let [folder, mesh, engine, set, threads, seconds] = arguments.as_slice() else {
-        // As all benches are run at once: nothing to compare with.
-        eprintln!("benches/peers/compare.py runs this");
+        // Run together with all other benches, without inputs.
+        eprintln!("benches/peers/compare.py runs this benchmark");
         return;
     };
     let (threads, seconds): (usize, f64) = (threads.parse().unwrap(), seconds.parse().unwrap());
@@ -107,16 +107,16 @@ fn main() {
     let build = start.elapsed().as_secs_f64();
     let memory = resident_mb() - before;
     let parry;
-    let way = |met: Option<Met>| met.map_or(f64::INFINITY, |m| m.distance);
+    let distance = |met: Option<Met>| met.map_or(f64::INFINITY, |m| m.distance);
     let mut together = BLOCK;
     let cast: Caster<'_> = match engine.as_str() {
         "single" => {
             let placed = &placed;
-            Box::new(move |rays, found, ways| {
+            Box::new(move |rays, found, distances| {
                 found.met.resize(rays.len(), None);
                 placed.nearest_of_each(rays, &mut found.met);
-                for (place, met) in ways.iter_mut().zip(&found.met) {
-                    *place = way(*met);
+                for (place, met) in distances.iter_mut().zip(&found.met) {
+                    *place = distance(*met);
                 }
             })
         }
@@ -126,12 +126,12 @@ fn main() {
                 .map(|p| parry3d::math::Vector::new(p.x, p.y, p.z))
                 .collect();
             parry = parry3d::shape::TriMesh::new(points, triangles).unwrap();
-            Box::new(|rays, _, ways| {
+            Box::new(|rays, _, distances| {
                 use parry3d::query::RayCast;
                 let vector = |v: &Vector3<f64>| parry3d::math::Vector::new(v.x, v.y, v.z);
-                for (ray, way) in rays.iter().zip(ways) {
+                for (ray, distance) in rays.iter().zip(distances) {
                     let ray = parry3d::query::Ray::new(vector(&ray.origin.coords), vector(&ray.direction));
-                    *way = parry.cast_local_ray(&ray, 1e4, false).unwrap_or(f64::INFINITY);
+                    *distance = parry.cast_local_ray(&ray, 1e4, false).unwrap_or(f64::INFINITY);
                 }
             })
         }
@@ -140,10 +140,10 @@ fn main() {
             let polygon = |t: &[u32; 3]| Polygon::new(t.map(|v| vertices[v as usize]).to_vec()).unwrap();
             let world = World::new(triangles.iter().map(|t| Shape::Polygon(polygon(t))).collect());
             together = count;
-            Box::new(move |rays, found, ways| {
+            Box::new(move |rays, found, distances| {
                 found.contacts.resize(rays.len(), None);
                 world.cast_beam(rays, None, &mut found.contacts);
-                for (place, contact) in ways.iter_mut().zip(&found.contacts) {
+                for (place, contact) in distances.iter_mut().zip(&found.contacts) {
                     *place = contact.map_or(f64::INFINITY, |c| c.distance);
                 }
             })
@@ -152,26 +152,26 @@ fn main() {
             let count: usize = beam.strip_prefix("beam").and_then(|n| n.parse().ok()).unwrap();
             let placed = &placed;
             together = count;
-            Box::new(move |rays, found, ways| {
+            Box::new(move |rays, found, distances| {
                 found.met.resize(rays.len(), None);
                 placed.nearest_of_beam(rays, &mut found.met);
-                for (place, met) in ways.iter_mut().zip(&found.met) {
-                    *place = way(*met);
+                for (place, met) in distances.iter_mut().zip(&found.met) {
+                    *place = distance(*met);
                 }
             })
         }
     };
-    let mut ways = vec![f64::INFINITY; rays.len() / 6];
-    let mut times = vec![pass(&cast, together, &rays, &mut ways, threads)];
+    let mut distances = vec![f64::INFINITY; rays.len() / 6];
+    let mut times = vec![pass(&cast, together, &rays, &mut distances, threads)];
     while times.iter().sum::<f64>() < seconds {
-        times.push(pass(&cast, together, &rays, &mut ways, threads));
+        times.push(pass(&cast, together, &rays, &mut distances, threads));
     }
     times.sort_by(f64::total_cmp);
-    let rate = ways.len() as f64 / times[times.len() / 2] / 1e6;
-    let bytes: Vec<u8> = ways.iter().flat_map(|way| way.to_le_bytes()).collect();
+    let rate = distances.len() as f64 / times[times.len() / 2] / 1e6;
+    let bytes: Vec<u8> = distances.iter().flat_map(|d| d.to_le_bytes()).collect();
     fs::write(format!("{folder}/{engine}.{mesh}.{set}.f64"), bytes).unwrap();
     println!(
         "{{\"mrays\": {rate:.3}, \"best\": {:.3}, \"build_s\": {build:.4}, \"memory_mb\": {memory:.1}}}",
-        ways.len() as f64 / times[0] / 1e6
+        distances.len() as f64 / times[0] / 1e6
     );
 }

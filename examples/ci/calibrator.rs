@@ -6,7 +6,7 @@ use catoptric::sim::Scene;
 use catoptric::testing::{self, Anees, Coverage, Significance};
 use proptest::prelude::*;
 
-/// Yours; here it asks one of ours.
+/// Yours; here it calls one of ours.
 struct Mine;
 
 impl Calibrator for Mine {
@@ -20,7 +20,7 @@ impl Calibrator for Mine {
 }
 
 fn scene() -> Scene {
-    let text = catoptric::io::scene::scene_template(catoptric::io::scene::Layout::TwoMirror);
+    let text = catoptric::files::scene::Template::TwoMirror.text();
     let mut scene: Scene = toml::from_str(text).unwrap();
     scene.experiment.scans_per_pose = 10; // a tenth of the time
     scene.scanner.sub_rays = 7;
@@ -39,7 +39,7 @@ proptest! {
 }
 
 #[test]
-fn states_what_it_errs() {
+fn states_its_errors() {
     let trials = testing::trials(&scene(), 1..=40, &Mine).unwrap();
     let significance = Significance::PER_MILLE.among(2);
     Anees::over(&trials).assert(significance);

@@ -1,14 +1,12 @@
-//! `catoptric apply`: from a stretch of scans and a calibration to a point cloud.
+//! `catoptric apply`: turns a stretch of scans into a point cloud, given a calibration.
 
 use super::Context;
 use super::error::CliError;
-use super::files::read_calibration;
+use super::one_of::one_of;
 use super::output::{counted, print};
-use catoptric::apply::{CloudFrame, apply};
-use catoptric::io;
-use catoptric::io::IoError;
-use catoptric::io::cloud::{CloudFormat, cloud_bytes};
-use clap::{Args, ValueEnum};
+use catoptric::files::cloud::CloudFormat;
+use catoptric::{CloudFrame, apply_into, read_calibration_for, read_dataset};
+use clap::Args;
 use std::path::PathBuf;
 
 /// Arguments of `apply`.
@@ -18,50 +16,37 @@ pub(crate) struct Arguments {
     dataset: PathBuf,
     /// The calibration.
     calibration: PathBuf,
-    /// The cloud to write; the name's end says how.
+    /// The cloud to write; the extension selects the format.
     #[arg(long, value_name = "cloud.ply|cloud.pcd")]
     out: PathBuf,
-    /// Frame of the points; Eqs. 9 and 10 are in the sensor's.
-    #[arg(long, value_enum, default_value_t = FrameName::Sensor)]
-    frame: FrameName,
+    /// Frame of the points; Eqs. (9) and (10) are in the sensor's.
+    #[arg(
+        long,
+        value_parser = one_of(&CloudFrame::ALL, CloudFrame::word, CloudFrame::about),
+        default_value = CloudFrame::Sensor.word()
+    )]
+    frame: CloudFrame,
     /// The pose whose scans are taken; those of the empty room by default.
     #[arg(long, value_name = "N")]
     pose: Option<usize>,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum FrameName {
-    /// The laser base frame
-    Sensor,
-    /// The marker body on the superstructure
-    Rig,
-    /// The frame of motion capture
-    Room,
-}
-
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let invalid = |message: String| CliError::Invalid { message, help: None };
     let path = &arguments.out;
-    let format = CloudFormat::of_path(path).map_err(|e| invalid(e.to_string()))?;
-    let dataset = io::read_dataset(&arguments.dataset)?;
-    let calibration = read_calibration(&arguments.calibration)?;
-    let frame = match arguments.frame {
-        FrameName::Sensor => CloudFrame::Sensor,
-        FrameName::Rig => CloudFrame::Rig,
-        FrameName::Room => CloudFrame::Room,
-    };
-    let cloud = apply(&dataset, &calibration, arguments.pose, frame).map_err(|e| invalid(e.to_string()))?;
-    let bytes = cloud_bytes(format, &cloud).map_err(|e| IoError::write(path, e))?;
-    io::write_file(path, &bytes)?;
+    // Said before anything is read.
+    CloudFormat::of_path(path).map_err(|e| CliError::invalid(e.to_string(), None))?;
+    let dataset = read_dataset(&arguments.dataset)?;
+    let calibration = read_calibration_for(&arguments.calibration, &dataset.session)?;
+    let cloud = apply_into(&dataset, &calibration, arguments.pose, arguments.frame, path)?;
     if cloud.mount_is_nominal {
-        context.say("the calibration has no mounting: the drawing's was taken");
+        context.say("the calibration has no mounting: using the one of the drawing");
     }
     print(&format!(
         "wrote {}: {} in the {} frame, pose {}; left out: {} without a range, {} of {} without a direction\n\
          next: open {} in a viewer such as CloudCompare or Open3D\n",
         path.display(),
-        counted(cloud.points.len(), "point"),
-        frame.word(),
+        counted(cloud.points, "point"),
+        arguments.frame.word(),
         cloud.pose,
         counted(cloud.without_range, "reading"),
         counted(cloud.without_direction, "reading"),

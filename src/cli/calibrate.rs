@@ -1,14 +1,13 @@
-//! `catoptric calibrate`: from a dataset to a calibration. The truth is not looked at.
+//! `catoptric calibrate`: estimates a calibration from a dataset. The truth is never read.
 
 use super::Context;
 use super::error::CliError;
-use super::files::read_characterization;
-use super::interrupt;
+use super::one_of::one_of;
 use super::output::{counted, print, quoted};
-use catoptric::calib::{self, JacobianForm, Method, Options};
-use catoptric::io;
-use catoptric::model::{Calibration, Status};
-use clap::{Args, ValueEnum};
+use catoptric::calib::{JacobianForm, Options};
+use catoptric::model::Status;
+use catoptric::{Calibration, Method, calibrate_with, read_characterization, read_dataset, write_json};
+use clap::Args;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -18,95 +17,57 @@ pub(crate) struct Arguments {
     /// The dataset.
     dataset: PathBuf,
     /// How the angles of an element are estimated.
-    #[arg(long, value_enum, default_value_t = MethodName::Joint)]
-    method: MethodName,
+    #[arg(
+        long,
+        value_parser = one_of(&Method::ALL, Method::name, Method::about),
+        default_value = Method::default().name()
+    )]
+    method: Method,
     /// The calibration to write.
     #[arg(long, value_name = "calibration.json")]
     out: PathBuf,
-    /// What step 1 found out about the sensor, instead of what the session believes; as `characterize` writes it.
+    /// Sensor errors found in step 1, as written by `characterize`, instead of the session's beliefs.
     #[arg(long, value_name = "characterization.json")]
     characterization: Option<PathBuf>,
-    /// Predict every board from the others as well, five times over, and say how well that goes (`joint`).
+    /// Also predict each board from the others (five-fold cross-validation) and report the errors (`joint` only).
     #[arg(long)]
     cross_validate: bool,
     /// How derivatives are formed; both end at the same answer.
-    #[arg(long, value_enum, default_value_t = JacobianName::Analytic)]
-    jacobian: JacobianName,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum MethodName {
-    /// Facets, mounting, boards, drifts and biases at once, beams free to depart from their facet's plane
-    Joint,
-    /// One plane per facet, each facet by itself
-    Facet,
-    /// Each element by itself, weighted by the covariance of all errors
-    BeamGls,
-    /// Each element by itself, all readings alike, Eqs. 7 and 8
-    Beam,
-    /// The same, one reading after the other: recursive least squares
-    Recursive,
-    /// Each element by itself, without iteration
-    ClosedForm,
-    /// The drawing
-    Prior,
-}
-
-impl From<MethodName> for Method {
-    fn from(name: MethodName) -> Self {
-        match name {
-            MethodName::Joint => Self::Joint,
-            MethodName::Facet => Self::Facet,
-            MethodName::BeamGls => Self::BeamGls,
-            MethodName::Beam => Self::Beam,
-            MethodName::Recursive => Self::Recursive,
-            MethodName::ClosedForm => Self::ClosedForm,
-            MethodName::Prior => Self::Prior,
-        }
-    }
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum JacobianName {
-    /// By differentiating Eq. 6
-    Analytic,
-    /// By the central differences of Eq. 7
-    Central,
+    #[arg(
+        long,
+        value_parser = one_of(&JacobianForm::ALL, JacobianForm::name, JacobianForm::about),
+        default_value = JacobianForm::default().name()
+    )]
+    jacobian: JacobianForm,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let mut dataset = io::read_dataset(&arguments.dataset)?;
-    interrupt::check()?;
+    let mut dataset = read_dataset(&arguments.dataset)?;
+    context.check()?;
     if let Some(path) = &arguments.characterization {
         let found = read_characterization(path)?;
         dataset.session.believed = dataset.session.believed.after(&found);
     }
-    let method = Method::from(arguments.method);
-    if arguments.cross_validate && method != Method::Joint {
-        return Err(CliError::Invalid {
-            message: format!(
-                "--cross-validate goes with --method joint, not with {}",
-                method.name()
-            ),
-            help: None,
-        });
+    let method = arguments.method;
+    if arguments.cross_validate && !method.cross_validates() {
+        let message = format!(
+            "--cross-validate works with --method joint only, not with {}",
+            method.name()
+        );
+        return Err(CliError::invalid(message, None));
     }
     let options = Options {
-        jacobian: match arguments.jacobian {
-            JacobianName::Analytic => JacobianForm::Analytic,
-            JacobianName::Central => JacobianForm::CentralDifference,
-        },
+        jacobian: arguments.jacobian,
         cross_validation: arguments.cross_validate,
         ..Options::default()
     };
     let begin = Instant::now();
-    let calibration = calib::calibrate(&dataset, method, &options)?;
-    interrupt::check()?;
+    let calibration = calibrate_with(&dataset, method, &options, &context.control())?;
     context.detail(&format!("calibrated in {:.2} s", begin.elapsed().as_secs_f64()));
     for warning in &calibration.warnings {
         context.say(&format!("warning: {warning}"));
     }
-    io::write_json(&arguments.out, &calibration)?;
+    write_json(&arguments.out, &calibration)?;
     print(&format!(
         "wrote {}: {}\n{}next: catoptric score {} {}\n",
         arguments.out.display(),
@@ -117,7 +78,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     ))
 }
 
-/// How well boards are predicted by the others, where that was asked.
+/// How well the boards are predicted by the others; empty unless requested.
 fn cross_validation(calibration: &Calibration) -> String {
     let held_out = calibration.assessment.as_ref().and_then(|a| a.held_out.as_ref());
     held_out.map_or_else(String::new, |h| {

@@ -1,13 +1,12 @@
-//! `catoptric check`: whether a scene can be simulated, and how large the experiment will be.
+//! `catoptric check`: checks that a scene can be simulated, and reports the size of the experiment.
 
 use super::Context;
 use super::error::CliError;
 use super::output::{counted, print, quoted};
-use catoptric::io::scene;
-use catoptric::model::beam;
+use catoptric::sim::Laboratory;
 use catoptric::sim::check::{Outline, outline};
 use catoptric::sim::trace::Scenery;
-use catoptric::sim::{Laboratory, Scene};
+use catoptric::{Scene, sim};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -22,13 +21,14 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let scene = scene::load(&arguments.scene, &arguments.set)?;
+    let scene = Scene::load_with(&arguments.scene, &arguments.set)?;
+    let scene = scene.resolved();
     if scene.has_no_laboratory() {
-        return open_stage(arguments, &scene);
+        return open_stage(arguments, scene);
     }
-    let outline = outline(&scene);
-    // Setting the experiment up finds what no single value shows: a board that fits nowhere.
-    let laboratory = Laboratory::new(&scene, scene.seed)?;
+    let outline = outline(scene);
+    // Setting up the experiment finds problems that no single value shows, such as a board that fits nowhere.
+    let laboratory = Laboratory::new(scene, scene.seed)?;
     let flights = match scene.flight.len() {
         0 => String::new(),
         flights => format!(", {}", counted(flights, "flight")),
@@ -41,7 +41,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         counted(scene.board.len(), "board"),
         counted(laboratory.board_poses(), "pose"),
         counted(laboratory.scans(), "scan"),
-        counted(laboratory.scans() * beam::COUNT, "reading"),
+        counted(laboratory.scans() * laboratory.sensor().scan().beams(), "reading"),
     );
     if context.global.verbose > 0 {
         for facet in &outline.facets {
@@ -71,8 +71,8 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     print(&text)
 }
 
-/// A scene to trace rays in, and no more.
-fn open_stage(arguments: &Arguments, scene: &Scene) -> Result<(), CliError> {
+/// Checks a scene that is only for tracing rays.
+fn open_stage(arguments: &Arguments, scene: &sim::Scene) -> Result<(), CliError> {
     Scenery::new(scene)?.tracer(1)?;
     print(&format!(
         "ok: {}: {}, {}, no laboratory\nnext: catoptric trace {} --rays RAYS.csv --out PATHS.csv\n",
@@ -83,7 +83,7 @@ fn open_stage(arguments: &Arguments, scene: &Scene) -> Result<(), CliError> {
     ))
 }
 
-/// How many beams the drawing sends to each facet.
+/// The number of beams that each facet deflects according to the drawing.
 fn served(outline: &Outline) -> String {
     let beams = || outline.facets.iter().map(|f| f.beams);
     match (beams().min(), beams().max()) {

@@ -1,12 +1,11 @@
-//! `catoptric compare`: several calibrations of one dataset, whoever made them, in one table.
+//! `catoptric compare`: tabulates several calibrations of one dataset, ours and third-party ones.
 
 use super::error::CliError;
-use super::files::{read_calibration, read_truth};
 use super::output::{counted, print};
 use super::score::figure;
-use catoptric::compare::{CONTRADICTION, Comparison, Contestant, Row, compare};
-use catoptric::io;
+use catoptric::compare::{CONTRADICTION, Row};
 use catoptric::score::Honesty;
+use catoptric::{Comparison, Contestant, Error, compare, read_calibration_for, read_dataset, read_truth};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -15,7 +14,7 @@ use std::path::PathBuf;
 pub(crate) struct Arguments {
     /// The dataset.
     dataset: PathBuf,
-    /// The calibrations, ours or anybody's.
+    /// The calibrations, ours or third-party.
     #[arg(required = true, num_args = 1.., value_name = "CALIBRATION")]
     calibrations: Vec<PathBuf>,
     /// Print the table as JSON.
@@ -23,9 +22,9 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Ends well whatever the verdicts are: `score` is what judges one of them.
+/// Succeeds whatever the verdicts are; judging a single calibration is up to `score`.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
-    let dataset = io::read_dataset(&arguments.dataset)?;
+    let dataset = read_dataset(&arguments.dataset)?;
     let truth = read_truth(&arguments.dataset)?;
     let contestants: Vec<Contestant> = arguments
         .calibrations
@@ -33,27 +32,32 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
         .map(|path| {
             Ok(Contestant {
                 name: path.display().to_string(),
-                calibration: read_calibration(path)?,
+                calibration: read_calibration_for(path, &dataset.session)?,
             })
         })
         .collect::<Result<_, CliError>>()?;
-    let found = compare(&dataset, &contestants, truth.as_ref());
+    let found = compare(&dataset, &contestants, truth.as_ref()).map_err(Error::from)?;
     if arguments.json {
         let json = serde_json::to_string_pretty(&found).map_err(|e| CliError::Output(e.into()))?;
-        return print(&format!("{json}\n"));
+        print(&format!("{json}\n"))?;
+    } else {
+        print(&words(&found))?;
     }
-    print(&words(&found))
+    match found.failures.is_empty() {
+        true => Ok(()),
+        false => Err(CliError::Verdict(found.failures.join("\n"))),
+    }
 }
 
 /// A calibration as a row of a table.
 type Cells = fn(&Row) -> Vec<String>;
 
-/// The tables as a person reads them.
+/// The tables as text.
 fn words(found: &Comparison) -> String {
     let order = if found.blind {
-        "no truth: residuals on boards and walls only, the least on the walls first"
+        "no truth: residuals on boards and walls only, smallest wall residual first"
     } else {
-        "the least point error at 4 m first"
+        "smallest point error at 4 m first"
     };
     let mut text = format!("{}, {order}\n", counted(found.rows.len(), "calibration"));
     let (heads, cells): (&[&str], Cells) = if found.blind {
@@ -148,7 +152,7 @@ fn blind_cells(row: &Row) -> Vec<String> {
     ]
 }
 
-/// Columns as wide as their widest cell: names to the left, figures to the right.
+/// Formats columns as wide as their widest cell: names left-aligned, figures right-aligned.
 fn table(heads: &[&str], rows: Vec<Vec<String>>) -> String {
     let columns = heads.len();
     let head = heads.iter().map(|h| (*h).to_owned()).collect();

@@ -1,4 +1,4 @@
-//! `catoptric completions`: what a shell needs to complete the command line.
+//! `catoptric completions`: prints a shell's completion script.
 
 use super::Cli;
 use super::error::CliError;

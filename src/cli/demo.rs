@@ -1,24 +1,23 @@
-//! `catoptric demo`: the whole story on the built-in scene.
+//! `catoptric demo`: simulates, calibrates, scores and reports on the built-in scene.
 
 use super::Context;
 use super::calibrate::summary;
 use super::error::CliError;
-use super::files::read_truth;
-use super::interrupt;
 use super::output::{counted, grouped, print, quoted};
 use super::score::figure;
-use super::simulate::{self, Recording};
-use catoptric::apply::{CloudFrame, apply};
-use catoptric::calib::{self, Method, Options};
-use catoptric::io::cloud::{CloudFormat, cloud_bytes};
-use catoptric::io::scene::{self, Layout};
-use catoptric::io::{self, IoError};
-use catoptric::score::{Verdict, score};
+use catoptric::apply::{CloudSketch, Lift};
+use catoptric::calib::Options;
+use catoptric::files;
+use catoptric::report::MAX_POINTS;
+use catoptric::{
+    CloudFrame, Error, Method, Recording, Scene, Template, Verdict, apply_into, calibrate_with, read_dataset,
+    read_truth, report, score, simulate_into, write_json,
+};
 use clap::Args;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// The methods it shows: the best one, the best that takes each element by itself, and the paper's.
+/// The methods shown: the best one, the best that treats each element separately, and the paper's.
 const SHOWN: [Method; 3] = [Method::Joint, Method::BeamGls, Method::Beam];
 
 /// Arguments of `demo`.
@@ -27,7 +26,7 @@ pub(crate) struct Arguments {
     /// The folder to write into.
     #[arg(long, value_name = "DIR", default_value = "catoptric-demo")]
     out: PathBuf,
-    /// Seed of every random draw, instead of the scene's.
+    /// Seed of all random effects, instead of the scene's.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
 }
@@ -35,46 +34,40 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let begin = Instant::now();
     let folder = &arguments.out;
-    if folder.join(io::dataset::SESSION).exists() {
-        return Err(CliError::Invalid {
-            message: format!(
-                "{} is itself a dataset; the demo writes one into a folder of its own",
-                folder.display()
-            ),
-            help: Some("give another --out".to_owned()),
-        });
+    if folder.join(files::dataset::SESSION).exists() {
+        let message = format!(
+            "{} is a dataset; the demo creates its dataset inside the folder it is given",
+            folder.display()
+        );
+        return Err(CliError::invalid(message, "choose another --out".to_owned()));
     }
-    let mut scene = scene::parse(scene::scene_template(Layout::Prototype), "prototype.toml", &[])?;
-    scene.seed = arguments.seed.unwrap_or(scene.seed);
+    let mut scene = Scene::template(Template::Prototype);
+    if let Some(seed) = arguments.seed {
+        scene = scene.with_seed(seed);
+    }
     let dataset_folder = folder.join("dataset");
-    let figures = simulate::record(
-        &Recording {
-            scene: &scene,
-            command_line: format!("catoptric demo --seed {}", scene.seed),
-            out: &dataset_folder,
-            // Only a dataset is ever replaced; a second demo makes the same one again.
-            blind: false,
-            replace: true,
-            returns: false,
-            readings: false,
-            sub_rays: false,
-        },
-        context,
-    )?;
+    let recording = Recording {
+        // Only datasets are ever replaced, and a second demo creates the same one.
+        replace: true,
+        command_line: Some(format!("catoptric demo --seed {}", scene.resolved().seed)),
+        ..Recording::default()
+    };
+    let control = context.control();
+    let figures = simulate_into(&scene, &dataset_folder, &recording, &control)?;
 
     context.say("reading the dataset back");
-    let dataset = io::read_dataset(&dataset_folder)?;
+    let dataset = read_dataset(&dataset_folder)?;
     let truth = read_truth(&dataset_folder)?;
     let mut results = Vec::new();
     let mut lines = Vec::new();
     for method in SHOWN {
-        interrupt::check()?;
+        context.check()?;
         let name = method.name();
         context.say(&format!("calibrating: {name}"));
-        let calibration = calib::calibrate(&dataset, method, &Options::default())?;
-        io::write_json(folder.join(format!("calibration-{name}.json")), &calibration)?;
-        let result = score(&dataset, &calibration, truth.as_ref());
-        io::write_json(folder.join(format!("score-{name}.json")), &result)?;
+        let calibration = calibrate_with(&dataset, method, &Options::default(), &control)?;
+        write_json(folder.join(format!("calibration-{name}.json")), &calibration)?;
+        let result = score(&dataset, &calibration, truth.as_ref()).map_err(Error::from)?;
+        write_json(folder.join(format!("score-{name}.json")), &result)?;
         lines.push(format!(
             "{name:8}  {}; per-axis error {} rms",
             summary(&calibration),
@@ -82,26 +75,23 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         ));
         results.push((calibration, result));
     }
-    interrupt::check()?;
+    context.check()?;
     context.say("writing cloud and report");
     let cloud_path = folder.join("cloud.ply");
-    let cloud = apply(&dataset, &results[0].0, None, CloudFrame::Room).map_err(|e| CliError::Invalid {
-        message: e.to_string(),
-        help: None,
-    })?;
-    let bytes = cloud_bytes(CloudFormat::Ply, &cloud).map_err(|e| IoError::write(&cloud_path, e))?;
-    io::write_file(&cloud_path, &bytes)?;
+    let cloud = apply_into(&dataset, &results[0].0, None, CloudFrame::Room, &cloud_path)?;
+    let lift = Lift::new(&dataset, &results[0].0, None, CloudFrame::Room).map_err(Error::from)?;
+    let sketch = CloudSketch::of(&lift, MAX_POINTS).map_err(Error::from)?;
     let report_path = folder.join("report.html");
-    let html = catoptric::report::report(&dataset, truth.as_ref(), &results, Some(&cloud));
-    io::write_file(&report_path, html.as_bytes())?;
+    let html = report(&dataset, truth.as_ref(), &results, Some(&sketch));
+    files::write_file(&report_path, html.as_bytes())?;
 
-    let score = &results[0].1;
+    let (scene, score) = (scene.resolved(), &results[0].1);
     let verdict = score.verdict.word();
     let calibrated = lines.join("\n            ");
     print(&format!(
         "simulated   scene {:?}, seed {}: {}, {}, {}, {} readings\n\
          calibrated  {calibrated}\n\
-         limit       no method can be expected to do better than {}, none that takes each element by itself than {}\n\
+         limit       no method can be expected to do better than {}, none that treats each element separately better than {}\n\
          verdict     {verdict}: of {} deflected elements {} solved, {} abstained, {} missed, {} false\n\
          points      {} at 1 m, {} at 4 m\n\
          took        {:.1} s\n\
@@ -128,7 +118,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         quoted(&dataset_folder),
         quoted(&report_path),
         quoted(&cloud_path),
-        counted(cloud.points.len(), "point"),
+        counted(cloud.points, "point"),
     ))?;
     match score.verdict {
         Verdict::Fail => Err(CliError::Verdict(format!(

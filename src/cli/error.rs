@@ -1,95 +1,94 @@
-//! How a verb can end other than well, and what the shell is told.
+//! Why a verb can fail, the message it prints and the exit code the shell receives.
 
-use catoptric::calib::CalibError;
-use catoptric::io::IoError;
-use catoptric::io::scene::SceneErrors;
+use catoptric::Error;
+use catoptric::files::IoError;
+use catoptric::files::scene::SceneErrors;
 use catoptric::sim::SimError;
 use std::io::{IsTerminal, Write};
-use std::path::PathBuf;
-use std::process::ExitCode;
 
 /// Why a verb did not succeed.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum CliError {
-    /// The input is not what it should be.
-    #[error("{message}")]
-    Invalid {
-        /// What is wrong.
-        message: String,
-        /// What to do about it.
-        help: Option<String>,
-    },
-    /// There is no scene.
+    /// The library returned an error.
     #[error(transparent)]
-    Scene(#[from] SceneErrors),
-    /// The scene is valid and still cannot be set up.
-    #[error("{0}")]
-    Setup(#[from] SimError),
-    /// A file that cannot be read, written or understood.
-    #[error(transparent)]
-    File(#[from] IoError),
-    /// The dataset cannot be calibrated.
-    #[error("cannot calibrate: {0}")]
-    Calibration(#[from] CalibError),
-    /// The verdict is "not good enough"; what it is about has been printed.
+    Library(#[from] Error),
+    /// The verdict is "not good enough"; the results have been printed already.
     #[error("{0}")]
     Verdict(String),
-    /// Ctrl-C.
-    #[error("interrupted; nothing half-written was left behind")]
-    Interrupted,
-    /// A file could not be written.
-    #[error("cannot write {}: {source}", path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// Standard output, or the machine, refused.
+    /// Writing to standard output failed.
     #[error("{0}")]
     Output(std::io::Error),
-    /// Nobody reads standard output any more: no error at all.
-    #[error("the reader of standard output has gone")]
+    /// The reader of standard output has closed it, which is not an error.
+    #[error("standard output was closed by its reader")]
     ClosedPipe,
 }
 
+impl From<IoError> for CliError {
+    fn from(error: IoError) -> Self {
+        Self::Library(error.into())
+    }
+}
+
+impl From<SceneErrors> for CliError {
+    fn from(error: SceneErrors) -> Self {
+        Self::Library(error.into())
+    }
+}
+
+impl From<SimError> for CliError {
+    fn from(error: SimError) -> Self {
+        Self::Library(error.into())
+    }
+}
+
 impl CliError {
+    /// An invalid argument.
+    pub(crate) fn invalid(message: impl Into<String>, help: impl Into<Option<String>>) -> Self {
+        Self::Library(Error::Invalid {
+            message: message.into(),
+            help: help.into(),
+        })
+    }
+
     fn exit_code(&self) -> u8 {
         match self {
             Self::ClosedPipe => 0,
             Self::Verdict(_) => 1,
-            Self::Calibration(_) => 2,
-            Self::File(error) => error.exit_code(),
-            Self::Interrupted => 130,
-            Self::Invalid { .. } | Self::Setup(_) | Self::Scene(SceneErrors::Invalid(_)) => 2,
-            Self::Scene(SceneErrors::Mesh { source, .. }) => source.exit_code(),
-            Self::Scene(SceneErrors::Read { .. }) | Self::Write { .. } | Self::Output(_) => 3,
+            Self::Output(_) => 3,
+            Self::Library(error) => error.exit_code(),
         }
     }
 
-    /// Tells the person on stderr and the shell by the exit code.
-    pub(crate) fn report(&self) -> ExitCode {
+    /// Prints the error to stderr and returns the exit code.
+    pub(crate) fn report(&self) -> u8 {
         let mut stderr = anstream::stderr();
-        // With stderr closed there is nobody left to tell.
+        // If stderr is closed, there is nowhere left to report to.
         let _ = match self {
             Self::ClosedPipe => Ok(()),
-            Self::Scene(SceneErrors::Invalid(problems)) => {
+            Self::Library(Error::Scene(SceneErrors::Invalid(problems))) => {
                 writeln!(stderr, "{}", problems.render(std::io::stderr().is_terminal()))
             }
-            Self::Invalid {
-                message,
-                help: Some(help),
-            } => writeln!(stderr, "error: {message}\nhelp: {help}"),
-            Self::Setup(error @ SimError::Placement { .. }) => writeln!(
-                stderr,
-                "error: {error}\nhelp: make the room larger, the board smaller, or experiment.range_m shorter"
-            ),
-            Self::File(error @ IoError::Exists { .. }) => {
-                writeln!(stderr, "error: {error}\nhelp: give --replace, or another --out")
+            Self::Library(Error::Stopped(_)) => {
+                writeln!(stderr, "interrupted; no incomplete files were left behind")
             }
-            Self::Verdict(_) | Self::Interrupted => writeln!(stderr, "{self}"),
-            other => writeln!(stderr, "error: {other}"),
+            Self::Verdict(_) => writeln!(stderr, "{self}"),
+            Self::Library(error) => match help(error) {
+                Some(help) => writeln!(stderr, "error: {error}\nhelp: {help}"),
+                None => writeln!(stderr, "error: {error}"),
+            },
+            Self::Output(error) => writeln!(stderr, "error: {error}"),
         };
-        ExitCode::from(self.exit_code())
+        self.exit_code()
+    }
+}
+
+/// What to do about an error, in terms of command-line options.
+fn help(error: &Error) -> Option<String> {
+    match error {
+        Error::Setup(SimError::Placement { .. }) => {
+            Some("use a larger room, a smaller board, or a shorter experiment.range_m".to_owned())
+        }
+        Error::File(IoError::Exists { .. }) => Some("use --replace or another --out".to_owned()),
+        other => other.help(),
     }
 }

@@ -1,33 +1,27 @@
-//! Ctrl-C: the first asks long work to stop and clean up, the second ends the program at once.
+//! Ctrl-C: the first one requests long work to stop and clean up, the second one ends the program immediately.
 
-use super::error::CliError;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, LazyLock};
+use catoptric::Stop;
+use std::sync::{LazyLock, Mutex, Once, PoisonError};
 
-/// What the shell is told of a program ended by Ctrl-C: 128 + SIGINT.
+/// Exit code of a program ended by Ctrl-C: 128 + SIGINT.
 const EXIT_CODE: i32 = 130;
 
-static INTERRUPTED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
+/// The stop request of the current run.
+static CURRENT: LazyLock<Mutex<Stop>> = LazyLock::new(Mutex::default);
 
-/// Begins to listen. Where that cannot be, Ctrl-C ends the program at once, as without it.
-pub(crate) fn install() {
-    let _ = ctrlc::set_handler(|| {
-        if INTERRUPTED.swap(true, Ordering::SeqCst) {
-            std::process::exit(EXIT_CODE);
-        }
+/// Starts listening for Ctrl-C on behalf of a run. If no handler can be installed, Ctrl-C ends the program immediately.
+pub(crate) fn listen() -> Stop {
+    static INSTALLED: Once = Once::new();
+    INSTALLED.call_once(|| {
+        let _ = ctrlc::set_handler(|| {
+            let stop = CURRENT.lock().unwrap_or_else(PoisonError::into_inner);
+            if stop.is_requested() {
+                std::process::exit(EXIT_CODE);
+            }
+            stop.request();
+        });
     });
-}
-
-/// Set once Ctrl-C was pressed, for what must not know of this program.
-pub(crate) fn flag() -> Arc<AtomicBool> {
-    INTERRUPTED.clone()
-}
-
-/// An error once Ctrl-C was pressed. Long loops ask for it.
-pub(crate) fn check() -> Result<(), CliError> {
-    if INTERRUPTED.load(Ordering::SeqCst) {
-        Err(CliError::Interrupted)
-    } else {
-        Ok(())
-    }
+    let stop = Stop::default();
+    *CURRENT.lock().unwrap_or_else(PoisonError::into_inner) = stop.clone();
+    stop
 }

@@ -1,96 +1,76 @@
-//! `catoptric layout`: what mirror layouts see, lose and allow; several side by side.
+//! `catoptric layout`: analyzes the coverage, losses and attainable accuracy of mirror layouts, several side by side.
 
 use super::Context;
 use super::error::CliError;
-use super::interrupt;
 use super::output::{print, quoted};
-use catoptric::io::{self, IoError, scene};
-use catoptric::layout::{self, Analysis, Class, Detail, FacetView, Requirement, RequirementError};
-use catoptric::report::{self, Drawn};
+use catoptric::layout::{Analysis, Class, FacetView, Requirement, RequirementError};
+use catoptric::{LAYOUT_PAGE, LayoutOptions, Scene, layout, layout_json, write_layouts};
 use clap::Args;
-use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Arguments of `layout`.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// The scene, TOML or JSON; several are put side by side.
+    /// The scene, TOML or JSON; several are compared side by side.
     #[arg(required = true, value_name = "SCENE")]
     scenes: Vec<PathBuf>,
-    /// Look at the structure as built under the seed instead of the drawing.
+    /// Analyze the structure as built under the seed instead of the drawing.
     #[arg(long)]
     as_built: bool,
     /// Seed of the structure as built and of the predicted accuracy; the scene's own by default.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// One ray per beam and no prediction of accuracy: an answer in milliseconds.
+    /// Use one ray per beam and predict no accuracy: takes milliseconds.
     #[arg(long)]
     coarse: bool,
     /// Change a value of every scene first: superstructure.mirror.reflectivity=0.95.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// A limit to keep, else the exit code is 1: "field_of_regard>=0.004", "facets.*.margin_mm>0.5". May be given more
-    /// than once.
+    /// A limit to meet, otherwise the exit code is 1: "field_of_regard>=0.004", "facets.*.margin_mm>0.5". May be given
+    /// more than once.
     #[arg(long, value_name = "FIGURE>=NUMBER")]
     require: Vec<String>,
-    /// Write layout.json, the pictures and a page, report.html, into this folder.
+    /// Write layout.json, the pictures and a page, report.html, to this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print every figure as JSON.
+    /// Print all figures as JSON.
     #[arg(long)]
     json: bool,
-}
-
-/// What is printed of several layouts.
-#[derive(Serialize)]
-struct SideBySide<'a> {
-    schema_version: u32,
-    layouts: &'a [Analysis],
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let requirements = requirements(&arguments.require, EXAMPLE)?;
     let mut scenes = Vec::new();
     for path in &arguments.scenes {
-        scenes.push(scene::load(path, &arguments.set)?);
+        scenes.push(Scene::load_with(path, &arguments.set)?);
     }
+    let options = LayoutOptions {
+        as_built: arguments.as_built,
+        seed: arguments.seed,
+        coarse: arguments.coarse,
+    };
     let begin = Instant::now();
     let mut analyses = Vec::new();
     for scene in &scenes {
-        interrupt::check()?;
-        let seed = arguments.seed.unwrap_or(scene.seed);
-        let detail = if arguments.coarse {
-            Detail::Coarse
-        } else {
-            Detail::Full
-        };
-        let mut analysis = layout::analyze(scene, arguments.as_built.then_some(seed), detail)?;
-        if !arguments.coarse {
-            analysis.accuracy = Some(layout::predict(scene, seed));
-        }
-        analyses.push(analysis);
+        context.check()?;
+        analyses.push(layout(scene, &options)?);
     }
     context.detail(&format!("analyzed in {:.3} s", begin.elapsed().as_secs_f64()));
     let unmet = unmet(&requirements, &analyses)?;
-    let json = json(&analyses)?;
     let mut said = String::new();
     if let Some(out) = &arguments.out {
-        let drawn: Result<Vec<Drawn>, _> = scenes
-            .iter()
-            .zip(&analyses)
-            .map(|(scene, analysis)| Drawn::new(scene, analysis))
-            .collect();
-        write(out, &json, &drawn?)?;
-        said = format!("wrote {}\n", quoted(&out.join(PAGE)));
+        let layouts: Vec<(&Scene, &Analysis)> = scenes.iter().zip(&analyses).collect();
+        write_layouts(&layouts, out, &context.control())?;
+        said = format!("wrote {}\n", quoted(&out.join(LAYOUT_PAGE)));
     }
     if arguments.json {
-        print(&json)?;
+        print(&layout_json(&analyses)?)?;
     } else {
         let mut text: Vec<String> = analyses.iter().map(text).collect();
         if context.global.verbose > 0 {
             for (text, (scene, analysis)) in text.iter_mut().zip(scenes.iter().zip(&analyses)) {
-                text.push_str(&corners(&layout::Drawing::new(scene, analysis.seed)?));
+                text.push_str(&corners(&layout::Drawing::new(scene.resolved(), analysis.seed)?));
             }
         }
         print(&(text.join("\n") + &said + &next(arguments)))?;
@@ -102,10 +82,10 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     }
 }
 
-/// A requirement as it is given.
+/// An example of a requirement.
 const EXAMPLE: &str = "field_of_regard>=0.004";
 
-/// Reads what was given with `--require`.
+/// Parses the values of `--require`.
 pub(super) fn requirements(texts: &[String], example: &str) -> Result<Vec<Requirement>, CliError> {
     texts
         .iter()
@@ -113,15 +93,14 @@ pub(super) fn requirements(texts: &[String], example: &str) -> Result<Vec<Requir
         .collect()
 }
 
-/// What is wrong with a requirement.
+/// The error for an invalid requirement.
 pub(super) fn refused(error: RequirementError, example: &str) -> CliError {
-    CliError::Invalid {
-        message: format!("--require: {error}"),
-        help: Some(match error {
-            RequirementError::Form { .. } => format!("--require '{example}'"),
-            RequirementError::Unknown { help, .. } => help,
-        }),
-    }
+    let message = format!("--require: {error}");
+    let help = match error {
+        RequirementError::Form { .. } => format!("--require '{example}'"),
+        RequirementError::Unknown { help, .. } => help,
+    };
+    CliError::invalid(message, help)
 }
 
 fn unmet(requirements: &[Requirement], analyses: &[Analysis]) -> Result<Vec<String>, CliError> {
@@ -133,33 +112,6 @@ fn unmet(requirements: &[Requirement], analyses: &[Analysis]) -> Result<Vec<Stri
         }
     }
     Ok(unmet)
-}
-
-/// One layout by itself, several in a list.
-fn json(analyses: &[Analysis]) -> Result<String, CliError> {
-    let text = match analyses {
-        [one] => serde_json::to_string(one),
-        several => serde_json::to_string(&SideBySide {
-            schema_version: layout::SCHEMA_VERSION,
-            layouts: several,
-        }),
-    };
-    text.map(|t| t + "\n").map_err(|e| CliError::Output(e.into()))
-}
-
-/// Names of what is written.
-const JSON: &str = "layout.json";
-const PAGE: &str = "report.html";
-
-fn write(out: &Path, json: &str, drawn: &[Drawn]) -> Result<(), CliError> {
-    std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
-    for (name, bytes) in report::layout_pictures(drawn) {
-        interrupt::check()?;
-        io::write_file(out.join(name), &bytes)?;
-    }
-    io::write_file(out.join(PAGE), report::layout(drawn).as_bytes())?;
-    io::write_file(out.join(JSON), json.as_bytes())?;
-    Ok(())
 }
 
 fn next(arguments: &Arguments) -> String {
@@ -174,7 +126,7 @@ fn next(arguments: &Arguments) -> String {
     }
 }
 
-/// A layout for people.
+/// An analysis as text.
 fn text(analysis: &Analysis) -> String {
     let counts: Vec<String> = Class::ALL
         .iter()
@@ -237,7 +189,7 @@ fn text(analysis: &Analysis) -> String {
     text
 }
 
-/// The polygons that were looked at.
+/// The polygons that were analyzed.
 fn corners(drawing: &layout::Drawing) -> String {
     let facets = drawing.facets.iter().map(|facet| {
         let corners = facet.face.corners.iter().map(|c| {

@@ -1,15 +1,16 @@
-//! `catoptric man`: the manual pages.
+//! `catoptric man`: prints or writes the manual pages.
 
 use super::Cli;
 use super::error::CliError;
 use super::output::print;
+use catoptric::files::IoError;
 use clap::{Args, CommandFactory};
 use std::path::PathBuf;
 
 /// Arguments of `man`.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// Write the pages of all verbs into this folder instead of printing the first one.
+    /// Write the pages of all verbs to this folder instead of printing the main one.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
@@ -22,10 +23,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
             .map_err(CliError::Output)?;
         return print(&String::from_utf8_lossy(&page));
     };
-    let write_error = |source| CliError::Write {
-        path: folder.clone(),
-        source,
-    };
+    let write_error = |source| IoError::write(folder, source);
     std::fs::create_dir_all(folder).map_err(write_error)?;
     clap_mangen::generate_to(Cli::command(), folder).map_err(write_error)?;
     print(&format!("wrote the manual pages to {}\n", folder.display()))

@@ -1,4 +1,4 @@
-//! The command line: its arguments, and one file for each verb.
+//! The command line: global options, dispatch, and one file per verb.
 
 mod apply;
 mod calibrate;
@@ -9,11 +9,11 @@ mod completions;
 mod demo;
 mod error;
 mod export;
-mod files;
 mod interrupt;
 mod layout;
 mod man;
 mod new;
+mod one_of;
 mod optimize;
 mod output;
 mod plan;
@@ -22,20 +22,20 @@ mod report;
 mod schema;
 mod score;
 mod simulate;
-mod stream;
 mod study;
-mod sub_rays;
 mod tolerance;
 mod trace;
-mod truth_tables;
 mod validate;
 
+use catoptric::{Control, Stop};
 use clap::{ArgAction, Args, Parser, Subcommand};
 use error::CliError;
+use progress::Reporter;
+use std::ffi::OsString;
 use std::io::Write;
-use std::process::ExitCode;
+use std::sync::Arc;
 
-/// Said at the end of every help.
+/// Printed at the end of every help text.
 const EXIT_CODES: &str = "Exit codes: 0 ok · 1 the verdict is \"not good enough\" · 2 usage or invalid input · \
                           3 input/output · 130 interrupted";
 
@@ -52,79 +52,97 @@ struct Cli {
 /// Options of every verb.
 #[derive(Debug, Clone, Args)]
 struct Global {
-    /// Threads to compute with; all of the machine's by default. Changes speed, never results.
+    /// Number of threads; all of the machine by default. Affects speed, never results.
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
-    /// Say more on stderr.
+    /// Print more on stderr.
     #[arg(short, long, global = true, action = ArgAction::Count)]
     verbose: u8,
-    /// Say nothing on stderr but errors.
+    /// Print nothing but errors on stderr.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,
 }
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// The whole story on the built-in scene: simulate, calibrate, score, report
+    /// Simulate, calibrate, score and report on the built-in scene
     Demo(demo::Arguments),
     /// Write a commented scene to start from
     New(new::Arguments),
-    /// Read a scene and say everything that is wrong with it
+    /// Read a scene and report everything that is wrong with it
     Check(check::Arguments),
     /// Simulate an experiment and write what it would have recorded
     Simulate(simulate::Arguments),
-    /// Follow any rays through a scene's mirrors
+    /// Trace arbitrary rays through a scene's mirrors
     Trace(trace::Arguments),
-    /// Find out what the bare sensor's ranges are off by: Tables 1 to 4, Eqs. 3 to 5
+    /// Measure the range errors of the bare sensor: Tables 1 to 4, Eqs. (3)–(5)
     Characterize(characterize::Arguments),
     /// Estimate where every mirrored beam goes
     Calibrate(calibrate::Arguments),
-    /// Say whether a calibration is well formed and physically sane
+    /// Check that a calibration is well formed and physically plausible
     Validate(validate::Arguments),
-    /// Compare a calibration with the truth, or, without one, with boards and walls
+    /// Compare a calibration with the truth or, without one, with boards and walls
     Score(score::Arguments),
-    /// Put several calibrations of one dataset side by side, ours or anybody's
+    /// Compare several calibrations of one dataset, ours or third-party
     Compare(compare::Arguments),
-    /// Run many experiments and say what their errors have in common
+    /// Run many experiments and report the statistics of their errors
     Study(study::Arguments),
-    /// Say which board poses to record next, and what each gains
+    /// Plan which board poses to record next, and what each one gains
     Plan(plan::Arguments),
-    /// Say what a mirror layout sees, loses and allows; several side by side
+    /// Analyze the coverage, losses and attainable accuracy of mirror layouts
     Layout(layout::Arguments),
     /// Search a scene's parameters for better layouts
     Optimize(optimize::Arguments),
-    /// Say what manufacturing errors do to a layout, and what a calibration leaves of them
+    /// Analyze the effect of manufacturing errors on a layout, before and after calibration
     Tolerance(tolerance::Arguments),
     /// Write a layout as solids, a 3D scene, a drawing table or frames
     Export(export::Arguments),
     /// Turn a scan into a point cloud
     Apply(apply::Arguments),
-    /// Write a page to read about calibrations and their scores
+    /// Write an HTML page about calibrations and their scores
     Report(report::Arguments),
     /// Print the JSON Schema of scenes
     Schema,
-    /// Print completions for a shell
+    /// Print the completion script of a shell
     Completions(completions::Arguments),
     /// Print the manual page, or write all of them
     Man(man::Arguments),
 }
 
-/// What every verb is given beside its own arguments.
-#[derive(Debug)]
-struct Context {
+/// What every verb receives in addition to its own arguments.
+pub(crate) struct Context {
     global: Global,
+    /// The command line as given, without the program's name.
+    given: Vec<OsString>,
+    stop: Stop,
+    reporter: Arc<Reporter>,
 }
 
 impl Context {
-    /// Says something on stderr, unless asked to be quiet.
+    /// The control of a long verb: it stops on Ctrl-C and reports progress on stderr.
+    fn control(&self) -> Control {
+        let reporter = self.reporter.clone();
+        Control {
+            stop: self.stop.clone(),
+            progress: Some(Arc::new(move |progress| reporter.report(progress))),
+            threads: None,
+        }
+    }
+
+    /// Returns an error once Ctrl-C has been pressed.
+    fn check(&self) -> Result<(), CliError> {
+        Ok(self.stop.check().map_err(catoptric::Error::from)?)
+    }
+
+    /// Prints a line on stderr, unless `--quiet` is set.
     fn say(&self, text: &str) {
         if !self.global.quiet {
-            // With stderr closed there is nobody left to tell.
+            // If stderr is closed, there is nowhere left to report to.
             let _ = writeln!(anstream::stderr(), "{text}");
         }
     }
 
-    /// Says more, for those who asked for it.
+    /// Prints a line on stderr if `--verbose` is set.
     fn detail(&self, text: &str) {
         if self.global.verbose > 0 {
             self.say(text);
@@ -132,52 +150,71 @@ impl Context {
     }
 }
 
-/// Runs the program.
-pub(crate) fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+/// Runs the program on its arguments, the first of which is its name, and returns its exit code.
+///
+/// Results go to standard output, everything else to standard error. Ctrl-C stops the current run.
+pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> u8 {
+    let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
+    let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(error) => {
-            // Help on a closed pipe has nobody to read it; there is nothing to add.
+            // If the help goes to a closed pipe, there is nothing left to do.
             let _ = error.print();
-            return u8::try_from(error.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from);
+            return u8::try_from(error.exit_code()).unwrap_or(1);
         }
     };
-    match run(cli) {
-        Ok(()) => ExitCode::SUCCESS,
+    let context = Context {
+        stop: interrupt::listen(),
+        reporter: Arc::new(Reporter::new(cli.global.quiet)),
+        given: arguments.into_iter().skip(1).collect(),
+        global: cli.global,
+    };
+    let ended = on_threads(context.global.threads, || {
+        let ended = dispatch(&cli.verb, &context);
+        context.reporter.finish();
+        ended
+    });
+    match ended {
+        Ok(()) => 0,
         Err(error) => error.report(),
     }
 }
 
-fn run(cli: Cli) -> Result<(), CliError> {
-    interrupt::install();
-    let context = Context { global: cli.global };
-    if let Some(threads) = context.global.threads {
-        // Fails only if a pool exists already, and this is the first statement that could make one.
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into());
-        pool.build_global()
-            .map_err(|e| CliError::Output(std::io::Error::other(e)))?;
-    }
-    match cli.verb {
-        Verb::Demo(arguments) => demo::run(&arguments, &context),
-        Verb::Simulate(arguments) => simulate::run(&arguments, &context),
-        Verb::Trace(arguments) => trace::run(&arguments, &context),
-        Verb::Characterize(arguments) => characterize::run(&arguments, &context),
-        Verb::Calibrate(arguments) => calibrate::run(&arguments, &context),
-        Verb::Validate(arguments) => validate::run(&arguments),
-        Verb::Score(arguments) => score::run(&arguments, &context),
-        Verb::Compare(arguments) => compare::run(&arguments),
-        Verb::Study(arguments) => study::run(&arguments, &context),
-        Verb::Plan(arguments) => plan::run(&arguments, &context),
-        Verb::Layout(arguments) => layout::run(&arguments, &context),
-        Verb::Optimize(arguments) => optimize::run(&arguments, &context),
-        Verb::Tolerance(arguments) => tolerance::run(&arguments, &context),
-        Verb::Export(arguments) => export::run(&arguments, &context),
-        Verb::Apply(arguments) => apply::run(&arguments, &context),
-        Verb::Report(arguments) => report::run(&arguments, &context),
-        Verb::New(arguments) => new::run(&arguments),
-        Verb::Check(arguments) => check::run(&arguments, &context),
+/// Runs some work on a pool of the given number of threads; on all of the machine's by default.
+fn on_threads(
+    threads: Option<u16>,
+    work: impl FnOnce() -> Result<(), CliError> + Send,
+) -> Result<(), CliError> {
+    let Some(threads) = threads else { return work() };
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads.into())
+        .build()
+        .map_err(|e| catoptric::Error::Threads(e.to_string()))?
+        .install(work)
+}
+
+fn dispatch(verb: &Verb, context: &Context) -> Result<(), CliError> {
+    match verb {
+        Verb::Demo(arguments) => demo::run(arguments, context),
+        Verb::Simulate(arguments) => simulate::run(arguments, context),
+        Verb::Trace(arguments) => trace::run(arguments, context),
+        Verb::Characterize(arguments) => characterize::run(arguments, context),
+        Verb::Calibrate(arguments) => calibrate::run(arguments, context),
+        Verb::Validate(arguments) => validate::run(arguments),
+        Verb::Score(arguments) => score::run(arguments, context),
+        Verb::Compare(arguments) => compare::run(arguments),
+        Verb::Study(arguments) => study::run(arguments, context),
+        Verb::Plan(arguments) => plan::run(arguments, context),
+        Verb::Layout(arguments) => layout::run(arguments, context),
+        Verb::Optimize(arguments) => optimize::run(arguments, context),
+        Verb::Tolerance(arguments) => tolerance::run(arguments, context),
+        Verb::Export(arguments) => export::run(arguments, context),
+        Verb::Apply(arguments) => apply::run(arguments, context),
+        Verb::Report(arguments) => report::run(arguments, context),
+        Verb::New(arguments) => new::run(arguments),
+        Verb::Check(arguments) => check::run(arguments, context),
         Verb::Schema => schema::run(),
-        Verb::Completions(arguments) => completions::run(&arguments),
-        Verb::Man(arguments) => man::run(&arguments),
+        Verb::Completions(arguments) => completions::run(arguments),
+        Verb::Man(arguments) => man::run(arguments),
     }
 }

@@ -1,8 +1,9 @@
-//! `catoptric new`: a commented scene to start from.
+//! `catoptric new`: writes a commented scene to start from.
 
 use super::error::CliError;
 use super::output::{print, quoted};
-use catoptric::io::scene::{self, Layout};
+use catoptric::Template;
+use catoptric::files::IoError;
 use clap::{Args, ValueEnum};
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
@@ -23,9 +24,9 @@ pub(crate) struct Arguments {
 enum LayoutName {
     /// Eight facets around the scanner
     Prototype,
-    /// Two mirrors beside a 270° scanner
+    /// Two mirrors on either side of a 270° scanner
     TwoMirror,
-    /// Half a hexagonal pyramid before the scanner
+    /// Half a hexagonal pyramid in front of the scanner
     Pyramid,
     /// A small mirror that folds eleven beams straight down
     Altimeter,
@@ -34,40 +35,36 @@ enum LayoutName {
 pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
     let path = &arguments.name;
     if path.extension().is_none_or(|e| e != "toml") {
-        return Err(CliError::Invalid {
-            message: format!(
-                "{} does not end in .toml, which scenes are written in",
+        return Err(CliError::invalid(
+            format!(
+                "{} does not end in .toml, the format of new scenes",
                 path.display()
             ),
-            help: Some(format!("catoptric new {}", quoted(&path.with_extension("toml")))),
-        });
+            format!("catoptric new {}", quoted(&path.with_extension("toml"))),
+        ));
     }
-    let text = scene::scene_template(match arguments.layout {
-        LayoutName::Prototype => Layout::Prototype,
-        LayoutName::TwoMirror => Layout::TwoMirror,
-        LayoutName::Pyramid => Layout::Pyramid,
-        LayoutName::Altimeter => Layout::Altimeter,
-    });
-    // `create_new` leaves no moment in which another program's file could be overwritten.
+    let template = match arguments.layout {
+        LayoutName::Prototype => Template::Prototype,
+        LayoutName::TwoMirror => Template::TwoMirror,
+        LayoutName::Pyramid => Template::Pyramid,
+        LayoutName::Altimeter => Template::Altimeter,
+    };
+    // `create_new` is atomic: a file that another program creates meanwhile cannot be overwritten.
     let file = OpenOptions::new().write(true).create_new(true).open(path);
     let mut file = file.map_err(|source| match source.kind() {
-        ErrorKind::AlreadyExists => CliError::Invalid {
-            message: format!("{} exists already and is left as it is", path.display()),
-            help: Some("choose another name, or remove the file first".to_owned()),
-        },
-        _ => CliError::Write {
-            path: path.clone(),
-            source,
-        },
+        ErrorKind::AlreadyExists => CliError::invalid(
+            format!("{} exists already and was not changed", path.display()),
+            "choose another name, or remove the file first".to_owned(),
+        ),
+        _ => IoError::write(path, source).into(),
     })?;
-    let written = file.write_all(text.as_bytes()).and_then(|()| file.sync_all());
+    let written = file
+        .write_all(template.text().as_bytes())
+        .and_then(|()| file.sync_all());
     if let Err(source) = written {
-        // Half a scene is worse than none.
+        // An incomplete scene is worse than none.
         let _ = std::fs::remove_file(path);
-        return Err(CliError::Write {
-            path: path.clone(),
-            source,
-        });
+        return Err(IoError::write(path, source).into());
     }
     print(&format!(
         "wrote {}\nnext: catoptric check {}\n",

@@ -1,19 +1,15 @@
-//! `catoptric optimize`: a search of a scene's parameters for better layouts.
+//! `catoptric optimize`: searches the parameters of a scene for better layouts.
 
 use super::Context;
 use super::error::CliError;
-use super::interrupt;
-use super::output::{counted, grouped, print, quoted};
-use super::progress::Progress;
-use catoptric::io::template::Template;
-use catoptric::io::{self, IoError, scene};
+use super::output::{counted, grouped, print, print_json, quoted};
 use catoptric::layout::{Detail, Requirement, RequirementError};
-use catoptric::optimize::{
-    Better, Candidate, Goal, GoalError, OptimizeError, Optimum, Options, Wanted, optimize,
+use catoptric::optimize::{Better, Candidate, Goal, GoalError, OptimizeError, Optimum, Options, Wanted};
+use catoptric::{
+    BEST_SCENE, Error, OPTIMUM_PAGE, Scene, optimize, report, shown_of_front as shown, write_optimum,
 };
-use catoptric::report;
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Arguments of `optimize`.
@@ -22,79 +18,73 @@ pub(crate) struct Arguments {
     /// The scene, TOML or JSON, with parameters that have `low` and `high`.
     scene: PathBuf,
     /// What to improve: field_of_regard, split_beams, lost_beams, predicted_accuracy, size, directions, or a figure of
-    /// `layout --json` and its way: share_within_5_deg:up. May be given more than once.
+    /// `layout --json` with up or down: share_within_5_deg:up. May be given more than once.
     #[arg(long, required = true, value_name = "GOAL")]
     goal: Vec<String>,
-    /// A direction for the goal `directions`, in degrees, and how many elements should look there: 90,-60,4. May be given
+    /// A direction for the goal `directions`, in degrees, and the number of elements wanted there: 90,-60,4. May be given
     /// more than once.
     #[arg(long, value_name = "AZIMUTH,ELEVATION[,ELEMENTS]", allow_hyphen_values = true)]
     direction: Vec<String>,
-    /// A limit that every layout has to keep: "facets.*.margin_mm>=0.3", "stopped_by_facets<=0". May be given more than
+    /// A limit that every layout must meet: "facets.*.margin_mm>=0.3", "stopped_by_facets<=0". May be given more than
     /// once.
     #[arg(long, value_name = "FIGURE>=NUMBER")]
     require: Vec<String>,
-    /// How many layouts to look at.
+    /// Number of layouts to evaluate.
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(20..=10_000_000))]
     evaluations: u32,
     /// Seed of the search.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// One ray per beam: many times faster, and blind to beams that an edge cuts.
+    /// Use one ray per beam: many times faster, but split beams go unnoticed.
     #[arg(long)]
     coarse: bool,
-    /// Change a value first: superstructure.mirror.reflectivity=0.95, parameters.reach_mm=70.
+    /// Change a value of the scene first: superstructure.mirror.reflectivity=0.95, parameters.reach_mm=70.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Write optimum.json, front.csv, front.svg, a page, report.html, and the best layouts as scenes into this folder.
+    /// Write optimum.json, front.csv, front.svg, a page, report.html, and the best layouts as scenes to this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print what was found as JSON.
+    /// Print the result as JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// Layouts of the front that are shown and written, at most.
-const SHOWN: usize = 12;
-
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let options = options(arguments)?;
-    let template = Template::load(&arguments.scene, &arguments.set)?;
+    let scene = Scene::load_with(&arguments.scene, &arguments.set)?;
     let begin = Instant::now();
-    let mut progress = Progress::new(context, "searching", options.evaluations);
-    let found = optimize(&template, &options, &mut |p| {
-        progress.advance(p.more);
-        interrupt::check().is_ok()
-    });
-    drop(progress);
-    let found = found.map_err(refused)?;
+    let found = optimize(&scene, &options, &context.control()).map_err(|error| match error {
+        Error::Optimize(error) => refused(error),
+        other => other.into(),
+    })?;
+    context.reporter.finish();
     context.say(&format!(
-        "looked at {} in {:.1} s",
+        "evaluated {} in {:.1} s",
         counted(found.evaluations, "layout"),
         begin.elapsed().as_secs_f64()
     ));
-    let json = serde_json::to_string(&found).map_err(|e| CliError::Output(e.into()))? + "\n";
     let mut next = String::new();
     if let Some(out) = &arguments.out {
-        write(out, &json, &template, &found)?;
-        next = format!("wrote {}\n", quoted(&out.join(PAGE)));
+        write_optimum(&scene, &found, out)?;
+        next = format!("wrote {}\n", quoted(&out.join(OPTIMUM_PAGE)));
         if found.best.is_some() {
             next += &format!(
                 "next: catoptric layout {} {} --out side-by-side\n",
                 quoted(&arguments.scene),
-                quoted(&out.join(BEST))
+                quoted(&out.join(BEST_SCENE))
             );
         }
     }
     if arguments.json {
-        print(&json)?;
+        print_json(&found)?;
     } else {
         print(&(text(&found) + &next))?;
     }
-    interrupt::check()?;
+    context.check()?;
     if found.best.is_none() {
         let nearest = found.start.unmet.join("\n");
         return Err(CliError::Verdict(format!(
-            "no layout that was looked at keeps every requirement; as drawn:\n{nearest}"
+            "no evaluated layout meets every requirement; as drawn:\n{nearest}"
         )));
     }
     Ok(())
@@ -116,10 +106,8 @@ fn options(arguments: &Arguments) -> Result<Options, CliError> {
     }
     for (number, goal) in goals.iter().enumerate() {
         if goals[..number].iter().any(|g| g.name() == goal.name()) {
-            return Err(CliError::Invalid {
-                message: format!("--goal {} is given twice", goal.name()),
-                help: None,
-            });
+            let message = format!("--goal {} is given twice", goal.name());
+            return Err(CliError::invalid(message, None));
         }
     }
     let requirements: Result<Vec<Requirement>, RequirementError> = arguments
@@ -156,111 +144,15 @@ fn refused(error: OptimizeError) -> CliError {
             Some("--require 'facets.*.margin_mm>=0.3'".to_owned())
         }
         OptimizeError::Requirement(RequirementError::Unknown { help, .. }) => Some(help.clone()),
-        OptimizeError::Search(_) => return CliError::Output(std::io::Error::other(error)),
+        OptimizeError::Search(_) => return Error::from(error).into(),
         OptimizeError::Setup(_) => None,
     };
-    CliError::Invalid {
-        message: error.to_string(),
-        help,
-    }
+    CliError::invalid(error.to_string(), help)
 }
 
-/// Names of what is written.
-const JSON: &str = "optimum.json";
-const PAGE: &str = "report.html";
-const PICTURE: &str = "front.svg";
-const TABLE: &str = "front.csv";
-const BEST: &str = "best.toml";
-
-fn write(out: &Path, json: &str, template: &Template, found: &Optimum) -> Result<(), CliError> {
-    std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
-    if let Some(best) = &found.best {
-        write_scene(&out.join(BEST), template, best)?;
-    }
-    for (number, candidate) in shown(found).into_iter().enumerate() {
-        write_scene(
-            &out.join(format!("front-{:02}.toml", number + 1)),
-            template,
-            candidate,
-        )?;
-    }
-    io::write_file(out.join(TABLE), table(found)?.as_slice())?;
-    if let Some(picture) = report::front_picture(found) {
-        io::write_file(out.join(PICTURE), picture.as_bytes())?;
-    }
-    io::write_file(out.join(PAGE), report::optimum(found).as_bytes())?;
-    io::write_file(out.join(JSON), json.as_bytes())?;
-    Ok(())
-}
-
-/// A layout as a scene, with the meshes that it names beside it.
-fn write_scene(path: &Path, template: &Template, candidate: &Candidate) -> Result<(), CliError> {
-    let choice = candidate.choice();
-    let refused = |problems: Vec<String>| CliError::Output(std::io::Error::other(problems.join("; ")));
-    let found = template.with(&choice).map_err(refused)?;
-    let (kept, meshes) = scene::kept(&found);
-    let folder = path.parent().unwrap_or(Path::new("."));
-    for (name, bytes) in meshes {
-        let mesh = folder.join(name);
-        if let Some(parent) = mesh.parent() {
-            std::fs::create_dir_all(parent).map_err(|e| IoError::write(parent, e))?;
-        }
-        io::write_file(mesh, &bytes)?;
-    }
-    let text = template
-        .text_with(&choice, &kept)
-        .ok_or_else(|| refused(vec!["a number that TOML cannot hold".to_owned()]))?;
-    let goals: Vec<String> = candidate
-        .goals
-        .iter()
-        .map(|(name, value)| format!("{name} {value:.6}"))
-        .collect();
-    let text = format!(
-        "# Found by catoptric optimize in {}: {}.\n{text}",
-        template.name(),
-        goals.join(", ")
-    );
-    io::write_file(path, text.as_bytes())?;
-    Ok(())
-}
-
-/// The front, or some of it from one end to the other.
-fn shown(found: &Optimum) -> Vec<&Candidate> {
-    let count = found.front.len();
-    if count <= SHOWN {
-        return found.front.iter().collect();
-    }
-    (0..SHOWN)
-        .map(|k| &found.front[k * (count - 1) / (SHOWN - 1)])
-        .collect()
-}
-
-/// The whole front as CSV.
-fn table(found: &Optimum) -> Result<Vec<u8>, CliError> {
-    let failed = |e: csv::Error| CliError::Output(std::io::Error::other(e));
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    let goals = || found.goals.iter().map(|g| g.name.clone());
-    let parameters = || found.parameters.iter().map(|p| p.name.clone());
-    let heading: Vec<String> = std::iter::once("number".to_owned())
-        .chain(goals())
-        .chain(parameters())
-        .collect();
-    writer.write_record(heading).map_err(failed)?;
-    for candidate in &found.front {
-        let values = goals().map(|g| candidate.goals.get(&g).copied());
-        let values = values.chain(parameters().map(|p| candidate.parameters.get(&p).copied()));
-        let values = values.map(|v| v.map_or_else(String::new, |v| v.to_string()));
-        let row: Vec<String> = std::iter::once(candidate.number.to_string())
-            .chain(values)
-            .collect();
-        writer.write_record(row).map_err(failed)?;
-    }
-    writer.into_inner().map_err(|e| CliError::Output(e.into_error()))
-}
-
-/// What was found, for people.
+/// The result as text.
 fn text(found: &Optimum) -> String {
-    let way = |better: Better| match better {
+    let arrow = |better: Better| match better {
         Better::Up => "up",
         Better::Down => "down",
     };
@@ -272,12 +164,12 @@ fn text(found: &Optimum) -> String {
                 "{}{} {}",
                 g.name,
                 g.unit.map_or_else(String::new, |u| format!(" ({u})")),
-                way(g.better)
+                arrow(g.better)
             )
         })
         .collect();
     let mut text = format!(
-        "{}: {} on the front of {} that keep the requirements; goals: {}{}\n",
+        "{}: {} on the front of {} that meet the requirements; goals: {}{}\n",
         found.name,
         counted(found.front.len(), "layout"),
         grouped(found.tried.len()),
@@ -313,9 +205,9 @@ fn text(found: &Optimum) -> String {
     }
     if let Some(best) = &found.best {
         text += if found.beats_start_in_every_goal {
-            "  the best is better than the drawing in every goal\n"
+            "  the best layout beats the drawing in every goal\n"
         } else {
-            "  nothing is better than the drawing in every goal\n"
+            "  no layout beats the drawing in every goal\n"
         };
         for open in &found.parameters {
             let value = best.parameters.get(&open.name).copied().unwrap_or(open.start);

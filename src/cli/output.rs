@@ -1,9 +1,10 @@
-//! Standard output: data and results, and a quiet end when nobody reads them.
+//! Standard output: data and results; a closed pipe ends the program quietly.
 
 use super::error::CliError;
+pub(crate) use catoptric::files::paths::quoted;
 use std::io::{ErrorKind, Write};
 
-/// Writes text to stdout as it is.
+/// Writes text to stdout unchanged.
 pub(crate) fn print(text: &str) -> Result<(), CliError> {
     let mut stdout = std::io::stdout().lock();
     let written = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush());
@@ -13,7 +14,13 @@ pub(crate) fn print(text: &str) -> Result<(), CliError> {
     })
 }
 
-/// Digits in groups of three, for people.
+/// Writes a result to stdout as one line of JSON.
+pub(crate) fn print_json(value: &impl serde::Serialize) -> Result<(), CliError> {
+    let json = serde_json::to_string(value).map_err(|e| CliError::Output(e.into()))?;
+    print(&format!("{json}\n"))
+}
+
+/// Formats a number with its digits in groups of three.
 pub(crate) fn grouped(number: usize) -> String {
     let digits = number.to_string();
     let mut out = String::new();
@@ -26,17 +33,6 @@ pub(crate) fn grouped(number: usize) -> String {
     out
 }
 
-/// A path as a shell takes it.
-pub(crate) fn quoted(path: &std::path::Path) -> String {
-    let text = path.display().to_string();
-    let plain = |c: char| c.is_alphanumeric() || "/\\._-+:".contains(c);
-    if !text.is_empty() && text.chars().all(plain) {
-        text
-    } else {
-        format!("'{}'", text.replace('\'', r"'\''"))
-    }
-}
-
 /// "1 board", "2 boards".
 pub(crate) fn counted(number: usize, what: &str) -> String {
     format!("{} {what}{}", grouped(number), if number == 1 { "" } else { "s" })
@@ -47,16 +43,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn digits_stand_in_threes() {
+    fn digits_are_grouped_in_threes() {
         assert_eq!(grouped(0), "0");
         assert_eq!(grouped(999), "999");
         assert_eq!(grouped(1000), "1 000");
         assert_eq!(grouped(1_234_567), "1 234 567");
-    }
-
-    #[test]
-    fn a_path_with_a_space_is_quoted() {
-        assert_eq!(quoted("a/b.toml".as_ref()), "a/b.toml");
-        assert_eq!(quoted("my scene's".as_ref()), r"'my scene'\''s'");
     }
 }

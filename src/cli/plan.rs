@@ -1,57 +1,53 @@
-//! `catoptric plan`: which board poses to record next, from the drawing or for what a dataset lacks.
+//! `catoptric plan`: plans which board poses to record next, from the drawing or for what a dataset lacks.
 
 use super::Context;
 use super::error::CliError;
-use super::interrupt;
-use super::output::{counted, print, quoted};
-use super::progress::Progress;
-use catoptric::calib::plan::{self, FacetPlan, Open, Plan, PlannedPose, Request, Situation, Standing};
-use catoptric::io::{self, dataset, scene};
-use catoptric::model::Dataset;
-use catoptric::plan::{PlanError, completed, situation, with_poses};
-use catoptric::report;
-use catoptric::sim::{Scene, check};
-use clap::{Args, ValueEnum};
-use rayon::prelude::*;
-use std::path::{Path, PathBuf};
+use super::one_of::one_of;
+use super::output::{counted, print, print_json, quoted};
+use catoptric::calib::plan::{Criterion, FacetPlan, Open, Plan, PlannedPose, Request, Standing};
+use catoptric::files::{self, dataset};
+use catoptric::{
+    Dataset, PlanStart, Scene, completed_scene, plan, planned_scene, read_dataset, report, write_planned,
+};
+use clap::Args;
+use std::path::PathBuf;
 use std::time::Instant;
 
-/// Reasons printed for each facet before the rest is only counted.
+/// Number of reasons printed per facet; the rest is only counted.
 const REASONS: usize = 4;
 
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// A scene, before anything is recorded, or a dataset: what its boards tell is the start.
+    /// A scene, before anything is recorded, or a dataset, whose boards are the starting point.
     #[arg(value_name = "SCENE|DATASET")]
     input: PathBuf,
-    /// Board poses for each facet.
+    /// Number of board poses per facet.
     #[arg(long, value_name = "K", default_value_t = 5, value_parser = clap::value_parser!(u16).range(1..=100))]
     poses: u16,
-    /// Plan for this facet alone; may be given more than once.
+    /// Plan for this facet only; may be given more than once.
     #[arg(long, value_name = "NAME")]
     facet: Vec<String>,
-    /// What is to be small over the elements of a facet.
-    #[arg(long, value_enum, default_value_t = CriterionName::D)]
-    criterion: CriterionName,
-    /// Least and greatest way from mirror to board, in metres.
+    /// What to minimize over the elements of a facet.
     #[arg(
         long,
-        value_name = "LEAST,GREATEST",
-        value_delimiter = ',',
-        default_value = "0.5,4"
+        value_parser = one_of(&Criterion::ALL, Criterion::name, Criterion::about),
+        default_value = Criterion::default().name()
     )]
+    criterion: Criterion,
+    /// Minimum and maximum distance from mirror to board, in meters.
+    #[arg(long, value_name = "MIN,MAX", value_delimiter = ',', default_value = "0.5,4")]
     range_m: Vec<f64>,
-    /// Largest incidence of a beam on a board, in degrees.
+    /// Maximum incidence of a beam on a board, in degrees.
     #[arg(long, value_name = "DEG", default_value_t = 60.0)]
     max_incidence_deg: f64,
-    /// Where the sequence of possible poses begins.
+    /// Seed of the sequence of candidate poses.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Change a value of the scene first: experiment.scans_per_pose=20.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// Write the scene with these poses in it, ready to be simulated.
+    /// Write the scene with the planned poses, ready to simulate.
     #[arg(long, value_name = "scene.toml")]
     out: Option<PathBuf>,
     /// Write a page with pictures of the room.
@@ -62,103 +58,55 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum CriterionName {
-    /// The area of the error ellipse: mean log det of the covariance
-    D,
-    /// The mean square error: mean trace of the covariance
-    A,
-}
-
 /// Where the plan starts from.
-enum Start {
+enum Source {
     Drawing(Box<Scene>),
     Recording(Box<Dataset>),
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let begin = Instant::now();
-    let (start, situation, readings) = start(arguments)?;
-    interrupt::check()?;
-    let facets = facets(arguments, &situation)?;
-    let request = request(arguments, readings)?;
-    let mut progress = Progress::new(context, "planning", facets.len());
-    let mut planned: Vec<FacetPlan> = Vec::with_capacity(facets.len());
-    for some in facets.chunks(rayon::current_num_threads()) {
-        interrupt::check()?;
-        let found: Result<Vec<FacetPlan>, _> = some
-            .par_iter()
-            .map(|facet| plan::plan_facet(&situation, facet, &request))
-            .collect();
-        planned.extend(found.map_err(impossible)?);
-        progress.advance(some.len());
-    }
-    drop(progress);
-    interrupt::check()?;
-    let plan = Plan {
-        schema_version: plan::SCHEMA_VERSION,
-        criterion: request.criterion,
-        facets: planned,
+    let source = source(arguments)?;
+    let start = match &source {
+        Source::Drawing(scene) => PlanStart::of_scene(scene)?,
+        Source::Recording(dataset) => PlanStart::of_dataset(dataset)?,
     };
-    let written = write(arguments, &start, &situation, &plan)?;
+    context.check()?;
+    let facets = start.facets(&arguments.facet)?;
+    let request = request(arguments, start.readings)?;
+    let plan = plan(&start, &facets, &request, &context.control())?;
+    let written = write(arguments, context, &source, &start, &plan)?;
     context.detail(&format!("planned in {:.2} s", begin.elapsed().as_secs_f64()));
     if arguments.json {
-        let json = serde_json::to_string(&plan).map_err(|e| CliError::Output(e.into()))?;
-        return print(&format!("{json}\n"));
+        return print_json(&plan);
     }
     let facets: String = plan.facets.iter().map(text).collect();
     print(&(facets + &written))
 }
 
-fn start(arguments: &Arguments) -> Result<(Start, Situation, usize), CliError> {
+fn source(arguments: &Arguments) -> Result<Source, CliError> {
     if !arguments.input.is_dir() {
-        let scene = scene::load(&arguments.input, &arguments.set)?;
-        let situation = situation(&scene).map_err(|error| match error {
-            PlanError::Scene(error) => error.into(),
-            PlanError::Plan(error) => impossible(error),
-        })?;
-        let readings = scene.experiment.scans_per_pose as usize;
-        return Ok((Start::Drawing(Box::new(scene)), situation, readings));
+        let scene = Scene::load_with(&arguments.input, &arguments.set)?;
+        return Ok(Source::Drawing(Box::new(scene)));
     }
     if !arguments.set.is_empty() {
-        return Err(CliError::Invalid {
-            message: "--set changes a scene; a dataset is what it is".to_owned(),
-            help: None,
-        });
+        let message = "--set changes a scene; a dataset cannot be changed";
+        return Err(CliError::invalid(message, None));
     }
-    let dataset = io::read_dataset(&arguments.input)?;
-    let situation = Situation::recorded(&dataset)?;
-    // What is recorded next is taken to be recorded as long as what there is: the median, for one odd stretch.
-    let mut scans: Vec<usize> = dataset
-        .poses
-        .iter()
-        .filter(|p| p.room_from_board.is_some())
-        .map(|p| p.label.scans)
-        .collect();
-    scans.sort_unstable();
-    let readings = scans
-        .get(scans.len() / 2)
-        .copied()
-        .unwrap_or(Request::default().readings);
-    Ok((Start::Recording(Box::new(dataset)), situation, readings))
+    Ok(Source::Recording(Box::new(read_dataset(&arguments.input)?)))
 }
 
 fn request(arguments: &Arguments, readings: usize) -> Result<Request, CliError> {
     let &[least, greatest] = arguments.range_m.as_slice() else {
-        return Err(CliError::Invalid {
-            message: format!(
-                "--range-m takes two numbers, it was given {}",
-                arguments.range_m.len()
-            ),
-            help: Some("--range-m 0.5,4".to_owned()),
-        });
+        let given = arguments.range_m.len();
+        return Err(CliError::invalid(
+            format!("--range-m takes two numbers, not {given}"),
+            "--range-m 0.5,4".to_owned(),
+        ));
     };
     Ok(Request {
         poses: arguments.poses.into(),
-        criterion: match arguments.criterion {
-            CriterionName::D => plan::Criterion::D,
-            CriterionName::A => plan::Criterion::A,
-        },
+        criterion: arguments.criterion,
         seed: arguments.seed,
         range_m: [least, greatest],
         max_incidence_deg: arguments.max_incidence_deg,
@@ -167,117 +115,56 @@ fn request(arguments: &Arguments, readings: usize) -> Result<Request, CliError> 
     })
 }
 
-/// The facets asked for, in the order of the session; all without a question.
-fn facets(arguments: &Arguments, situation: &Situation) -> Result<Vec<String>, CliError> {
-    let names: Vec<&str> = situation
-        .session()
-        .facets
-        .iter()
-        .map(|f| f.name.as_str())
-        .collect();
-    if names.is_empty() {
-        return Err(CliError::Invalid {
-            message: "there is no facet that a beam meets".to_owned(),
-            help: None,
-        });
-    }
-    if let Some(unknown) = arguments.facet.iter().find(|f| !names.contains(&f.as_str())) {
-        let near = check::nearest(unknown, names.iter().copied());
-        return Err(CliError::Invalid {
-            message: format!("no facet is called {unknown:?}; there are {}", names.join(", ")),
-            help: near.map(|near| format!("did you mean --facet {near}?")),
-        });
-    }
-    let asked = |name: &&str| arguments.facet.is_empty() || arguments.facet.iter().any(|f| f == name);
-    Ok(names.into_iter().filter(asked).map(str::to_owned).collect())
-}
-
-fn impossible(error: catoptric::calib::CalibError) -> CliError {
-    CliError::Invalid {
-        message: error.to_string(),
-        help: Some("see --range-m and --max-incidence-deg, or plan for one --facet at a time".to_owned()),
-    }
-}
-
-/// Writes what was asked for, and says so.
+/// Writes the requested files and returns the lines that report them.
 fn write(
     arguments: &Arguments,
-    start: &Start,
-    situation: &Situation,
+    context: &Context,
+    source: &Source,
+    start: &PlanStart,
     plan: &Plan,
 ) -> Result<String, CliError> {
     let mut said = String::new();
     if let Some(path) = &arguments.report {
-        io::write_file(path, report::plan(situation, plan).as_bytes())?;
+        files::write_file(path, report::plan(&start.situation, plan).as_bytes())?;
         said += &format!("wrote {}\n", path.display());
     }
     let Some(out) = &arguments.out else {
-        let blind = matches!(start, Start::Recording(_)) && !arguments.input.join(dataset::SCENE).exists();
+        let blind = matches!(source, Source::Recording(_)) && !arguments.input.join(dataset::SCENE).exists();
         let next = if blind {
-            "next: record these poses, and calibrate\n".to_owned()
+            "next: record these poses and calibrate\n".to_owned()
         } else {
-            // The same again, whatever was asked for.
-            let given: Vec<String> = std::env::args_os().skip(1).map(|a| quoted(a.as_ref())).collect();
+            // Repeats the command with all its options.
+            let given: Vec<String> = context.given.iter().map(|a| quoted(a.as_ref())).collect();
             format!("next: catoptric {} --out planned.toml\n", given.join(" "))
         };
         return Ok(said + &next);
     };
-    let (mut planned, folder) = match start {
-        Start::Drawing(scene) => (with_poses(scene, plan)?, folder_of(&arguments.input)),
-        Start::Recording(dataset) => {
+    let (planned, folder) = match source {
+        Source::Drawing(scene) => (planned_scene(scene, plan)?, scene.folder().to_owned()),
+        Source::Recording(dataset) => {
             let path = arguments.input.join(dataset::SCENE);
             if !path.exists() {
-                return Err(CliError::Invalid {
-                    message: format!(
-                        "{} is blind: there is no scene to put the poses in",
-                        arguments.input.display()
-                    ),
-                    help: Some("plan without --out".to_owned()),
-                });
+                let message = format!(
+                    "{} is blind: there is no scene to add the poses to",
+                    arguments.input.display()
+                );
+                return Err(CliError::invalid(message, "plan without --out".to_owned()));
             }
-            (
-                completed(&scene::load(&path, &[])?, dataset, plan),
-                folder_of(&path),
-            )
+            let scene = Scene::load(&path)?;
+            (completed_scene(&scene, dataset, plan), scene.folder().to_owned())
         }
     };
-    move_meshes(&mut planned, &folder, &folder_of(out))?;
-    let text = scene::to_toml(&planned).map_err(|e| CliError::Invalid {
-        message: format!("{}: {e}", out.display()),
-        help: None,
-    })?;
-    io::write_file(out, text.as_bytes())?;
+    let poses = planned.experiment.pose.len();
+    write_planned(planned, &folder, out)?;
     let stem = out.file_stem().unwrap_or(out.as_os_str()).to_string_lossy();
     Ok(said
         + &format!(
             "wrote {}: {}\nnext: catoptric simulate {} --out {}\n",
             out.display(),
-            counted(planned.experiment.pose.len(), "pose"),
+            counted(poses, "pose"),
             quoted(out),
             quoted(format!("{stem}-dataset").as_ref())
         ))
-}
-
-fn folder_of(path: &Path) -> PathBuf {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-    folder.unwrap_or(Path::new(".")).to_owned()
-}
-
-/// Meshes are named from the scene's folder; in another folder they get their whole path.
-fn move_meshes(scene: &mut Scene, from: &Path, to: &Path) -> Result<(), CliError> {
-    let whole = |path: &Path| {
-        path.canonicalize().map_err(|source| CliError::Write {
-            path: path.to_owned(),
-            source,
-        })
-    };
-    if scene.mesh_shapes().is_empty() || whole(from)? == whole(to)? {
-        return Ok(());
-    }
-    for mesh in scene.mesh_shapes_mut() {
-        mesh.file = whole(&from.join(&mesh.file))?.display().to_string();
-    }
-    Ok(())
 }
 
 fn text(facet: &FacetPlan) -> String {
@@ -313,7 +200,7 @@ fn line(number: usize, pose: &PlannedPose) -> String {
     let [x, y, z] = pose.center_m;
     let [yaw, pitch, roll] = pose.yaw_pitch_roll_deg;
     let served: Vec<String> = pose.beams.iter().map(|b| beams(*b)).collect();
-    // Beams that a pose opens up count from then on, so a bound without their number would not say which beams it is of.
+    // Beams that a pose determines are included from then on, so a bound is ambiguous without the number of open ones.
     let bound = |s: &Standing| match s.bound_deg {
         None => "all open".to_owned(),
         Some(deg) if s.open > 0 => format!("{deg:.4}° with {} open", s.open),

@@ -1,13 +1,11 @@
-//! `catoptric report`: one page to read about calibrations and their scores.
+//! `catoptric report`: writes one HTML page about calibrations and their scores.
 
 use super::Context;
 use super::error::CliError;
-use super::files::{read_calibration, read_truth};
-use super::interrupt;
 use super::output::print;
-use catoptric::apply::{CloudFrame, apply};
-use catoptric::io;
-use catoptric::score::score;
+use catoptric::apply::{CloudSketch, Lift};
+use catoptric::report::MAX_POINTS;
+use catoptric::{CloudFrame, Error, files, read_calibration_for, read_dataset, read_truth, report, score};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -16,7 +14,7 @@ use std::path::PathBuf;
 pub(crate) struct Arguments {
     /// The dataset.
     dataset: PathBuf,
-    /// The calibrations; the fans of the first are drawn.
+    /// The calibrations; the fans of the first one are drawn.
     #[arg(required = true)]
     calibrations: Vec<PathBuf>,
     /// The page to write.
@@ -25,28 +23,28 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let dataset = io::read_dataset(&arguments.dataset)?;
+    let dataset = read_dataset(&arguments.dataset)?;
     let truth = read_truth(&arguments.dataset)?;
     let mut results = Vec::new();
     for path in &arguments.calibrations {
-        interrupt::check()?;
-        let calibration = read_calibration(path)?;
-        let result = score(&dataset, &calibration, truth.as_ref());
+        context.check()?;
+        let calibration = read_calibration_for(path, &dataset.session)?;
+        let result = score(&dataset, &calibration, truth.as_ref()).map_err(Error::from)?;
         results.push((calibration, result));
     }
     let cloud = results
         .first()
-        .map(|(calibration, _)| apply(&dataset, calibration, None, CloudFrame::Room));
+        .map(|(calibration, _)| Lift::new(&dataset, calibration, None, CloudFrame::Room));
     let cloud = match cloud {
-        Some(Ok(cloud)) => Some(cloud),
+        Some(Ok(lift)) => Some(CloudSketch::of(&lift, MAX_POINTS).map_err(Error::from)?),
         Some(Err(error)) => {
-            context.say(&format!("without a cloud: {error}"));
+            context.say(&format!("no cloud: {error}"));
             None
         }
         None => None,
     };
-    let html = catoptric::report::report(&dataset, truth.as_ref(), &results, cloud.as_ref());
-    io::write_file(&arguments.out, html.as_bytes())?;
+    let html = report(&dataset, truth.as_ref(), &results, cloud.as_ref());
+    files::write_file(&arguments.out, html.as_bytes())?;
     print(&format!(
         "wrote {path}\nnext: open {path} in a browser\n",
         path = arguments.out.display()

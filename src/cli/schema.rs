@@ -1,8 +1,8 @@
-//! `catoptric schema`: the JSON Schema of scenes, for editors.
+//! `catoptric schema`: prints the JSON Schema of scenes, for editors.
 
 use super::error::CliError;
 use super::output::print;
-use catoptric::io::scene;
+use catoptric::files::scene;
 
 pub(crate) fn run() -> Result<(), CliError> {
     print(&format!("{:#}\n", scene::file_schema()))

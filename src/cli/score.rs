@@ -1,11 +1,9 @@
-//! `catoptric score`: a calibration against the truth; on blind data, against boards and walls.
+//! `catoptric score`: compares a calibration with the truth or, on blind data, with boards and walls.
 
 use super::Context;
 use super::error::CliError;
-use super::files::{read_calibration, read_truth};
 use super::output::{print, quoted};
-use catoptric::io;
-use catoptric::score::{Score, Verdict, score};
+use catoptric::{Error, Score, Verdict, read_calibration_for, read_dataset, read_truth, score};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -16,7 +14,7 @@ pub(crate) struct Arguments {
     dataset: PathBuf,
     /// The calibration.
     calibration: PathBuf,
-    /// Fail (exit code 1) if the per-axis error is greater than this, in degrees, or does not exist; not tested on blind
+    /// Fail (exit code 1) if the per-axis error exceeds this value, in degrees, or does not exist; not tested on blind
     /// data.
     #[arg(long, value_name = "X", value_parser = positive)]
     max_rms_deg: Option<f64>,
@@ -28,15 +26,15 @@ pub(crate) struct Arguments {
 fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err("a number greater than 0 is needed".to_owned()),
+        _ => Err("must be a number greater than 0".to_owned()),
     }
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let dataset = io::read_dataset(&arguments.dataset)?;
+    let dataset = read_dataset(&arguments.dataset)?;
     let truth = read_truth(&arguments.dataset)?;
-    let calibration = read_calibration(&arguments.calibration)?;
-    let mut result = score(&dataset, &calibration, truth.as_ref());
+    let calibration = read_calibration_for(&arguments.calibration, &dataset.session)?;
+    let mut result = score(&dataset, &calibration, truth.as_ref()).map_err(Error::from)?;
     if let Some(limit) = arguments.max_rms_deg {
         result = result.with_limit(limit);
     }
@@ -63,7 +61,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     }
 }
 
-/// A score in a few lines.
+/// A score as a few lines of text.
 fn words(score: &Score) -> String {
     let verdict = score.verdict.word();
     let mut text = format!("{verdict}: method {}\n", score.method);
@@ -94,11 +92,11 @@ fn words(score: &Score) -> String {
     text
 }
 
-/// The figures that take a truth.
+/// Adds the figures that require a truth.
 fn against_truth(score: &Score, line: &mut impl FnMut(&str, String)) {
     line("direction, per axis", degrees(score.per_axis_rms_deg));
     line("  bound", degrees(score.crlb_per_axis_deg));
-    line("  bound by itself", degrees(score.alone_crlb_per_axis_deg));
+    line("  bound per element", degrees(score.alone_crlb_per_axis_deg));
     line("  common to all", degrees(score.common_mode_deg));
     line("  in the room", degrees(score.per_axis_rms_room_deg));
     line(
@@ -131,7 +129,7 @@ fn degrees(value: f64) -> String {
     format!("{} rms", figure(value, 4, "°"))
 }
 
-/// A number for people; a dash where there is none.
+/// Formats a number with its unit; a dash if it does not exist.
 pub(crate) fn figure(value: f64, decimals: usize, unit: &str) -> String {
     if value.is_finite() {
         format!("{value:.decimals$}{unit}")

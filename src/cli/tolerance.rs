@@ -1,146 +1,79 @@
-//! `catoptric tolerance`: what manufacturing errors do to a layout, and what a calibration leaves of them.
+//! `catoptric tolerance`: analyzes the effect of manufacturing errors on a layout, before and after calibration.
 
 use super::Context;
 use super::error::CliError;
-use super::interrupt;
 use super::layout::{refused, requirements};
-use super::output::{print, quoted};
-use super::progress::Progress;
-use catoptric::io::{self, IoError, scene};
-use catoptric::layout::Requirement;
-use catoptric::sim::SimError;
-use catoptric::tolerance::{self, Bounds, Calibrated, Distribution, Tolerance, Workshop};
-use catoptric::{layout, report};
+use super::output::{print, print_json, quoted};
+use catoptric::tolerance::{Distribution, Tolerance};
+use catoptric::{Error, Scene, TOLERANCE_PAGE, ToleranceOptions, tolerance, write_tolerance};
 use clap::Args;
-use rayon::prelude::*;
-use std::path::{Path, PathBuf};
-
-/// Structures between two looks at whether Ctrl-C was pressed.
-const CHUNK: usize = 16;
+use std::path::PathBuf;
 
 /// Arguments of `tolerance`.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
-    /// The scene, TOML or JSON; its `superstructure.as_built` and `scanner.mount` say how large errors are.
+    /// The scene, TOML or JSON; its `superstructure.as_built` and `scanner.mount` specify the errors.
     scene: PathBuf,
-    /// Structures to build, one for each seed from --seed on.
+    /// Number of structures to build, with consecutive seeds from --seed on.
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     draws: u32,
     /// Seed of the first structure; the scene's own by default.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
-    /// Structures, the first of them, for which the accuracy that a calibration can reach is predicted; 0 for none.
+    /// Predict the attainable calibration accuracy of the first N structures; 0 for none.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(0..=10_000))]
     bounds: u32,
-    /// Structures, the first of them, whose experiment is simulated, calibrated by `joint` and scored; 3 if no number is
-    /// given.
+    /// Simulate the experiment of the first N structures, calibrate it by `joint` and score it; 3 if no number is given.
     #[arg(long, value_name = "N", num_args = 0..=1, default_value_t = 0, default_missing_value = "3",
         value_parser = clap::value_parser!(u32).range(0..=10_000))]
     calibrate: u32,
     /// Change a value of the scene first: superstructure.as_built.tilt_sd_deg=0.1.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// A limit to keep, else the exit code is 1: "direction_deg.p95<=2", "facets.*.point_at_4m_mm.max<500". May be given
-    /// more than once.
+    /// A limit to meet, otherwise the exit code is 1: "direction_deg.p95<=2", "facets.*.point_at_4m_mm.max<500". May be
+    /// given more than once.
     #[arg(long, value_name = "FIGURE<=NUMBER")]
     require: Vec<String>,
-    /// Write tolerance.json, the plot and a page, report.html, into this folder.
+    /// Write tolerance.json, the plot and a page, report.html, to this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print every figure as JSON.
+    /// Print all figures as JSON.
     #[arg(long)]
     json: bool,
 }
 
-/// A requirement as it is given.
+/// An example of a requirement.
 const EXAMPLE: &str = "direction_deg.p95<=2";
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let requirements = requirements(&arguments.require, EXAMPLE)?;
-    let scene = scene::load(&arguments.scene, &arguments.set)?;
-    let first = arguments.seed.unwrap_or(scene.seed);
-    let seeds = |count: u32| -> Vec<u64> { (0..count).map(|k| first.wrapping_add(k.into())).collect() };
-    let workshop = Workshop::new(&scene)?;
-    // A name that is no figure's is refused before the work is done.
-    let mut empty = workshop.summarize(&[]);
-    empty.bound = (arguments.bounds > 0).then(|| Bounds::of(&[]));
-    empty.calibrated = (arguments.calibrate > 0).then(|| Calibrated::of(&[]));
-    judge(&requirements, &empty)?;
-    let built = each(context, "building", &seeds(arguments.draws), |seed| {
-        workshop.build(seed)
+    let options = ToleranceOptions {
+        draws: arguments.draws,
+        seed: arguments.seed,
+        bounds: arguments.bounds,
+        calibrate: arguments.calibrate,
+        requirements: requirements(&arguments.require, EXAMPLE)?,
+    };
+    let scene = Scene::load_with(&arguments.scene, &arguments.set)?;
+    let (found, unmet) = tolerance(&scene, &options, &context.control()).map_err(|error| match error {
+        Error::Requirement(error) => refused(error, EXAMPLE),
+        other => other.into(),
     })?;
-    let mut found = workshop.summarize(&built);
-    if arguments.bounds > 0 {
-        let predicted = each(context, "predicting", &seeds(arguments.bounds), |seed| {
-            Ok(layout::predict(&scene, seed))
-        })?;
-        found.bound = Some(Bounds::of(&predicted));
-    }
-    if arguments.calibrate > 0 {
-        let runs = each(context, "calibrating", &seeds(arguments.calibrate), |seed| {
-            tolerance::calibrate(&scene, seed)
-        })?;
-        found.calibrated = Some(Calibrated::of(&runs));
-    }
-    let unmet = judge(&requirements, &found)?;
-    let json = serde_json::to_string(&found).map_err(|e| CliError::Output(e.into()))? + "\n";
     let mut said = String::new();
     if let Some(out) = &arguments.out {
-        write(out, &json, &found)?;
-        said = format!("wrote {}\n", quoted(&out.join(PAGE)));
+        write_tolerance(&found, out)?;
+        said = format!("wrote {}\n", quoted(&out.join(TOLERANCE_PAGE)));
     }
     if arguments.json {
-        print(&json)?;
+        print_json(&found)?;
     } else {
         print(&(text(&found) + &said + &next(arguments, &found)))?;
     }
     if unmet.is_empty() {
         Ok(())
     } else {
+        let unmet: Vec<String> = unmet.iter().map(|u| format!("not met: {u}")).collect();
         Err(CliError::Verdict(unmet.join("\n")))
     }
-}
-
-fn judge(requirements: &[Requirement], found: &Tolerance) -> Result<Vec<String>, CliError> {
-    let mut unmet = Vec::new();
-    for requirement in requirements {
-        let judged = tolerance::judge(requirement, found).map_err(|e| refused(e, EXAMPLE))?;
-        unmet.extend(judged.iter().map(|u| format!("not met: {u}")));
-    }
-    Ok(unmet)
-}
-
-/// Does the same for every seed, some at a time, in order.
-fn each<T: Send>(
-    context: &Context,
-    what: &'static str,
-    seeds: &[u64],
-    one: impl Fn(u64) -> Result<T, SimError> + Sync,
-) -> Result<Vec<T>, CliError> {
-    let mut progress = Progress::new(context, what, seeds.len());
-    let mut found = Vec::with_capacity(seeds.len());
-    for chunk in seeds.chunks(CHUNK) {
-        let of_one = |&seed: &u64| {
-            interrupt::check()?;
-            one(seed).map_err(CliError::from)
-        };
-        found.extend(chunk.par_iter().map(of_one).collect::<Result<Vec<T>, _>>()?);
-        progress.advance(chunk.len());
-    }
-    Ok(found)
-}
-
-/// Names of what is written.
-const JSON: &str = "tolerance.json";
-const PLOT: &str = "directions.svg";
-const PAGE: &str = "report.html";
-
-fn write(out: &Path, json: &str, found: &Tolerance) -> Result<(), CliError> {
-    std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
-    io::write_file(out.join(PLOT), report::tolerance_plot(found).as_bytes())?;
-    io::write_file(out.join(PAGE), report::tolerance(found).as_bytes())?;
-    io::write_file(out.join(JSON), json.as_bytes())?;
-    Ok(())
 }
 
 fn next(arguments: &Arguments, found: &Tolerance) -> String {
@@ -168,12 +101,12 @@ fn distribution(of: &Distribution, unit: &str, decimals: usize) -> String {
     )
 }
 
-/// An analysis for people.
+/// An analysis as text.
 fn text(found: &Tolerance) -> String {
     let errors = &found.errors;
     let last = found.seed.wrapping_add(found.draws.saturating_sub(1) as u64);
     let mut text = format!(
-        "{}: {} structures as built, seeds {} to {last}\n  facets turned by {}°, shifted by {} mm, thicker by {} mm (1σ), uneven by \
+        "{}: {} structures as built, seeds {} to {last}\n  facets turned by {}°, shifted by {} mm, thicker by {} mm (1σ), slope error \
          {} mrad; scanner within {}° of yaw, {}° of tilt, {} mm\n  before calibration:\n  directions {}\n  points at 4 m {}\n",
         found.name,
         found.draws,

@@ -1,11 +1,10 @@
-//! `catoptric validate`: whether a calibration, whoever wrote it, is well formed and physically sane.
+//! `catoptric validate`: checks that a calibration, from any source, is well formed and physically plausible.
 
 use super::calibrate::summary;
 use super::error::CliError;
 use super::output::{counted, print, quoted};
-use catoptric::io;
-use catoptric::model::Calibration;
-use catoptric::validate::{Severity, validate};
+use catoptric::validate::Severity;
+use catoptric::{Calibration, files, validate};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -18,20 +17,18 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
     let path = &arguments.calibration;
-    let calibration: Calibration = io::read_json(path)?;
+    let calibration: Calibration = files::read_json(path)?;
     let problems = validate(&calibration);
     let errors = problems.iter().filter(|p| p.severity == Severity::Error).count();
     if errors > 0 {
         let list: Vec<String> = problems.iter().map(|p| format!("  {p}")).collect();
-        return Err(CliError::Invalid {
-            message: format!(
-                "{}: {}\n{}",
-                path.display(),
-                counted(errors, "error"),
-                list.join("\n")
-            ),
-            help: None,
-        });
+        let message = format!(
+            "{}: {}\n{}",
+            path.display(),
+            counted(errors, "error"),
+            list.join("\n")
+        );
+        return Err(CliError::invalid(message, None));
     }
     let mut text = String::new();
     for problem in &problems {

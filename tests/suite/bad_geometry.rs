@@ -1,6 +1,6 @@
-//! Bad geometry in scenes: mirrors that are none, light that does not get there, boards that stand nowhere.
+//! Invalid geometry in scenes: corners that form no mirror, facets that no light reaches, boards that fit nowhere.
 //!
-//! Each is refused as in `bad_input`, whose helpers spoil one good scene.
+//! Each is refused as in `bad_input`, whose helpers corrupt one valid scene.
 
 use crate::bad_input::expect_one;
 
@@ -18,7 +18,7 @@ fn facets_must_be_mirrors() {
         "[\n[-40.0",
         &["2 different corners", "at least 3"],
     );
-    // Lifted off the plane by a millimetre.
+    // Lifted off the plane by one millimeter.
     expect(
         "[-40.0, 70.0, -10.0], [-20.0, 70.0, -10.0], [-20.0, 80.0, 10.0], [-40.0, 81.0, 10.0]\n",
         "[\n[-40.0",
@@ -30,7 +30,7 @@ fn facets_must_be_mirrors() {
         "[\n[-40.0",
         &["crosses itself"],
     );
-    // An arrowhead: the third corner drawn in.
+    // A concave outline: the third corner pulled in.
     expect(
         "[-40.0, 70.0, -10.0], [-20.0, 70.0, -10.0], [-36.0, 72.0, -6.0], [-40.0, 80.0, 10.0]\n",
         "[-36.0, 72.0, -6.0]",
@@ -63,7 +63,7 @@ fn facets_must_be_mirrors() {
         "[140.0, 155.0]",
         &["-135° to 135°"],
     );
-    // Turned by nothing, the beam has no mirror.
+    // Without deflection no mirror is defined.
     expect_one(
         "exit_elevation_deg = 50.0",
         "exit_elevation_deg = 0",
@@ -104,7 +104,7 @@ fn light_must_reach_every_facet() {
 }
 
 #[test]
-fn housings_that_no_light_leaves() {
+fn housings_that_block_all_light() {
     let preset = "preset = \"ust-20lx\"";
     let with = |lines: &str| format!("{preset}\n{lines}");
     expect_one(
@@ -156,7 +156,7 @@ fn everything_must_be_in_the_room() {
 }
 
 #[test]
-fn a_board_must_stand_before_its_beams() {
+fn a_board_must_be_in_front_of_its_beams() {
     expect_one(
         "center_m = [1.5, 0.0, 1.2]\nnormal = [-1.0, 0.0, 0.0]",
         "center_m = [-1.5, 0.0, 1.2]\nnormal = [1.0, 0.0, 0.0]",
@@ -175,7 +175,7 @@ fn a_board_must_stand_before_its_beams() {
         "[1.0, 0.0, 0.0]",
         &["the back of the board"],
     );
-    // The wedge sends its fan up and to the left; this board stands low on the right.
+    // The wedge deflects its fan up and to the left; this board is low on the right.
     expect_one(
         "center_m = [0.3, 0.7, 2.1]\nnormal = [0.0, -0.5, -1.0]",
         "center_m = [-0.3, -0.7, 0.5]\nnormal = [0.0, 0.5, 1.0]",

@@ -1,12 +1,12 @@
-//! Bad scenes: each is refused with the place, what was found, what is allowed and what to do.
+//! Invalid scenes: each is refused with the location, what was found, what is allowed and what to do.
 //!
-//! Positions are computed here from the spoiled text by searching it, not by the code under test.
+//! Expected positions are found by searching the corrupted text, not by the code under test.
 
 use crate::common::{VALID, folder_with, run, stderr};
-use catoptric::io::diagnostic::{Diagnostics, Place};
-use catoptric::io::scene::{self, SceneErrors};
+use catoptric::files::diagnostic::{Diagnostics, Place};
+use catoptric::files::scene::{self, SceneErrors};
 
-/// Everything that is wrong with a scene.
+/// All problems of a scene.
 pub(crate) fn problems_with(text: &str, sets: &[&str]) -> Diagnostics {
     let sets: Vec<String> = sets.iter().map(|s| (*s).to_owned()).collect();
     match scene::parse(text, "scene.toml", &sets) {
@@ -22,7 +22,7 @@ pub(crate) fn spoiled(from: &str, to: &str) -> String {
     VALID.replace(from, to)
 }
 
-/// Line and column of the only place where a text occurs, counted from 1.
+/// Line and column, counted from 1, of the only occurrence of a text.
 pub(crate) fn place_of(text: &str, part: &str) -> (usize, usize) {
     assert_eq!(text.matches(part).count(), 1, "{part:?} must occur once");
     let before = &text[..text.find(part).unwrap()];
@@ -30,13 +30,13 @@ pub(crate) fn place_of(text: &str, part: &str) -> (usize, usize) {
     (line, before.split('\n').next_back().unwrap().chars().count() + 1)
 }
 
-/// Spoils the scene and expects exactly one problem: at `at`, saying all of `words`.
+/// Corrupts the scene and expects exactly one problem: at `at`, with all of `words`.
 #[track_caller]
 pub(crate) fn expect_one(from: &str, to: &str, at: &str, words: &[&str]) {
     expect_one_in(&spoiled(from, to), at, words);
 }
 
-/// Expects exactly one problem in a scene: at `at`, saying all of `words`.
+/// Expects exactly one problem in a scene: at `at`, with all of `words`.
 #[track_caller]
 pub(crate) fn expect_one_in(text: &str, at: &str, words: &[&str]) {
     let problems = problems_with(text, &[]);
@@ -50,12 +50,12 @@ pub(crate) fn expect_one_in(text: &str, at: &str, words: &[&str]) {
 }
 
 #[test]
-fn the_scene_that_is_spoiled_here_is_valid() {
+fn the_scene_that_is_corrupted_here_is_valid() {
     scene::parse(VALID, "scene.toml", &[]).unwrap();
 }
 
 #[test]
-fn an_unknown_key_is_told_its_neighbour() {
+fn an_unknown_key_gets_the_most_similar_one() {
     expect_one(
         "scans_per_pose",
         "scan_per_pose",
@@ -75,21 +75,21 @@ fn an_unknown_key_is_told_its_neighbour() {
 }
 
 #[test]
-fn an_angle_in_radians_is_told_its_degrees() {
+fn an_angle_in_radians_gets_its_value_in_degrees() {
     expect_one(
         "tilt_deg = [30.0, 50.0]",
         "tilt_rad = [0.5, 0.75]",
         "tilt_rad",
         &["`tilt_deg`", "angles are in degrees", "[28.64789, 42.971835]"],
     );
-    // 45 in radians: more than a turn, so it may as well have been meant in degrees.
+    // 45 in radians is more than a turn, so degrees may have been meant.
     expect_one(
         "exit_elevation_deg = 50.0",
         "exit_elevation_rad = 45",
         "exit_elevation_rad",
         &["`exit_elevation_deg`", "2578.31", "exit_elevation_deg = 45"],
     );
-    // 45 rad written out in degrees.
+    // 45 rad converted to degrees.
     expect_one(
         "exit_elevation_deg = 50.0",
         "exit_elevation_deg = 2578.31",
@@ -220,7 +220,7 @@ fn names_and_markers() {
         "\"whit\"",
         &["`white`"],
     );
-    // Every pose names the board by its old name, so both poses are wrong as well.
+    // Every pose refers to the board by its old name, so both poses are wrong as well.
     let text = spoiled("name = \"big\"", "name = \"bigg\"");
     let problems = problems_with(&text, &[]);
     let helps: Vec<_> = problems.list.iter().map(|p| p.help.as_deref()).collect();
@@ -245,7 +245,7 @@ fn tables_and_limits() {
 }
 
 #[test]
-fn all_problems_are_told_at_once() {
+fn all_problems_are_reported_at_once() {
     let text = VALID
         .replace("seed = 7", "sede = 7")
         .replace("preset = \"ust-20lx\"", "preset = \"ust-30lx\"")
@@ -262,7 +262,7 @@ fn all_problems_are_told_at_once() {
     }
     assert!(said.ends_with("scene.toml: 4 problems\n"), "{said}");
     assert!(!said.contains('\u{1b}'), "no colors without a terminal: {said:?}");
-    // Carets stand under the text that is wrong.
+    // Carets mark the text that is wrong.
     assert!(
         said.contains("2 | name") || said.contains("3 | sede = 7\n  | ^^^^\n"),
         "{said}"
@@ -270,7 +270,7 @@ fn all_problems_are_told_at_once() {
 }
 
 #[test]
-fn a_laboratory_needs_walls_and_a_mirror_no_more_light_than_it_gets() {
+fn a_laboratory_needs_walls_and_a_mirror_returns_no_more_light_than_it_receives() {
     let said = |text: &str| problems_with(text, &[]).to_string();
     let text = VALID.replace("size_m = [6.0, 6.0, 3.0]\n", "");
     assert!(
@@ -280,7 +280,7 @@ fn a_laboratory_needs_walls_and_a_mirror_no_more_light_than_it_gets() {
     );
     let text = format!("{VALID}\n[superstructure.mirror]\nreflectivity = 0.9\ndiffuse_reflectivity = 0.2\n");
     assert!(
-        said(&text).contains("returns no more light than it gets"),
+        said(&text).contains("a mirror cannot return more light than it receives"),
         "{}",
         said(&text)
     );
@@ -311,7 +311,7 @@ fn a_laboratory_needs_walls_and_a_mirror_no_more_light_than_it_gets() {
 }
 
 #[test]
-fn a_syntax_error_does_not_hide_the_rest_nor_invent_more() {
+fn a_syntax_error_neither_hides_other_problems_nor_adds_any() {
     let text = spoiled("seed = 7", "seed = 7 8").replace("[room]\n", "[room]\nsiez = 1\n");
     let problems = problems_with(&text, &[]);
     let places: Vec<_> = problems
@@ -330,7 +330,7 @@ fn a_syntax_error_does_not_hide_the_rest_nor_invent_more() {
 }
 
 #[test]
-fn a_wrong_set_is_named_itself() {
+fn a_wrong_setting_is_reported_as_such() {
     for (set, words) in [
         ("seed=-1", "`seed` is -1"),
         ("seed", "has no `=`"),
@@ -352,7 +352,7 @@ fn a_wrong_set_is_named_itself() {
             "experiment.pose[0].center_m=[-1.5, 0.0, 1.2]",
             "behind the sensor",
         ),
-        // The consequence is found elsewhere, in a line that is right by itself.
+        // The consequence is reported elsewhere, at a line that is correct on its own.
         ("board.0.name=wide", "there is no such board"),
         ("seed=nan", "finite"),
     ] {
@@ -367,7 +367,7 @@ fn a_wrong_set_is_named_itself() {
 }
 
 #[test]
-fn a_set_does_not_take_the_blame_for_the_file() {
+fn a_setting_is_not_blamed_for_the_file() {
     let text = spoiled("[30.0, 50.0]", "[50.0, 30.0]");
     let problems = problems_with(&text, &["experiment.scans_per_pose=20"]);
     assert_eq!(problems.list.len(), 1);
@@ -378,7 +378,7 @@ fn a_set_does_not_take_the_blame_for_the_file() {
 }
 
 #[test]
-fn sets_reach_into_tables_that_the_file_leaves_out() {
+fn settings_reach_into_tables_that_the_file_omits() {
     let sets = [
         "mocap.profile=ideal",
         "superstructure.facet.0.name=left",
@@ -391,7 +391,7 @@ fn sets_reach_into_tables_that_the_file_leaves_out() {
 }
 
 #[test]
-fn files_that_are_not_there_or_not_text() {
+fn files_that_are_missing_or_not_text() {
     let (folder, path) = folder_with(VALID);
     let output = run(folder.path(), &["check", "scnee.toml"]);
     assert_eq!(output.status.code(), Some(3));
@@ -410,7 +410,7 @@ fn files_that_are_not_there_or_not_text() {
     assert_eq!(
         output.status.code(),
         Some(3),
-        "a folder is no scene: {}",
+        "a folder is not a scene: {}",
         stderr(&output)
     );
 }
@@ -437,17 +437,17 @@ fn json_goes_through_the_same_checks() {
 }
 
 #[test]
-fn the_resolved_scene_reads_back_as_itself() {
-    let templates = scene::Layout::ALL.map(scene::scene_template);
+fn the_resolved_scene_is_read_back_unchanged() {
+    let templates = scene::Template::ALL.map(scene::Template::text);
     for text in templates.into_iter().chain([VALID]) {
         let scene = scene::parse(text, "scene.toml", &[]).unwrap();
         let resolved = scene::to_toml(&scene).unwrap();
         let back = scene::parse(&resolved, "resolved.toml", &[]).unwrap();
         assert_eq!(back, scene);
-        // Defaults are written out, so a later version with other defaults reads the same scene.
+        // Defaults are written explicitly, so a later version with other defaults reads the same scene.
         assert!(resolved.contains("threshold_reflectivity"));
     }
-    // The largest seed does not fit TOML's own integers.
+    // The largest seed exceeds TOML's integers.
     let mut scene = scene::parse(VALID, "scene.toml", &[]).unwrap();
     scene.seed = u64::MAX;
     let back = scene::parse(&scene::to_toml(&scene).unwrap(), "resolved.toml", &[]).unwrap();
@@ -456,7 +456,7 @@ fn the_resolved_scene_reads_back_as_itself() {
 
 #[test]
 fn a_board_that_fits_nowhere_is_found_by_check() {
-    // Poses are chosen by the rules once none are given.
+    // Poses are chosen by the rules if none are given.
     let text = VALID.split("[[experiment.pose]]").next().unwrap();
     let (folder, _) = folder_with(text);
     let output = run(folder.path(), &["check", "scene.toml"]);
@@ -472,7 +472,7 @@ fn a_board_that_fits_nowhere_is_found_by_check() {
 }
 
 #[test]
-fn no_damage_to_the_text_is_a_panic() {
+fn no_corruption_of_the_text_causes_a_panic() {
     let check = |text: &str| {
         if let Err(SceneErrors::Invalid(problems)) = scene::parse(text, "scene.toml", &[]) {
             assert!(!problems.list.is_empty(), "{text}");
@@ -481,17 +481,17 @@ fn no_damage_to_the_text_is_a_panic() {
                 let (line, _) = problems.position(problem).unwrap();
                 assert!((1..=lines).contains(&line), "{problems}");
             }
-            // Excerpts are drawn of whatever is left of the text.
+            // Excerpts in messages are taken from whatever is left of the text.
             assert!(problems.render(true).contains("scene.toml"));
         }
     };
-    // Cut off anywhere.
+    // Truncated anywhere.
     for end in (0..VALID.len()).step_by(5) {
         check(&VALID[..end]);
     }
     let lines: Vec<&str> = VALID.lines().collect();
     for at in 0..lines.len() {
-        // A line lost, twice there, or overwritten.
+        // A line removed, duplicated, or overwritten.
         let mut lost = lines.clone();
         lost.remove(at);
         check(&lost.join("\n"));

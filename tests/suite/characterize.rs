@@ -1,9 +1,9 @@
-//! Step 1: Tables 1 to 4 and the numbers of Eqs. 3 to 5 come back from the virtual laboratory.
+//! Step 1: Tables 1 to 4 and the parameters of Eqs. (3)–(5) are recovered from the virtual laboratory.
 //!
-//! That the tables come back proves that simulator and estimator agree with each other and with the paper's numbers; the
-//! estimator's model is the simulator's own here (the inverse crime), but for the finite beam, drift, motion capture and
-//! placement. What a real sensor is like it does not prove. The consistency test proves that the stated uncertainties are
-//! the errors'.
+//! This proves that simulator and estimator agree with each other and with the numbers of the paper; the estimator uses
+//! the model of the simulator here (the inverse crime), except for the finite beam, drift, motion capture and
+//! placement. It does not prove that a real sensor behaves like this. The consistency test proves that the stated
+//! uncertainties match the errors.
 
 use crate::common::{run, stderr, stdout};
 use crate::scenes::{BARE, scene, set_board_ahead};
@@ -24,17 +24,17 @@ fn characterized(scene: &Scene, seed: u64) -> (Characterization, RangeBias) {
 }
 
 #[test]
-fn tables_1_to_4_come_back_beside_the_papers() {
+fn tables_1_to_4_are_recovered_next_to_those_of_the_paper() {
     let scene = scene(COOPER);
     let (found, _) = characterized(&scene, scene.seed);
-    // Table 1: 5 % or 1 mm, heights everywhere and widths but at 2 m, which no straight beam has (see paper.rs).
+    // Table 1: within 5 % or 1 mm, all heights, and widths except at 2 m, which fits no straight beam (see paper.rs).
     assert_eq!(found.spots.len(), paper::TABLE_1.len());
     for (row, (distance, height, width)) in found.spots.iter().zip(paper::TABLE_1) {
         let within = |found: f64, printed: f64| (found - printed).abs() <= f64::max(1.0, 0.05 * printed);
         assert!((row.distance_m / distance - 1.0).abs() < 0.02);
         assert!(within(row.spot.height_mm, height), "{row:?}");
         if distance == 2.0 {
-            // 33.6 mrad · 2 m is 67.2 mm; edges are read to 0.25 mm each.
+            // 33.6 mrad · 2 m is 67.2 mm; each edge is found to 0.25 mm.
             assert!((row.spot.width_mm - 67.2).abs() < 1.5, "{row:?}");
         } else {
             assert!(within(row.spot.width_mm, width), "{row:?}");
@@ -84,12 +84,12 @@ fn tables_1_to_4_come_back_beside_the_papers() {
         "{:?}",
         found.fit
     );
-    // What calibration.md says of the paper's data holds of ours: no line describes Table 2.
+    // As for the data of the paper, see calibration.md, no straight line describes Table 2.
     assert!(found.distance_line.unwrap().fit.is_rejected());
     assert!(!found.angle_law.unwrap().is_rejected());
 }
 
-/// The scene of step 1 with few scans, pencil beams and errors of color, for a test over many seeds.
+/// The scene of step 1 with few scans, pencil beams and color errors, for a test over many seeds.
 fn quick(text: &str) -> Scene {
     let mut scene = scene(text);
     scene.scanner.sub_rays = 1;
@@ -108,7 +108,7 @@ fn quick(text: &str) -> Scene {
     scene
 }
 
-/// What a simulation put in for a fitted number.
+/// The injected value of a fitted parameter.
 fn injected(p: &Parameter, bias: &RangeBias) -> f64 {
     let color = p
         .color
@@ -125,15 +125,15 @@ fn injected(p: &Parameter, bias: &RangeBias) -> f64 {
     }
 }
 
-/// χ² over its degrees of freedom that lies z standard deviations off by chance (Wilson and Hilferty).
+/// χ² over its degrees of freedom at z standard deviations (Wilson and Hilferty).
 fn bound(freedom: f64, z: f64) -> f64 {
     (1.0 - 2.0 / (9.0 * freedom) + z * (2.0 / (9.0 * freedom)).sqrt()).powi(3)
 }
 
-/// The fitted numbers are the injected ones within their stated covariance: χ² over independent seeds inside the bounds
-/// that one true covariance in a thousand leaves, for all numbers together and for each by itself.
+/// The fitted parameters equal the injected ones within their stated covariance: χ² over independent seeds is inside the
+/// 99.9 % bounds of a correct covariance, for all parameters together and for each one individually.
 #[test]
-fn fitted_numbers_are_the_injected_ones_within_their_uncertainty() {
+fn fitted_parameters_are_the_injected_ones_within_their_uncertainty() {
     for (text, count, seeds) in [(COOPER, 12, 200_u32), (TABLE_3, 2, 100)] {
         let scene = quick(text);
         let errors: Vec<(f64, Vec<f64>, f64)> = (1..=seeds)
@@ -209,7 +209,7 @@ fn a_recorded_dataset_gives_the_same_with_and_without_its_truth() {
     assert_eq!(read("known.json"), read("blind.json"));
     let page = String::from_utf8(read("known.html")).unwrap();
     assert_eq!(page.matches("<svg").count(), 4);
-    // A scene is simulated on the way; only the readings' rounding to 32 bits in the file differs.
+    // A scene is simulated first; only the rounding of readings to 32 bits in the file differs.
     from(&[
         "characterize",
         "scene.toml",
@@ -227,8 +227,8 @@ fn a_recorded_dataset_gives_the_same_with_and_without_its_truth() {
 }
 
 #[test]
-fn what_the_boards_do_not_tell_is_said() {
-    // Face-on boards of one color at one distance: nothing of A_a, one node of E_r.
+fn what_the_boards_do_not_determine_is_reported() {
+    // Face-on boards of one color at one distance: they do not determine A_a, and only one node of E_r.
     let mut narrow = quick(TABLE_3);
     narrow.board[0].width_mm = 300.0;
     narrow.experiment.test.truncate(1);
@@ -243,7 +243,7 @@ fn what_the_boards_do_not_tell_is_said() {
             .any(|n| n.symbol == "A_a" && n.reason.contains("incidence"))
     );
     assert!(found.angle_law.is_none() && found.distance_line.is_none());
-    // A color at one distance has no slope.
+    // A color at a single distance has no slope.
     let mut one = quick(COOPER);
     one.experiment.test.last_mut().unwrap().range_m = vec![1.0];
     let (found, _) = characterized(&one, 1);
@@ -253,7 +253,7 @@ fn what_the_boards_do_not_tell_is_said() {
         .iter()
         .find(|n| n.color.as_deref() == Some("jet_black"));
     assert_eq!(open.map(|n| n.symbol.as_str()), Some("A_c"));
-    // No board at all is an error, not a table of nothing.
+    // No board at all is an error, not an empty table.
     let mut empty = scene(BARE);
     set_board_ahead(&mut empty, 2.0);
     empty.experiment.pose.clear();
@@ -265,10 +265,10 @@ fn what_the_boards_do_not_tell_is_said() {
     assert!(error.contains("no board is read"), "{error}");
 }
 
-/// Boards that were set up to find the mounting tell E_r and E_a together, and no less honestly: their distances and
-/// incidences go together in no way that the fit does not allow for.
+/// Boards that were recorded to find the mounting also determine E_r and E_a, and just as honestly: any correlation
+/// between their distances and incidences is accounted for by the fit.
 #[test]
-fn boards_without_a_note_tell_distance_and_angle_apart() {
+fn boards_without_a_test_label_separate_distance_and_angle() {
     let mut scene = scene(crate::scenes::TWO_MIRROR);
     scene.scanner.sub_rays = 1;
     scene.scanner.mount.shift_tolerance_mm = 0.0;
@@ -290,7 +290,7 @@ fn boards_without_a_note_tell_distance_and_angle_apart() {
 }
 
 #[test]
-fn a_law_that_does_not_hold_gets_a_table() {
+fn a_law_that_does_not_fit_is_replaced_by_a_table() {
     let mut scene = quick(COOPER);
     scene.errors.angle.table = Some(catoptric::model::AngleTable {
         incidence_deg: vec![0.0, 18.5, 44.7, 80.0],
@@ -309,11 +309,11 @@ fn a_law_that_does_not_hold_gets_a_table() {
     }
 }
 
-/// A fixed threshold makes ranges depend on the light that comes back. The session knows nothing of it; step 1 learns it
-/// as Eqs. 3 to 5 can: error and dishonesty of the calibration fall, though not to nothing, since what the detector does
-/// is no sum of terms in distance, angle and color, and mirrors take light that the bare sensor had.
+/// A fixed threshold makes ranges depend on the received power. The session does not know this; step 1 learns it as far
+/// as Eqs. (3)–(5) can: error and dishonesty of the calibration decrease, though not to zero, since the effect of the
+/// detector is not a sum of terms in distance, angle and color, and mirrors absorb light that the bare sensor receives.
 #[test]
-fn step_1_teaches_a_calibration_the_walk_of_a_threshold() {
+fn step_1_teaches_a_calibration_the_walk_error_of_a_threshold() {
     let physical = |text: &str| {
         let mut scene = scene(text);
         scene.errors.model = catoptric::sim::scene::ErrorModel::Physical;
@@ -330,7 +330,7 @@ fn step_1_teaches_a_calibration_the_walk_of_a_threshold() {
     let options = calib::Options::default();
     let accuracy = |dataset: &catoptric::model::Dataset| {
         let calibration = calib::calibrate(dataset, calib::Method::Beam, &options).unwrap();
-        score(dataset, &calibration, Some(&truth))
+        score(dataset, &calibration, Some(&truth)).expect("in memory")
     };
     let before = accuracy(&dataset);
     dataset.session.believed = dataset.session.believed.after(&found);

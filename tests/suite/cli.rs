@@ -26,7 +26,7 @@ fn new_writes_a_scene_that_check_accepts() {
 }
 
 #[test]
-fn new_leaves_an_existing_file_as_it_is() {
+fn new_does_not_change_an_existing_file() {
     let (folder, path) = folder_with("mine");
     let output = run(folder.path(), &["new", "scene.toml"]);
     assert_eq!(output.status.code(), Some(2));
@@ -39,12 +39,12 @@ fn new_leaves_an_existing_file_as_it_is() {
 }
 
 #[test]
-fn new_says_where_it_cannot_write() {
+fn new_reports_where_it_cannot_write() {
     let folder = tempfile::tempdir().unwrap();
     let output = run(folder.path(), &["new", "no/such/folder/scene.toml"]);
     assert_eq!(output.status.code(), Some(3));
     assert!(
-        stderr(&output).contains("cannot write no/such/folder/scene.toml"),
+        stderr(&output).contains("no/such/folder/scene.toml: cannot be written"),
         "{}",
         stderr(&output)
     );
@@ -59,7 +59,7 @@ fn new_says_where_it_cannot_write() {
 }
 
 #[test]
-fn check_tells_the_size_of_the_experiment() {
+fn check_reports_the_size_of_the_experiment() {
     let (folder, _) = folder_with(VALID);
     let output = run(folder.path(), &["check", "scene.toml"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
@@ -67,7 +67,7 @@ fn check_tells_the_size_of_the_experiment() {
     let mut lines = said.lines();
     let first = lines.next().unwrap();
     assert!(first.starts_with("ok: small: 3 facets of "), "{first}");
-    // Two poses of 10 scans, 100 scans of the room and 100 of the bare structure, 1081 beams each.
+    // Two poses of 10 scans, 100 scans of the room and 100 of the bare structure, with 1081 beams each.
     assert!(
         first.ends_with(", 1 board, 2 poses, 220 scans, 237 820 readings"),
         "{first}"
@@ -87,7 +87,7 @@ fn check_tells_the_size_of_the_experiment() {
         stdout(&output)
     );
     let output = run(folder.path(), &["-v", "check", "scene.toml"]);
-    // 15° in steps of 0.25°; the beams along the two cut edges may fall on either side.
+    // 15° in steps of 0.25°; the beams along the two cut edges may be on either side.
     let beams: usize = stdout(&output)
         .lines()
         .find_map(|l| l.strip_prefix("  wedge: ")?.strip_suffix(" beams")?.parse().ok())
@@ -96,7 +96,7 @@ fn check_tells_the_size_of_the_experiment() {
 }
 
 #[test]
-fn a_wrong_command_line_ends_with_2() {
+fn a_wrong_command_line_exits_with_2() {
     let folder = tempfile::tempdir().unwrap();
     for arguments in [
         &["frobnicate"][..],
@@ -114,12 +114,12 @@ fn a_wrong_command_line_ends_with_2() {
             "{arguments:?}"
         );
     }
-    // A slip of the pen is told its neighbour.
+    // A typo gets the most similar verb.
     assert!(stderr(&run(folder.path(), &["chekc"])).contains("check"));
 }
 
 #[test]
-fn help_and_version_are_data() {
+fn help_and_version_go_to_standard_output() {
     let folder = tempfile::tempdir().unwrap();
     let help = run(folder.path(), &["--help"]);
     assert_eq!(help.status.code(), Some(0));
@@ -137,7 +137,7 @@ fn the_schema_describes_every_key_of_a_scene() {
     let output = run(folder.path(), &["schema"]);
     assert_eq!(output.status.code(), Some(0));
     let schema: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
-    let scene = catoptric::io::scene::parse(VALID, "scene.toml", &[]).unwrap();
+    let scene = catoptric::files::scene::parse(VALID, "scene.toml", &[]).unwrap();
     let keys = serde_json::to_value(&scene).unwrap();
     for key in keys.as_object().unwrap().keys() {
         assert!(schema["properties"][key]["description"].is_string(), "{key}");
@@ -173,7 +173,7 @@ fn a_closed_pipe_ends_quietly() {
             .stderr(Stdio::piped())
             .spawn();
         let mut child = child.unwrap();
-        // Like `| head -c 1`; what does not fit the pipe meets a closed end.
+        // Like `| head -c 1`: what does not fit into the pipe finds a closed end.
         let mut pipe = child.stdout.take().unwrap();
         pipe.read_exact(&mut [0]).unwrap();
         drop(pipe);
@@ -186,7 +186,7 @@ fn a_closed_pipe_ends_quietly() {
         );
         assert_eq!(stderr(&output), "", "{arguments:?}");
     }
-    // A pipe whose reader was never there: the first byte meets the closed end already.
+    // A pipe whose reader never existed: even the first byte finds a closed end.
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);
     let output = catoptric()

@@ -1,21 +1,21 @@
-//! The estimator on data without errors: every angle must come back.
+//! The estimator on data without errors: every angle must be recovered.
 //!
-//! This is the inverse crime, committed on purpose: the simulator is reduced to the estimator's own model (pencil
-//! beams, no errors), so it proves conventions, derivatives and convergence, and says nothing about accuracy.
+//! This commits the inverse crime on purpose: the simulator is reduced to the estimator's own model (pencil beams, no
+//! errors), so it proves conventions, derivatives and convergence, but nothing about accuracy.
 
 use crate::scenes::{PROTOTYPE, TWO_MIRROR, layouts, scene, without_errors};
 use catoptric::calib::{self, Method, Options};
-use catoptric::io::{DatasetWriter, Provenance, read_dataset};
-use catoptric::model::beam;
+use catoptric::files::{DatasetWriter, Provenance, read_dataset};
 use catoptric::sim::{Laboratory, Scene};
 use catoptric::testing::closure_of;
+use catoptric_fixtures::ust20lx;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-/// How far off a method may be without errors, in radians.
+/// Allowed error of a method without errors in the data, in radians.
 const ALLOWED: f64 = 1e-9;
 
-/// Every method but the drawing's.
+/// Every method except the drawing.
 fn measuring() -> impl Iterator<Item = Method> {
     Method::ALL.into_iter().filter(|m| *m != Method::Prior)
 }
@@ -32,13 +32,13 @@ fn close(scene: &Scene, seed: u64) -> Result<(), TestCaseError> {
         let calibration = calib::calibrate(&dataset, method, &Options::default())
             .map_err(|e| TestCaseError::fail(e.to_string()))?;
         closure_of(&truth, &calibration, ALLOWED).map_err(|e| TestCaseError::fail(e.to_string()))?;
-        prop_assert_eq!(calibration.beams.len(), beam::COUNT);
+        prop_assert_eq!(calibration.beams.len(), ust20lx::COUNT);
     }
     Ok(())
 }
 
 #[test]
-fn the_repositorys_scenes_close() {
+fn scenes_of_the_repository_close() {
     for text in [PROTOTYPE, TWO_MIRROR] {
         let scene = without_errors(scene(text));
         close(&scene, scene.seed).expect("the scene closes");
@@ -47,11 +47,11 @@ fn the_repositorys_scenes_close() {
 
 /// Files hold ranges as 32-bit floats: 1.2e-7 m at 2 m, up to twenty times that in an angle of a short lever.
 #[test]
-fn the_repositorys_scenes_close_through_the_files() {
+fn scenes_of_the_repository_close_through_the_files() {
     for text in [PROTOTYPE, TWO_MIRROR] {
         let scene = without_errors(scene(text));
-        let laboratory = Laboratory::new(&scene, scene.seed).expect("the scene is good");
-        let folder = tempfile::tempdir().expect("a folder can be had");
+        let laboratory = Laboratory::new(&scene, scene.seed).expect("the scene is valid");
+        let folder = tempfile::tempdir().expect("a folder can be created");
         let out = folder.path().join("data");
         let session = laboratory.session().expect("known");
         let mut writer = DatasetWriter::create(&out, false, &session).expect("it can be written");
@@ -69,11 +69,12 @@ fn the_repositorys_scenes_close_through_the_files() {
         let truth = laboratory.truth().expect("known");
         writer.write_truth(&truth).expect("it can be written");
         writer.finish(provenance).expect("it can be written");
-        let dataset = read_dataset(&out).expect("it reads back");
+        let dataset = read_dataset(&out).expect("it can be read back");
         for method in measuring() {
-            let calibration = calib::calibrate(&dataset, method, &Options::default()).expect("it calibrates");
-            let worst = closure_of(&truth, &calibration, f64::INFINITY).expect("every angle comes back");
-            // Not exact either: the files do round.
+            let calibration =
+                calib::calibrate(&dataset, method, &Options::default()).expect("the calibration succeeds");
+            let worst = closure_of(&truth, &calibration, f64::INFINITY).expect("every angle is recovered");
+            // The errors are not zero either: the files round ranges.
             assert!(
                 worst < 3e-6 && worst > 1e-12,
                 "{}: off by {worst:e} rad",
@@ -87,7 +88,7 @@ proptest! {
     #![proptest_config(ProptestConfig {
         max_global_rejects: 2000,
         failure_persistence: None,
-        // The same layouts on every run, 256 or as many as PROPTEST_CASES says: a failure here is a change of ours.
+        // The same layouts in every run, 256 or the number in PROPTEST_CASES: a failure is due to a change of the code.
         rng_seed: RngSeed::Fixed(2018),
         ..ProptestConfig::default()
     })]

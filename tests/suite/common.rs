@@ -1,4 +1,4 @@
-//! What the tests share: running the program, and a small valid scene to spoil.
+//! Shared helpers: running the program, and a small valid scene to corrupt.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 /// The program.
 pub(crate) fn catoptric() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_catoptric"));
-    // Colors must come from the terminal test alone, not from the machine that runs the tests.
+    // Colors must depend on the terminal check only, not on the environment of the machine.
     command.env_remove("CLICOLOR_FORCE").env_remove("NO_COLOR");
     command
 }
@@ -24,7 +24,7 @@ pub(crate) fn stderr(output: &Output) -> String {
     String::from_utf8(output.stderr.clone()).unwrap()
 }
 
-/// A folder that goes with the test, and the scene in it.
+/// A temporary folder with the scene in it.
 pub(crate) fn folder_with(scene: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.toml");
@@ -32,10 +32,10 @@ pub(crate) fn folder_with(scene: &str) -> (tempfile::TempDir, PathBuf) {
     (folder, path)
 }
 
-/// A scene with every kind of facet, a post, explicit poses and a color of its own.
+/// A scene with every kind of facet, a post, explicit poses and a custom color.
 ///
-/// The rig stands in the middle of a 6 m × 6 m × 3 m room, 1.2 m up; the sensor is in the rig's origin. The wedge
-/// lifts its fan by 50°.
+/// The rig is in the middle of a 6 m × 6 m × 3 m room, 1.2 m up; the sensor is at the origin of the rig. The wedge lifts
+/// its fan by 50°.
 pub(crate) const VALID: &str = r#"schema_version = 1
 name = "small"
 seed = 7

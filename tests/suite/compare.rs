@@ -1,7 +1,7 @@
-//! Judging anybody's calibration through the program: `compare`, `score` and `validate` on files as others write them.
+//! Judging third-party calibrations through the program: `compare`, `score` and `validate` on files as others write them.
 //!
-//! These prove what the program makes of a file, not that any method is good. Submissions are written from the truth, so
-//! that what they should come to is known.
+//! These prove what the program reports about a file, not that any method is good. Submissions are derived from the
+//! truth, so that the expected results are known.
 
 use crate::common::{run, stderr, stdout};
 use catoptric::sim::Truth;
@@ -32,7 +32,7 @@ fn truth_of(folder: &Path, dataset: &str) -> Truth {
     serde_json::from_str(&text).unwrap()
 }
 
-/// The truth as somebody else would submit it: deflected elements alone, from the last to the first, no optional key.
+/// The truth as a third party would submit it: deflected elements only, in reverse order, without optional keys.
 /// `lift_rad` is added to every elevation, `sd_rad` is stated for both angles.
 fn submission(truth: &Truth, lift_rad: f64, sd_rad: Option<f64>) -> Value {
     let element = |b: &catoptric::sim::truth::TrueBeam| {
@@ -73,7 +73,7 @@ fn json_of(folder: &Path, arguments: &[&str], code: i32) -> Value {
 }
 
 #[test]
-fn the_truth_as_anybody_submits_it_has_no_error() {
+fn the_truth_as_a_third_party_submission_has_no_error() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     simulate(at, "scenes/two-mirror.toml", "data", &[]);
@@ -90,7 +90,7 @@ fn the_truth_as_anybody_submits_it_has_no_error() {
     assert_eq!(score["beams"]["missed"], 0);
     assert!(score["honesty"].is_null());
     assert_eq!(score["nulls"]["honesty"], "no scored element has a covariance");
-    // Half of the elements are a submission too: the other half is missed, not an error of the program.
+    // Half of the elements are a valid submission too: the other half is missed, which is not an error of the program.
     let mut half = submission(&truth, 0.0, None);
     let beams = half["beams"].as_array_mut().unwrap();
     let all = beams.len();
@@ -107,7 +107,7 @@ fn over_confidence_and_the_limit_decide_the_exit_code() {
     let at = folder.path();
     simulate(at, "scenes/two-mirror.toml", "data", &[]);
     let truth = truth_of(at, "data");
-    // All elevations are off by 0.1°: per axis 0.1°/√2 = 0.0707°.
+    // All elevations have an error of 0.1°: per axis 0.1°/√2 = 0.0707°.
     let lift = 0.1_f64.to_radians();
     write(
         at,
@@ -137,7 +137,7 @@ fn over_confidence_and_the_limit_decide_the_exit_code() {
             .starts_with("fails: the per-axis error is 0.0707°"),
         "{score}"
     );
-    // eᵀP⁻¹e = 100 over two dimensions: errors √50 times what is stated.
+    // eᵀP⁻¹e = 100 over two dimensions: errors √50 times the stated ones.
     let score = json_of(at, &["score", "data", "over.json", "--json"], 1);
     assert_eq!(score["honesty"], "over_confident");
     let said = stdout(&run(at, &["score", "data", "over.json"]));
@@ -150,7 +150,7 @@ fn over_confidence_and_the_limit_decide_the_exit_code() {
 }
 
 #[test]
-fn compare_sorts_by_the_point_and_calls_the_over_confident_so() {
+fn compare_sorts_by_the_point_error_and_reports_over_confidence() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     simulate(at, "scenes/two-mirror.toml", "data", &[]);
@@ -160,7 +160,7 @@ fn compare_sorts_by_the_point_and_calls_the_over_confident_so() {
     write(at, "near.json", &submission(&truth, lift, Some(lift)));
     write(at, "truth.json", &submission(&truth, 0.0, Some(lift)));
     let arguments = ["compare", "data", "far.json", "near.json", "truth.json"];
-    // The verdict on one of them is "fail", and comparing them is done all the same.
+    // The verdict on one of them is "fail", and yet the comparison succeeds.
     let found = json_of(at, &[&arguments[..], &["--json"]].concat(), 0);
     let names: Vec<&Value> = found["rows"]
         .as_array()
@@ -241,7 +241,7 @@ fn a_blind_run_is_the_same_recording_without_the_truth() {
     write(at, "c.json", &submission(&truth_of(at, "open"), 0.0, None));
     let score = json_of(at, &["score", "blind", "c.json", "--json"], 0);
     assert_eq!(score["verdict"], "blind");
-    // A limit is not tested where there is nothing to test it by; that is said, and no failure.
+    // A limit is not tested without a truth; that is reported, but is not a failure.
     let score = json_of(
         at,
         &["score", "blind", "c.json", "--json", "--max-rms-deg", "0.001"],

@@ -1,8 +1,8 @@
-//! Whether the stated uncertainty is the real one: errors over independent seeds against their covariances.
+//! Whether the stated uncertainty is correct: errors over independent seeds compared with their covariances.
 //!
-//! One element of each seed, so that the sample is independent: elements of one run share their errors. The simulator
-//! has everything on that the estimator's model lacks (wide beams, edges, uneven mirrors, rounding), so this is not the
-//! inverse crime. It does not prove that the estimate is as good as it could be.
+//! One element of each seed, so that the sample is independent: elements of one run share errors. The simulator includes
+//! all effects that the estimator's model lacks (wide beams, edges, slope errors of mirrors, rounding), so this is not
+//! the inverse crime. It does not prove that the estimate is as accurate as possible.
 
 use crate::scenes::{PROTOTYPE, scene};
 use catoptric::calib::{self, Method, Options};
@@ -12,12 +12,12 @@ use catoptric::sim::Laboratory;
 use catoptric::sim::truth::BeamClass;
 use rayon::prelude::*;
 
-/// Seeds, and the exact 99.9 % bounds of χ² with 400 degrees of freedom over 400: 1 is honest.
+/// Number of seeds, and the exact 99.9 % bounds of χ² with 400 degrees of freedom, divided by 400: 1 is honest.
 const SEEDS: u64 = 200;
 const MEAN_NEES: (f64, f64) = (0.7836, 1.2492);
 
 #[test]
-fn errors_obey_the_stated_covariance() {
+fn errors_match_the_stated_covariance() {
     let mut scene = scene(PROTOTYPE);
     scene.superstructure.facet.truncate(2);
     scene.superstructure.post.truncate(1);
@@ -26,11 +26,11 @@ fn errors_obey_the_stated_covariance() {
     let nees: Vec<f64> = (1..=SEEDS)
         .into_par_iter()
         .map(|seed| {
-            let laboratory = Laboratory::new(&scene, seed).expect("the scene is good");
+            let laboratory = Laboratory::new(&scene, seed).expect("the scene is valid");
             let dataset = laboratory.dataset().expect("recorded");
             let truth = laboratory.truth().expect("known");
-            let calibration =
-                calib::calibrate(&dataset, Method::Beam, &Options::default()).expect("it calibrates");
+            let calibration = calib::calibrate(&dataset, Method::Beam, &Options::default())
+                .expect("the calibration succeeds");
             let deflected: Vec<_> = truth
                 .beams
                 .iter()
@@ -54,9 +54,9 @@ fn errors_obey_the_stated_covariance() {
     let mean = nees.iter().sum::<f64>() / (2.0 * SEEDS as f64);
     assert!(
         MEAN_NEES.0 < mean && mean < MEAN_NEES.1,
-        "mean normalised squared error {mean}"
+        "mean normalized squared error {mean}"
     );
-    // 95 % of 200 errors inside their ellipses; exact binomial bounds at 99.9 %.
+    // 95 % of 200 errors are inside their ellipses; exact binomial bounds at 99.9 %.
     let inside = nees.iter().filter(|n| **n <= score::CHI_SQUARED_95).count();
     assert!(
         (179..=198).contains(&inside),

@@ -1,26 +1,29 @@
-//! What each detector makes of a beam, against closed forms and a waveform summed up by other means.
+//! Every detector compared with closed forms and with an independently summed waveform.
 //!
-//! The closed forms take the light on a tilted board for a Gaussian in range: its mean is off by s·σ_δ²(½ − 2tan²α),
-//! its spread σ_R = s·tan α·σ_δ. That neglects the distribution's skew μ₃ = 6s³·tan²α·(½ + tan²α)·σ_δ⁴: with a pulse of
-//! 4 ns (p = 255 mm) it is worth 0.2 % to an edge at 4 m and 60°, but 1.9 % to the highest point, which therefore has
-//! its own term. For pulses of p near σ_R = 28 mm only the summed waveform holds.
-//! None of this proves that a real scanner has the detector that is simulated.
+//! The closed forms model the light on a tilted board as a Gaussian in range: its mean is shifted by s·σ_δ²(½ − 2tan²α),
+//! its standard deviation is σ_R = s·tan α·σ_δ. That neglects the skew of the distribution, μ₃ = 6s³·tan²α·(½ +
+//! tan²α)·σ_δ⁴: with a pulse of 4 ns (p = 255 mm) it changes the leading edge at 4 m and 60° by 0.2 %, but the peak by
+//! 1.9 %, which therefore has an extra term. For pulses of p near σ_R = 28 mm only the summed waveform is accurate.
+//! None of this proves that a real scanner has the simulated detector.
 
 use crate::common::{folder_with, run, stderr};
 use crate::scenes::{BARE, scene};
-use catoptric::io::scene as scene_file;
-use catoptric::model::{Stretch, beam};
-use catoptric::sim::cast::{Polygon, Shape};
-use catoptric::sim::optics::{self, Mirrors, Role, Setting};
-use catoptric::sim::reading::{Return, Sensor};
+use catoptric::cast::{Polygon, Shape};
+use catoptric::files::scene as scene_file;
+use catoptric::model::Stretch;
+use catoptric::sim::build::Structure;
+use catoptric::sim::build::color;
+use catoptric::sim::light::{Mirrors, Role, Setting};
+use catoptric::sim::receive::phase;
+use catoptric::sim::receive::{Return, Sensor};
 use catoptric::sim::scene::{BeamShape, Detector, ErrorModel, Preset};
-use catoptric::sim::structure::Structure;
-use catoptric::sim::{Laboratory, Scene, color, phase};
+use catoptric::sim::{Laboratory, Scene};
+use catoptric_fixtures::ust20lx;
 use nalgebra::Point3;
 use std::collections::BTreeMap;
 use std::f64::consts::LN_2;
 
-/// Full 1/e² width of the beams here, in milliradians, and the standard deviation of their light, a quarter of it.
+/// Full 1/e² width of the beams here, in milliradians, and the standard deviation of their light, a quarter of that.
 const WIDTH_MRAD: f64 = 16.0;
 const SIGMA: f64 = 0.25e-3 * WIDTH_MRAD;
 
@@ -31,7 +34,7 @@ const DETECTORS: [Detector; 4] = [
     Detector::Centroid,
 ];
 
-/// Standard deviation of a 4 ns pulse, in metres of range.
+/// Standard deviation of a 4 ns pulse, in meters of range.
 fn pulse_sd(fwhm_ns: f64) -> f64 {
     0.5 * 299_792_458.0 * fwhm_ns * 1e-9 / (8.0 * LN_2).sqrt()
 }
@@ -53,7 +56,7 @@ fn physical() -> Scene {
     scene
 }
 
-/// A board in the sensor frame: distance and tilt about the vertical in degrees, the y it reaches from and to, color.
+/// A board in the sensor frame: distance, tilt about the vertical in degrees, extent in y, color.
 struct Target(f64, f64, [f64; 2], &'static str);
 
 /// A board that fills the spot.
@@ -61,7 +64,7 @@ fn filling(distance: f64, tilt_deg: f64, color: &'static str) -> Target {
     Target(distance, tilt_deg, [-3.0, 3.0], color)
 }
 
-/// What the forward beam brings home from boards.
+/// What the forward beam returns from boards.
 fn forward(scene: &Scene, boards: &[Target]) -> Option<Return> {
     let structure = Structure::nominal(scene).expect("there is none");
     let targets = boards
@@ -69,7 +72,7 @@ fn forward(scene: &Scene, boards: &[Target]) -> Option<Return> {
         .map(|Target(distance, tilt_deg, [from, to], color)| {
             let (sin, cos) = libm::sincos(tilt_deg.to_radians());
             let at = |y: f64, z: f64| Point3::new(distance + y * sin, y * cos, z);
-            optics::Target {
+            catoptric::sim::light::Target {
                 name: "board".to_owned(),
                 shape: Shape::Polygon(
                     Polygon::new(vec![at(*to, -1.0), at(*from, -1.0), at(*from, 1.0), at(*to, 1.0)])
@@ -83,22 +86,22 @@ fn forward(scene: &Scene, boards: &[Target]) -> Option<Return> {
         Setting::new(scene, &structure, Mirrors::Attached, targets.collect()).expect("colors are built in");
     Sensor::new(scene)
         .expect("white is built in")
-        .observe(&setting, beam::FORWARD)
+        .observe(&setting, ust20lx::FORWARD)
 }
 
-/// Height of the echo of the whole spot, in thresholds: 0.1 at 8 m is one.
+/// Height of the echo of the whole spot, in units of the threshold: a reflectivity of 0.1 at 8 m gives 1.
 fn height(reflectivity: f64, distance: f64, tilt_deg: f64) -> f64 {
     reflectivity / 0.1 * (8.0 / distance).powi(2) * libm::cos(tilt_deg.to_radians())
 }
 
-/// The waveform of a tilted board, summed over the spot in small steps, and where a detector takes it.
+/// The waveform of a tilted board, summed over the spot in small steps, and the range that a detector takes from it.
 fn summed(distance: f64, tilt_deg: f64, sd: f64, detector: Detector) -> f64 {
     let tilt = tilt_deg.to_radians();
     let n = 4001;
     let pulses: Vec<(f64, f64)> = (0..n)
         .map(|k| {
             let x = -6.0 + 12.0 * f64::from(k) / f64::from(n - 1);
-            // The Gaussian is one in the slope of the rays.
+            // The Gaussian is in the slope of the rays.
             let angle = libm::atan(libm::tan(0.5e-3 * WIDTH_MRAD) * 0.5 * x);
             let range = distance * libm::cos(tilt) / libm::cos(angle + tilt);
             let share = libm::exp(-0.5 * x * x);
@@ -107,7 +110,7 @@ fn summed(distance: f64, tilt_deg: f64, sd: f64, detector: Detector) -> f64 {
         .collect();
     let light: f64 = pulses.iter().map(|p| p.1).sum();
     let mean = pulses.iter().map(|(r, w)| r * w).sum::<f64>() / light;
-    // A spot that meets the board face on is as high as Eq. 1 has it.
+    // The echo of a spot that hits the board face on has the height of Eq. (1).
     let whole: f64 = (0..n)
         .map(|k| libm::exp(-0.5 * (-6.0 + 12.0 * f64::from(k) / f64::from(n - 1)).powi(2)))
         .sum();
@@ -143,7 +146,7 @@ fn summed(distance: f64, tilt_deg: f64, sd: f64, detector: Detector) -> f64 {
     )
 }
 
-/// What the calibration at a white board 2 m away, face on, undoes.
+/// The offset that the calibration at a white board 2 m away, face on, removes.
 fn reference(detector: Detector, sd: f64) -> f64 {
     match detector {
         Detector::LeadingEdge => sd * (2.0 * libm::log(height(0.9, 2.0, 0.0))).sqrt(),
@@ -153,7 +156,7 @@ fn reference(detector: Detector, sd: f64) -> f64 {
 }
 
 #[test]
-fn a_tilted_board_reads_as_the_closed_forms() {
+fn a_tilted_board_reads_as_in_the_closed_forms() {
     let p = pulse_sd(4.0);
     for detector in DETECTORS {
         let (mut worst, mut worst_summed) = (0.0_f64, 0.0_f64);
@@ -166,7 +169,7 @@ fn a_tilted_board_reads_as_the_closed_forms() {
                 let t = libm::tan(tilt_deg.to_radians());
                 let centroid = distance * SIGMA * SIGMA * (0.5 - 2.0 * t * t);
                 let spread = p.hypot(distance * t * SIGMA);
-                // The peak of the echo sinks as it spreads.
+                // The peak of the echo is lower the more it is spread.
                 let lambert = 1.0 + (3.0 * t * t - 1.5) * SIGMA * SIGMA;
                 let f = height(0.9, distance, tilt_deg) * lambert * p / spread;
                 let edge = |k: f64| -k * (spread - p);
@@ -176,14 +179,14 @@ fn a_tilted_board_reads_as_the_closed_forms() {
                         edge(k) - p * k + reference(detector, p)
                     }
                     Detector::ConstantFraction => edge((2.0 * LN_2).sqrt()),
-                    // A skewed echo is highest μ₃/2p² before its mean, μ₃ = 6s³·tan²α·(½ + tan²α)·σ_δ⁴.
+                    // A skewed echo peaks μ₃/2p² before its mean, μ₃ = 6s³·tan²α·(½ + tan²α)·σ_δ⁴.
                     Detector::Peak => {
                         -3.0 * (distance * SIGMA).powi(3) * t * t * (0.5 + t * t) * SIGMA / (spread * spread)
                     }
                     Detector::Centroid => 0.0,
                 };
                 let expected = centroid + walk;
-                // 1 % of the terms' sizes: their sum passes through 0.
+                // 1 % of the magnitudes of the terms, since their sum passes through 0.
                 let size = distance * SIGMA * SIGMA * (0.5 + 2.0 * t * t) + walk.abs();
                 let miss = (error - expected).abs();
                 worst = worst.max(miss / size);
@@ -208,7 +211,7 @@ fn a_tilted_board_reads_as_the_closed_forms() {
 }
 
 #[test]
-fn a_pulse_as_short_as_the_spot_is_deep_reads_as_the_summed_waveform() {
+fn a_pulse_as_short_as_the_depth_of_the_spot_reads_as_the_summed_waveform() {
     let (distance, tilt_deg, fwhm_ns) = (4.0, 60.0, 0.47);
     let p = pulse_sd(fwhm_ns);
     let spread = p.hypot(distance * libm::tan(f64::to_radians(tilt_deg)) * SIGMA);
@@ -218,7 +221,8 @@ fn a_pulse_as_short_as_the_spot_is_deep_reads_as_the_summed_waveform() {
         scene.detection.pulse_fwhm_ns = fwhm_ns;
         let found = forward(&scene, &[filling(distance, tilt_deg, "white")]).expect("it is bright");
         let exact = summed(distance, tilt_deg, p, detector) + reference(detector, p);
-        // Far down the edge, at 1/13 of the height, the beam's tail counts, which the bundle has at one radius: 1.6 %.
+        // Far down the edge, at 1/13 of the height, the beam's tail counts, which the sub-rays sample at a single
+        // radius: 1.6 %.
         assert!(
             (found.range() - exact).abs() < 0.02 * (spread - p) + 1e-9,
             "{detector:?}: {found:?}"
@@ -227,7 +231,7 @@ fn a_pulse_as_short_as_the_spot_is_deep_reads_as_the_summed_waveform() {
 }
 
 #[test]
-fn a_darker_color_walks_only_before_a_fixed_threshold() {
+fn a_darker_color_walks_only_with_a_fixed_threshold() {
     let p = pulse_sd(4.0);
     for detector in DETECTORS {
         for (name, reflectivity) in [("white", 0.9), ("pencil_grey", 0.4), ("jet_black", 0.05)] {
@@ -252,17 +256,17 @@ fn a_darker_color_walks_only_before_a_fixed_threshold() {
     }
 }
 
-/// A scene of the repository, checked as the program checks it, and the stretch with its board.
+/// A scene of the repository, checked as the program does, and the stretch with its board.
 fn recorded(name: &str, text: &str) -> (Laboratory, Stretch) {
     let scene = scene_file::parse(text, name, &[]).unwrap_or_else(|e| panic!("{name}: {e}"));
-    let laboratory = Laboratory::new(&scene, scene.seed).expect("the scene is good");
+    let laboratory = Laboratory::new(&scene, scene.seed).expect("the scene is valid");
     let stretch = laboratory.stretch(2).expect("it is recorded");
     (laboratory, stretch)
 }
 
 /// The forward beam's first reading.
 fn reading(name: &str, text: &str) -> f64 {
-    recorded(name, text).1.ranges[beam::FORWARD]
+    recorded(name, text).1.ranges[ust20lx::FORWARD]
 }
 
 macro_rules! scene_text {
@@ -272,7 +276,7 @@ macro_rules! scene_text {
 }
 
 #[test]
-fn the_detector_scenes_give_their_answers() {
+fn the_detector_scenes_give_the_stated_results() {
     let p = pulse_sd(4.0);
     let lead = |h: f64| p * (2.0 * libm::log(h)).sqrt();
     for ((name, text), expected, tolerance) in [
@@ -283,7 +287,8 @@ fn the_detector_scenes_give_their_answers() {
             2.0 + lead(28.8) - lead(12.8),
             1e-9,
         ),
-        // The part beyond the edge has no chief ray: its mean range is a few micrometres beyond the wall's nearest.
+        // The part beyond the edge has no chief ray: its mean range exceeds the wall's nearest range by a few
+        // micrometers.
         (scene_text!("last-echo"), 5.0, 2e-4),
         (scene_text!("phase-ambiguity"), 6.0 - phase::ambiguity(3e7), 1e-9),
     ] {
@@ -296,7 +301,7 @@ fn the_detector_scenes_give_their_answers() {
 }
 
 #[test]
-fn the_scenes_of_two_surfaces_give_their_answers() {
+fn the_scenes_of_two_surfaces_give_the_stated_results() {
     let (name, text) = scene_text!("two-echoes");
     let (laboratory, stretch) = recorded(name, text);
     let sheet = laboratory.session().expect("known").scanner;
@@ -304,13 +309,14 @@ fn the_scenes_of_two_surfaces_give_their_answers() {
         (sheet.preset.as_str(), sheet.range_min_m, sheet.range_max_m),
         ("utm-30lx-ew", 0.1, 30.0)
     );
-    assert!((stretch.ranges[beam::FORWARD] - 2.0).abs() < 1e-9);
-    let echoes = &stretch.echoes.as_ref().expect("they are recorded")[beam::FORWARD];
+    assert!((stretch.ranges[ust20lx::FORWARD] - 2.0).abs() < 1e-9);
+    let echoes = &stretch.echoes.as_ref().expect("they are recorded")[ust20lx::FORWARD];
     assert!(
         echoes.len() == 2 && (echoes[0] - 2.0).abs() < 1e-9 && (echoes[1] - 5.0).abs() < 2e-4,
         "{echoes:?}"
     );
-    // The edge is 1 mm beside the beam's middle; the board gets Φ of that over the spot's spread.
+    // The edge is 1 mm from the center of the beam; the share of the board is Φ of that over the spot's standard
+    // deviation.
     let covered = |distance: f64| {
         let spread = 0.5 * distance * libm::tan(8e-3);
         0.5 * libm::erfc(-1e-3 / spread / std::f64::consts::SQRT_2)
@@ -319,7 +325,7 @@ fn the_scenes_of_two_surfaces_give_their_answers() {
     let found = reading(name, text);
     let (near, far) = (covered(4.7) / 4.7_f64.powi(2), (1.0 - covered(4.7)) / 25.0);
     let expected = (near * 4.7 + far * 5.0) / (near + far);
-    // A thousand rays decide where the edge lies to a few parts in a thousand of 0.3 m.
+    // With a thousand rays the edge is located to a few parts in a thousand of 0.3 m.
     assert!(
         (found - expected).abs() < 0.005,
         "{name}: {found} against {expected}"
@@ -338,10 +344,14 @@ fn the_scenes_of_two_surfaces_give_their_answers() {
 }
 
 #[test]
-fn the_scenes_of_chance_and_limits_give_their_answers() {
+fn the_scenes_of_random_effects_and_limits_give_the_stated_results() {
     let (name, text) = scene_text!("faint-board");
     let (_, stretch) = recorded(name, text);
-    let readings = stretch.ranges.iter().skip(beam::FORWARD).step_by(beam::COUNT);
+    let readings = stretch
+        .ranges
+        .iter()
+        .skip(ust20lx::FORWARD)
+        .step_by(ust20lx::COUNT);
     let (mut seen, mut missed) = (0.0, 0.0);
     for reading in readings {
         if reading.is_finite() {
@@ -358,23 +368,27 @@ fn the_scenes_of_chance_and_limits_give_their_answers() {
 
     let (name, text) = scene_text!("custom-scanner");
     let (laboratory, stretch) = recorded(name, text);
-    assert!((stretch.ranges[beam::FORWARD] - 2.0).abs() < 1e-12);
-    assert_eq!(stretch.ranges[beam::FORWARD + 13], f64::INFINITY, "the far wall");
+    assert!((stretch.ranges[ust20lx::FORWARD] - 2.0).abs() < 1e-12);
     assert_eq!(
-        stretch.ranges[beam::FORWARD + 360],
+        stretch.ranges[ust20lx::FORWARD + 13],
+        f64::INFINITY,
+        "the far wall"
+    );
+    assert_eq!(
+        stretch.ranges[ust20lx::FORWARD + 360],
         f64::NEG_INFINITY,
         "the near one"
     );
     let sheet = laboratory.session().expect("known").scanner;
-    assert_eq!((stretch.scan_period_s, sheet.scan_rate_hz), (0.1, 10.0));
+    assert_eq!((stretch.scan_period_s, sheet.scan.scan_rate_hz()), (0.1, 10.0));
     assert_eq!((sheet.range_min_m, sheet.range_max_m), (0.5, 4.0));
 
     let (name, text) = scene_text!("warm-up");
     let (laboratory, stretch) = recorded(name, text);
-    for (scan, ranges) in stretch.ranges.chunks(beam::COUNT).enumerate() {
+    for (scan, ranges) in stretch.ranges.chunks(ust20lx::COUNT).enumerate() {
         let expected = 2.0 + 8e-3 * libm::exp(-(10.05 + scan as f64 / 40.0) / 100.0);
         assert!(
-            (ranges[beam::FORWARD] - expected).abs() < 1e-12,
+            (ranges[ust20lx::FORWARD] - expected).abs() < 1e-12,
             "{name}, scan {scan}"
         );
     }
@@ -385,7 +399,7 @@ fn the_scenes_of_chance_and_limits_give_their_answers() {
 }
 
 #[test]
-fn what_contradicts_itself_is_refused() {
+fn contradictory_settings_are_refused() {
     let (name, text) = scene_text!("walk-of-grey");
     for (sets, key) in [
         (
@@ -485,9 +499,9 @@ fn the_truth_adds_up_to_every_reading() {
     );
 }
 
-/// What the guide chapter on Table 3 says, in millimetres: growth of the error from 0.9° to 18.5° and to 44.7°.
+/// The figures in the guide's chapter on Table 3, in millimeters: growth of the error from 0.9° to 18.5° and to 44.7°.
 #[test]
-fn the_guide_says_of_table_3_what_the_physics_says() {
+fn the_guide_states_the_simulated_figures_of_table_3() {
     let guide = include_str!("../../docs/guide/6-physics-of-table-3.md");
     let mut missing = false;
     for (preset, spot) in [(Preset::Ust20lx, "manual"), (Preset::Ust20lxCooper, "Table 1")] {
@@ -511,7 +525,7 @@ fn the_guide_says_of_table_3_what_the_physics_says() {
             missing |= !guide.contains(&row);
         }
     }
-    assert!(!missing, "the guide must hold the rows printed above");
+    assert!(!missing, "the guide must contain the rows printed above");
 }
 
 fn name_of(detector: Detector) -> &'static str {

@@ -1,22 +1,22 @@
-//! The same scene and seed give the same numbers, on any number of threads, in any order.
+//! The same scene and seed give the same numbers, on any number of threads and in any order.
 
 use crate::scenes::{PROTOTYPE, scene};
 use catoptric::sim::Laboratory;
 use catoptric::testing::same_result;
 
 #[test]
-fn a_stretch_recorded_alone_is_the_stretch_recorded_in_turn() {
+fn a_stretch_recorded_alone_equals_the_same_stretch_recorded_in_sequence() {
     let mut scene = scene(PROTOTYPE);
     scene.experiment.scans_per_pose = 3;
-    let laboratory = Laboratory::new(&scene, 5).expect("the scene is good");
+    let laboratory = Laboratory::new(&scene, 5).expect("the scene is valid");
     let in_turn: Vec<_> = (0..laboratory.stretches())
         .map(|i| laboratory.stretch(i).expect("recorded"))
         .collect();
-    let again = Laboratory::new(&scene, 5).expect("the scene is good");
+    let again = Laboratory::new(&scene, 5).expect("the scene is valid");
     for number in [40, 3, 17] {
         assert_eq!(again.stretch(number).expect("recorded"), in_turn[number]);
     }
-    let other = Laboratory::new(&scene, 6).expect("the scene is good");
+    let other = Laboratory::new(&scene, 6).expect("the scene is valid");
     assert_ne!(other.stretch(3).expect("recorded").ranges, in_turn[3].ranges);
 }
 
@@ -26,7 +26,7 @@ fn the_number_of_threads_changes_nothing() {
     scene.experiment.scans_per_pose = 2;
     scene.experiment.poses_per_group = 3;
     let record = || {
-        let laboratory = Laboratory::new(&scene, 1).expect("the scene is good");
+        let laboratory = Laboratory::new(&scene, 1).expect("the scene is valid");
         (
             laboratory.dataset().expect("recorded"),
             laboratory.truth().expect("known"),

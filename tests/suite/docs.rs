@@ -1,18 +1,18 @@
-//! The documents say what is so: crates, files, commands, keys and printed figures are compared with the real ones.
+//! The documents are correct: crates, files, commands, keys and printed figures are compared with the real ones.
 //!
-//! These prove that what the documents name exists, and that what they have to name is there. They do not prove that
-//! the sentences around it are true; the examples of the guide are run as doc tests.
+//! These prove that everything the documents name exists, and that everything they must name is there. They do not prove
+//! that the sentences are true; the examples of the guide are run as doctests.
 
 use crate::common::{run, stdout};
-use catoptric::io::scene::{self, Layout};
+use catoptric::files::scene::{self, Template};
 use catoptric::model::assessment::{Assessment, HeldOut, SharedParameter, VarianceComponent};
 use catoptric::model::calibration::{FacetEstimate, MountEstimate};
-use catoptric::model::{AngleTable, BeamEstimate, Calibration, RangeBias, Status};
+use catoptric::model::{AngleTable, BeamEstimate, Calibration, RangeBias, ScanGeometry, Status};
 use catoptric::{calib, score, sim};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
 fn root() -> &'static Path {
@@ -23,7 +23,7 @@ fn read(path: &str) -> String {
     fs::read_to_string(root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"))
 }
 
-/// Every file below a folder, with its path from the repository's root.
+/// All files below a folder, with their paths relative to the root of the repository.
 fn files_below(folder: &str) -> Vec<String> {
     let mut found = Vec::new();
     for entry in fs::read_dir(root().join(folder)).unwrap() {
@@ -48,7 +48,7 @@ fn documents() -> Vec<(String, String)> {
     paths.into_iter().map(|p| (p.clone(), read(&p))).collect()
 }
 
-/// What stands between single backquotes, outside of code blocks.
+/// The text between single backquotes, outside code blocks.
 fn code_words(text: &str) -> Vec<String> {
     let prose: Vec<&str> = text.split("```").step_by(2).collect();
     let prose = prose.concat();
@@ -110,7 +110,7 @@ fn dependencies(package: &str) -> BTreeSet<String> {
         .collect();
     assert!(
         names.contains(package),
-        "cargo tree says nothing of {package}:\n{text}"
+        "cargo tree does not list {package}:\n{text}"
     );
     names
 }
@@ -141,7 +141,7 @@ fn the_estimator_cannot_see_the_truth() {
         !sim.contains("catoptric-calib") && !sim.contains("catoptric"),
         "{sim:?}"
     );
-    // The names looked for are those that cargo prints.
+    // Names as printed by cargo.
     assert!(
         has(&sim, "parry") && has(&sim, "rand") && sim.contains("catoptric-model"),
         "{sim:?}"
@@ -151,7 +151,7 @@ fn the_estimator_cannot_see_the_truth() {
 #[test]
 fn every_scene_is_valid() {
     let mut scenes = files_below("scenes");
-    // Beside them are the meshes that they name.
+    // Meshes are stored next to the scenes that refer to them.
     scenes.retain(|p| p.ends_with(".toml"));
     assert!(scenes.len() >= 2, "{scenes:?}");
     for path in scenes {
@@ -162,7 +162,7 @@ fn every_scene_is_valid() {
 }
 
 #[test]
-fn links_lead_somewhere() {
+fn links_have_targets() {
     let mut links = 0;
     for (path, text) in documents() {
         let folder = root().join(&path).parent().unwrap().to_owned();
@@ -181,7 +181,7 @@ fn links_lead_somewhere() {
             } else if !target.starts_with("https://") {
                 assert!(
                     folder.join(target).exists(),
-                    "{path} links to {target}, which is not there"
+                    "{path} links to {target}, which does not exist"
                 );
             }
         }
@@ -190,7 +190,7 @@ fn links_lead_somewhere() {
 }
 
 #[test]
-fn files_that_documents_name_exist() {
+fn files_named_in_documents_exist() {
     let folders = [
         "crates/",
         "src/",
@@ -209,7 +209,7 @@ fn files_that_documents_name_exist() {
                 named += 1;
                 assert!(
                     root().join(&word).exists(),
-                    "{path} names {word}, which is not there"
+                    "{path} names {word}, which does not exist"
                 );
             }
         }
@@ -218,45 +218,83 @@ fn files_that_documents_name_exist() {
 }
 
 #[test]
-fn the_code_map_is_the_tree() {
+fn the_architecture_names_every_crate() {
     let text = read("ARCHITECTURE.md");
-    let sources = |folder: &str| {
-        files_below(folder)
-            .into_iter()
-            .filter(|p| p.ends_with(".rs"))
-            .map(PathBuf::from)
-    };
-    let mut folders: BTreeSet<PathBuf> = BTreeSet::new();
-    for crate_sources in ["src", "crates/model/src", "crates/sim/src", "crates/calib/src"] {
-        folders.extend(sources(crate_sources).map(|p| p.parent().unwrap().to_owned()));
+    let named = first_column(&text, "## The crates");
+    let mut there: BTreeSet<String> = files_below("crates")
+        .into_iter()
+        .filter(|path| path.ends_with("/Cargo.toml"))
+        .chain(["Cargo.toml".to_owned()])
+        .map(|path| package_name(&read(&path)))
+        .collect();
+    there.remove("");
+    assert_eq!(named, there, "ARCHITECTURE.md (left) and the workspace (right)");
+}
+
+/// The name that a Cargo.toml gives its package.
+fn package_name(manifest: &str) -> String {
+    let mut lines = manifest
+        .lines()
+        .skip_while(|line| *line != "[package]")
+        .filter_map(|line| line.strip_prefix("name = "));
+    lines.next().unwrap_or_default().trim_matches('"').to_owned()
+}
+
+#[test]
+fn every_source_file_says_first_what_it_is() {
+    for folder in ["src", "crates", "tests", "benches", "examples"] {
+        for path in files_below(folder).into_iter().filter(|p| p.ends_with(".rs")) {
+            let text = read(&path);
+            let first = text.lines().next().unwrap_or_default();
+            assert!(
+                first.starts_with("//!") || path.ends_with("/build.rs"),
+                "{path} begins with {first:?}"
+            );
+        }
     }
-    for folder in folders {
-        let folder = folder.to_str().unwrap();
-        // A module split into a folder says itself what its parts are; the crates and the folders that hold many ideas
-        // have a table.
-        let is_crate = folder == "src" || folder.starts_with("crates/") && folder.ends_with("/src");
-        if !is_crate && !text.contains(&format!("### `{folder}` ")) {
-            continue;
-        }
-        let named = first_column(&text, &format!("### `{folder}` "));
-        let is_own = |path: &PathBuf| path.parent() == Some(Path::new(folder));
-        let mut there: BTreeSet<String> = BTreeSet::new();
-        for path in sources(folder) {
-            let stem = path.file_stem().unwrap().to_str().unwrap().to_owned();
-            // Modules in folders of their own are known by the folder; lib.rs is the crate itself.
-            let module = if is_own(&path) {
-                stem
-            } else {
-                let inner = path.strip_prefix(folder).unwrap();
-                inner.iter().next().unwrap().to_str().unwrap().to_owned()
-            };
-            there.insert(module);
-        }
-        there.remove("mod");
-        if folder != "src" {
-            there.remove("lib");
-        }
-        assert_eq!(named, there, "ARCHITECTURE.md (left) and {folder} (right)");
+}
+
+/// Packages that a user compiles beside our own crates' dependencies, ours counted.
+fn packages(arguments: &[&str]) -> BTreeSet<String> {
+    let output = Command::new(env!("CARGO"))
+        .args([
+            "tree",
+            "--locked",
+            "--offline",
+            "--prefix",
+            "none",
+            "--format",
+            "{p}",
+        ])
+        .args(["-e", "normal"])
+        .args(arguments)
+        .current_dir(root())
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let words = |line: &str| line.split(' ').take(2).collect::<Vec<_>>().join(" ");
+    stdout(&output).lines().map(words).collect()
+}
+
+#[test]
+fn who_only_tests_a_calibration_compiles_little() {
+    let with = packages(&["-p", "catoptric", "--features", "testing"]);
+    let without = packages(&[
+        "-p",
+        "catoptric",
+        "--no-default-features",
+        "--features",
+        "testing",
+    ]);
+    assert!(with.len() <= 125, "{}: {with:?}", with.len());
+    assert!(without.len() <= 95, "{}: {without:?}", without.len());
+    for foreign in ["clap", "indicatif", "plotters", "image", "argmin"] {
+        let has = |names: &BTreeSet<String>| names.iter().any(|n| n.split(' ').next() == Some(foreign));
+        assert!(!has(&with) && !has(&without), "{foreign}");
     }
 }
 
@@ -275,17 +313,17 @@ fn verbs() -> BTreeSet<String> {
     verbs
 }
 
-/// Every `catoptric …` command that a document shows, as words.
+/// Every `catoptric …` command shown in a document, as words.
 fn commands_of_the_program() -> Vec<(String, Vec<String>)> {
     let mut commands = Vec::new();
     for (path, text) in documents() {
         let shown = code_blocks(&text, "sh").concat();
         let lines = shown.lines().map(str::to_owned).chain(code_words(&text));
         for line in lines.flat_map(|l| l.split("&&").map(|c| c.trim().to_owned()).collect::<Vec<_>>()) {
-            // What the output is piped into has options of its own.
-            let own = line.split(" | ").next().unwrap();
-            if let Some(rest) = own.strip_prefix("catoptric ") {
-                commands.push((path.clone(), rest.split_whitespace().map(str::to_owned).collect()));
+            if let Some(rest) = line.strip_prefix("catoptric ") {
+                // What follows a pipe is somebody else's program.
+                let words = rest.split_whitespace().take_while(|word| *word != "|");
+                commands.push((path.clone(), words.map(str::to_owned).collect()));
             }
         }
     }
@@ -358,7 +396,7 @@ fn the_demo_prints_what_the_readme_says() {
     }
 }
 
-/// Paths of all keys of a value; lists are `name[]`, maps with free keys end where they are named.
+/// Paths of all keys of a value; lists are written `name[]`, and maps with free keys are not descended into.
 fn keys(value: &Value, free: &[&str]) -> BTreeSet<String> {
     fn walk(value: &Value, path: &str, free: &[&str], found: &mut BTreeSet<String>) {
         match value {
@@ -415,9 +453,11 @@ fn every_key() -> Calibration {
         covariance: Some([[0.0; 6]; 6]),
     };
     Calibration {
-        schema_version: 1,
+        schema_version: 2,
         method: "mine".to_owned(),
         frame: "sensor".to_owned(),
+        scanner: Some(*ScanGeometry::default().angles()),
+        dataset: Some("0".repeat(64)),
         beams: vec![estimate],
         facets: vec![facet],
         rig_from_sensor: Some(mount),
@@ -482,7 +522,7 @@ waypoint = [{ time_s = 0, position_m = [0, 0, 1.8] }, { time_s = 0.025, position
 pose = 3
 moved_mm = [0, 0, 4]
 "#;
-    let small = scene::scene_template(Layout::TwoMirror).to_owned() + flight;
+    let small = Template::TwoMirror.text().to_owned() + flight;
     let small = scene::parse(&small, "two-mirror.toml", &quick).unwrap();
     let laboratory = sim::Laboratory::new(&small, small.seed).unwrap();
     let (dataset, truth) = (laboratory.dataset().unwrap(), laboratory.truth().unwrap());
@@ -498,7 +538,7 @@ moved_mm = [0, 0, 4]
     );
 
     let calibration = calib::calibrate(&dataset, calib::Method::Beam, &calib::Options::default()).unwrap();
-    let score = score(&dataset, &calibration, Some(&truth));
+    let score = score(&dataset, &calibration, Some(&truth)).expect("in memory");
     same(
         "score.json",
         &json(serde_json::to_value(&score)),
@@ -623,7 +663,7 @@ fn documented_figures_of_a_tolerance_are_those_of_its_json() {
     );
 }
 
-/// The files that the picture of a dataset's folder lists.
+/// The files listed in the picture of a dataset folder.
 fn files_of_dataset(text: &str) -> Vec<String> {
     let picture = &code_blocks(text, "text")[0];
     let files: Vec<String> = picture

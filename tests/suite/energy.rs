@@ -1,21 +1,23 @@
-//! Light as a whole: none of it is lost, none appears, and it grows smoothly through face-on.
+//! Energy balance: no light is lost or created, and the received power is continuous through face-on.
 //!
-//! This proves the accounts of energy, not where it goes: that is for `physics` and `tracing`.
+//! This proves the energy balance, not the paths: those are covered by `physics` and `tracing`.
 
 use crate::scenes::{BARE, scene};
-use catoptric::model::beam;
-use catoptric::sim::cast::{Polygon, Shape};
+use catoptric::cast::{Polygon, Shape};
+use catoptric::sim::Scene;
+use catoptric::sim::build::Structure;
+use catoptric::sim::build::color;
+use catoptric::sim::light::{Mirrors, Role, Setting, Target};
 use catoptric::sim::noise::{Draws, Purpose};
-use catoptric::sim::optics::{Mirrors, Role, Setting, Target};
-use catoptric::sim::reading::{Return, Sensor, Stop, SubRayEnd};
+use catoptric::sim::receive::phase;
+use catoptric::sim::receive::{Return, Sensor, Stop, SubRayEnd};
 use catoptric::sim::scene::{
     Detector, ErrorModel, Facet, FacetShape, Glass, Post, PostCylinder, PostShape, Principle, RectangleShape,
 };
-use catoptric::sim::structure::Structure;
-use catoptric::sim::{Scene, color, phase};
+use catoptric_fixtures::ust20lx;
 use nalgebra::{Point3, Vector3};
 
-/// A white rectangle at a place, seen along its normal.
+/// A white rectangle at a position, facing along its normal.
 fn rectangle(scene: &Scene, center: Point3<f64>, normal: Vector3<f64>, half: [f64; 2]) -> Target {
     let normal = normal.normalize();
     let across = normal.cross(&Vector3::z()).normalize();
@@ -49,7 +51,7 @@ fn rectangle_facet(name: String, center_mm: Vector3<f64>, normal: Vector3<f64>, 
     }
 }
 
-/// Facets, posts and boards at random places: some with glass, some with two sides.
+/// Facets, posts and boards at random positions: some with glass, some with two sides.
 fn random_scene(draws: &mut Draws, round: usize) -> Scene {
     let mut scene = scene(BARE);
     scene.scanner.sub_rays = 61;
@@ -93,7 +95,7 @@ fn random_scene(draws: &mut Draws, round: usize) -> Scene {
     scene
 }
 
-/// Power that a way brings home.
+/// Power that a path returns.
 fn power(end: &SubRayEnd) -> f64 {
     match end.stop {
         Stop::Hit { power, .. } => power,
@@ -102,13 +104,13 @@ fn power(end: &SubRayEnd) -> f64 {
 }
 
 #[test]
-fn a_beams_energy_is_all_accounted_for() {
+fn the_energy_of_a_beam_is_fully_accounted_for() {
     let mut draws = Draws::new(17, Purpose::Placement, 0);
     let (mut compared, mut split, mut escaped, mut trapped) = (0, 0, 0, 0);
     for round in 0..60 {
         let scene = random_scene(&mut draws, round);
         let structure = Structure::nominal(&scene).unwrap();
-        // A wall on one side, boards here and there; the rest of the world is open.
+        // A wall on one side, a few boards; everything else is open.
         let mut targets = vec![rectangle(
             &scene,
             Point3::new(4.0, 0.0, 0.0),
@@ -121,7 +123,7 @@ fn a_beams_energy_is_all_accounted_for() {
         }
         let setting = Setting::new(&scene, &structure, Mirrors::Attached, targets).unwrap();
         let sensor = Sensor::new(&scene).unwrap();
-        for index in (0..beam::COUNT).step_by(9) {
+        for index in (0..ust20lx::COUNT).step_by(9) {
             let ends = sensor.sub_ray_ends(&setting, index);
             let weight: f64 = ends.iter().map(|e| e.sub_ray.weight).sum();
             assert!((weight - 1.0).abs() < 1e-12, "beam {index}: {weight}");
@@ -140,7 +142,7 @@ fn a_beams_energy_is_all_accounted_for() {
             trapped += ends.iter().filter(|e| e.stop == Stop::Trapped).count();
         }
     }
-    // The cases are what they claim to be.
+    // The random scenes contain the intended cases.
     assert!(
         compared > 7000 && split > 300,
         "{split} of {compared} beams are split"
@@ -151,17 +153,17 @@ fn a_beams_energy_is_all_accounted_for() {
     );
 }
 
-/// What the forward beam brings home in a setting.
+/// What the forward beam returns in a setting.
 fn forward(scene: &Scene, targets: Vec<Target>) -> (Option<Return>, Vec<SubRayEnd>) {
     let structure = Structure::nominal(scene).unwrap();
     let setting = Setting::new(scene, &structure, Mirrors::Attached, targets).unwrap();
     let sensor = Sensor::new(scene).unwrap();
-    let ends = sensor.sub_ray_ends(&setting, beam::FORWARD);
-    (sensor.observe(&setting, beam::FORWARD), ends)
+    let ends = sensor.sub_ray_ends(&setting, ust20lx::FORWARD);
+    (sensor.observe(&setting, ust20lx::FORWARD), ends)
 }
 
 #[test]
-fn light_and_range_pass_smoothly_through_face_on() {
+fn light_and_range_are_continuous_through_face_on() {
     for detector in [
         Detector::LeadingEdge,
         Detector::ConstantFraction,
@@ -173,7 +175,7 @@ fn light_and_range_pass_smoothly_through_face_on() {
             scene.errors.model = ErrorModel::Physical;
             scene.detection.detector = detector;
             scene.scanner.sub_rays = 61;
-            // A mirror that lifts the forward beam by 90°, or none: the board is 2 m on.
+            // A mirror that lifts the forward beam by 90°, or none: the board is 2 m farther.
             let (at, towards) = if folded {
                 let facet = rectangle_facet(
                     "lift".to_owned(),
@@ -189,7 +191,7 @@ fn light_and_range_pass_smoothly_through_face_on() {
             for side in [Vector3::y(), towards.cross(&Vector3::y())] {
                 let read = |tilt: f64| {
                     let normal: Vector3<f64> = towards * libm::cos(tilt) + side * libm::sin(tilt);
-                    // Its sides are as they are whatever the tilt: it fills the spot.
+                    // Its size does not depend on the tilt: it fills the spot.
                     let mut target = rectangle(&scene, at, Vector3::x(), [1.0, 1.0]);
                     let x = normal.cross(&Vector3::new(0.3, 0.5, 0.7)).normalize();
                     let y = normal.cross(&x);
@@ -202,7 +204,7 @@ fn light_and_range_pass_smoothly_through_face_on() {
                 for tilt in [1e-12, 1e-9, 1e-7, 1e-6, 1e-5] {
                     for tilt in [tilt, -tilt] {
                         let found = read(tilt);
-                        // A tilt of 1e-5 takes 5e-11 of the light by its cosine.
+                        // A tilt of 1e-5 reduces the light by 5e-11, its cosine.
                         assert!(
                             (found.power / face_on.power - 1.0).abs() < 1e-9,
                             "{detector:?} at {tilt}"
@@ -219,7 +221,7 @@ fn light_and_range_pass_smoothly_through_face_on() {
 }
 
 #[test]
-fn ranging_by_phase_is_the_phasor_sum_of_the_light_that_is_listed() {
+fn ranging_by_phase_is_the_phasor_sum_of_the_listed_light() {
     let mut draws = Draws::new(31, Purpose::Placement, 0);
     let mut outside = 0;
     for _ in 0..200 {
@@ -228,7 +230,7 @@ fn ranging_by_phase_is_the_phasor_sum_of_the_light_that_is_listed() {
         scene.detection.modulation_hz = 46.55e6;
         scene.errors.model = ErrorModel::Physical;
         scene.scanner.sub_rays = 127;
-        // A board before part of the spot, another behind it.
+        // One board covers part of the spot, another is behind it.
         let (near, gap) = (0.8 + draws.uniform(), 0.1 + 1.8 * draws.uniform());
         let edge = draws.within(0.004) * near;
         let targets = vec![
@@ -256,7 +258,7 @@ fn ranging_by_phase_is_the_phasor_sum_of_the_light_that_is_listed() {
         });
         let Some(found) = found else { continue };
         let expected = libm::atan2(y, x) / wave;
-        // Where the two nearly cancel, their direction is worth less.
+        // Where the two nearly cancel, their phase is less accurate.
         let light: f64 = ends.iter().map(power).sum();
         let worth = 1e-14 * light / libm::hypot(x, y) + 1e-13;
         assert!(
@@ -267,5 +269,5 @@ fn ranging_by_phase_is_the_phasor_sum_of_the_light_that_is_listed() {
         assert!((0.0..=ambiguity).contains(&found.range()));
         outside += usize::from(found.range() < near - 1e-3 || found.range() > near + gap + 1e-3);
     }
-    assert!(outside > 10, "{outside} readings are outside of the two surfaces");
+    assert!(outside > 10, "{outside} readings are outside the two surfaces");
 }

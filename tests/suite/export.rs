@@ -1,14 +1,14 @@
-//! What `export` writes is what was drawn: closed, outward, of the right size.
+//! The output of `export` equals the drawing: closed, outward, of the right size.
 //!
-//! `tests/export_peers.py` opens the same files with readers that others wrote.
+//! `tests/export_peers.py` opens the same files with third-party readers.
 
 use crate::common::{run, stderr, stdout};
+use catoptric::cast::volume;
 use catoptric::export::{self, Part, Solid};
-use catoptric::io::mesh::read_mesh;
-use catoptric::io::scene as scenes;
+use catoptric::files::mesh::read_mesh;
+use catoptric::files::scene as scenes;
 use catoptric::layout::{Detail, Drawing, analyze};
 use catoptric::sim::Scene;
-use catoptric::sim::cast::volume;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -19,7 +19,7 @@ fn load(path: &str) -> Scene {
 
 const SCENES: [&str; 3] = ["prototype.toml", "two-mirror.toml", "reference-facet.toml"];
 
-/// Every edge of a closed surface is walked once in each direction.
+/// Every edge of a closed surface occurs once in each direction.
 fn assert_closed(solid: &Solid) {
     let key = |p: &nalgebra::Point3<f64>| [p.x.to_bits(), p.y.to_bits(), p.z.to_bits()];
     let mut edges: BTreeMap<_, i32> = BTreeMap::new();
@@ -55,7 +55,7 @@ fn mirror_plates_have_their_area_and_thickness() {
         let drawing = Drawing::new(&scene, None).unwrap();
         let plates = export::solids(&scene, &drawing, Part::Mirrors);
         for (plate, facet) in plates.iter().zip(&analysis.facets) {
-            // A mirror drawn without a thickness is made of the least that is cut.
+            // A mirror drawn without a thickness gets the minimum thickness that can be cut.
             let drawn = scene.superstructure.mirror.thickness_mm;
             let thickness_mm = if drawn > 0.0 { drawn } else { 1.0 };
             let by_hand = facet.area_mm2 * thickness_mm * 1e-9;
@@ -69,7 +69,7 @@ fn mirror_plates_have_their_area_and_thickness() {
 }
 
 #[test]
-fn the_frame_takes_no_sight() {
+fn the_frame_blocks_no_view() {
     for name in SCENES {
         assert_eq!(
             export::shaded_by_frame(&load(name), None).unwrap(),
@@ -80,8 +80,8 @@ fn the_frame_takes_no_sight() {
 }
 
 #[test]
-fn a_frame_in_the_way_is_found() {
-    // A mirror that throws its fan back over the scanner meets the hub above it.
+fn a_frame_in_the_view_is_detected() {
+    // A mirror that deflects its fan back over the scanner, where it hits the hub above.
     let mut scene = load("two-mirror.toml");
     scene.superstructure.facet.truncate(1);
     scene.superstructure.facet[0].shape =
@@ -95,7 +95,7 @@ fn a_frame_in_the_way_is_found() {
 }
 
 #[test]
-fn an_stl_is_read_back_in_millimetres() {
+fn an_stl_is_read_back_in_millimeters() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("all.stl");
     let scene = load("prototype.toml");
@@ -116,7 +116,7 @@ fn an_stl_is_read_back_in_millimetres() {
     assert!((read / (1e3 * drawn) - 1.0).abs() < 1e-6, "{read} {drawn}");
 }
 
-/// A number of the JSON that counts or points.
+/// A number of the JSON that is a count or an index.
 fn whole(value: &serde_json::Value) -> usize {
     usize::try_from(value.as_u64().unwrap()).unwrap()
 }
@@ -135,7 +135,7 @@ fn parts(glb: &[u8]) -> (serde_json::Value, Vec<u8>) {
 }
 
 #[test]
-fn a_glb_holds_what_its_accessors_say_in_metres() {
+fn a_glb_matches_its_accessors_in_meters() {
     let scene = load("prototype.toml");
     let drawing = Drawing::new(&scene, None).unwrap();
     let (json, data) = parts(&export::glb(&scene, &drawing, 0.5));
@@ -162,7 +162,7 @@ fn a_glb_holds_what_its_accessors_say_in_metres() {
             .find(|m| m["name"] == name)
             .unwrap_or_else(|| panic!("no {name}"))
     };
-    // Undeflected beams end half a metre from the scanner, the one ahead on the x axis.
+    // Undeflected beams end half a meter from the scanner, the forward one on the x axis.
     let lines = &find("beams undeflected")["primitives"][0];
     assert_eq!(lines["mode"], 1);
     let accessor = &accessors[whole(&lines["attributes"]["POSITION"])];
@@ -174,7 +174,7 @@ fn a_glb_holds_what_its_accessors_say_in_metres() {
 }
 
 #[test]
-fn a_drawing_table_gives_the_mirrors_back() {
+fn a_drawing_table_reproduces_the_mirrors() {
     let scene = load("prototype.toml");
     let drawing = Drawing::new(&scene, None).unwrap();
     let table = export::drawing_table(&scene, &drawing).unwrap();
@@ -198,7 +198,7 @@ fn a_drawing_table_gives_the_mirrors_back() {
         for (axis, name) in ["x_mm", "y_mm", "z_mm"].into_iter().enumerate() {
             assert!((number(name) - 1e3 * corner[axis]).abs() < 1e-6);
         }
-        // The plane holds its corners.
+        // The plane contains its corners.
         let normal = [number("normal_x"), number("normal_y"), number("normal_z")];
         let on_plane: f64 = normal.iter().zip(corner.iter()).map(|(m, c)| m * c * 1e3).sum();
         assert!((on_plane - number("plane_offset_mm")).abs() < 1e-3);
@@ -207,7 +207,7 @@ fn a_drawing_table_gives_the_mirrors_back() {
             scene.superstructure.as_built.tilt_sd_deg
         );
     }
-    // The corner angles of a quadrangle.
+    // The corner angles of a quadrilateral.
     let of_first = rows
         .iter()
         .take(4)
@@ -215,7 +215,7 @@ fn a_drawing_table_gives_the_mirrors_back() {
     assert!((of_first.sum::<f64>() - 360.0).abs() < 1e-4);
 }
 
-/// The three numbers of an attribute of the joint to a link.
+/// The three numbers of an attribute of the joint of a link.
 fn joint(urdf: &str, child: &str, attribute: &str) -> [f64; 3] {
     let at = urdf
         .find(&format!("<child link=\"{child}\"/>"))
@@ -227,7 +227,7 @@ fn joint(urdf: &str, child: &str, attribute: &str) -> [f64; 3] {
 }
 
 #[test]
-fn urdf_frames_stand_on_the_mirrors() {
+fn urdf_frames_are_located_on_the_mirrors() {
     let mut scene = load("prototype.toml");
     scene.scanner.mount.yaw_deg = 30.0;
     let drawing = Drawing::new(&scene, None).unwrap();
@@ -237,7 +237,7 @@ fn urdf_frames_stand_on_the_mirrors() {
     for facet in &drawing.facets {
         let link = format!("mirror_{}", facet.name);
         let [roll, pitch, yaw] = joint(&urdf, &link, "rpy");
-        // URDF: turns about the fixed x, y and z axes, one after the other.
+        // URDF: rotations about the fixed x, y and z axes, in this order.
         let turn = nalgebra::Rotation3::from_axis_angle(&nalgebra::Vector3::z_axis(), yaw)
             * nalgebra::Rotation3::from_axis_angle(&nalgebra::Vector3::y_axis(), pitch)
             * nalgebra::Rotation3::from_axis_angle(&nalgebra::Vector3::x_axis(), roll);
@@ -251,7 +251,7 @@ fn urdf_frames_stand_on_the_mirrors() {
 }
 
 #[test]
-fn the_verb_writes_every_format_and_refuses_what_it_cannot() {
+fn the_verb_writes_every_format_and_refuses_what_it_cannot_write() {
     let folder = tempfile::tempdir().unwrap();
     let scene = format!("{}/scenes/two-mirror.toml", env!("CARGO_MANIFEST_DIR"));
     for format in ["stl", "glb", "csv", "urdf"] {
@@ -307,12 +307,12 @@ fn the_verb_writes_every_format_and_refuses_what_it_cannot() {
                 "--set",
                 "superstructure.facet=[]",
             ],
-            "nothing of that kind",
+            "no such solids",
         ),
     ] {
         let arguments = [&["export", "--out", "x"], arguments.as_slice()].concat();
         let output = run(folder.path(), &arguments);
-        // A folder that is no dataset is one that was not found.
+        // A folder that is not a dataset counts as not found.
         let code = if said.contains("session.toml") { 3 } else { 2 };
         assert_eq!(output.status.code(), Some(code), "{}", stderr(&output));
         assert!(
@@ -324,7 +324,7 @@ fn the_verb_writes_every_format_and_refuses_what_it_cannot() {
     }
 }
 
-/// A table's columns, and its rows.
+/// The columns and rows of a table.
 fn parsed(table: &[u8]) -> (Vec<String>, Vec<csv::StringRecord>) {
     let mut reader = csv::Reader::from_reader(table);
     let header = reader.headers().unwrap().iter().map(str::to_owned).collect();
@@ -332,7 +332,7 @@ fn parsed(table: &[u8]) -> (Vec<String>, Vec<csv::StringRecord>) {
 }
 
 #[test]
-fn a_board_table_is_the_recording_to_the_bit() {
+fn a_board_table_is_bit_identical_to_the_recording() {
     let sets = [
         "experiment.scans_per_pose=3",
         "scanner.sub_rays=1",
@@ -384,7 +384,7 @@ fn a_board_table_is_the_recording_to_the_bit() {
             if label.facet.is_some() {
                 assert_eq!(text("inside_edge_m"), "");
             } else {
-                // The nearest edge, by the corner-free distance along the board's own axes.
+                // The nearest edge, as the smaller distance along the board's own axes.
                 let pick = |name: &str| {
                     nalgebra::Vector3::from(["x", "y", "z"].map(|axis| number(&name.replace('*', axis))))
                 };
@@ -397,7 +397,8 @@ fn a_board_table_is_the_recording_to_the_bit() {
                 let inside = (0.45 - x.abs()).min(0.35 - y.abs());
                 assert!((number("inside_edge_m") - inside).abs() < 1e-12);
             }
-            let found: Vec<f64> = record.readings(beam).filter(|r| r.is_finite()).collect();
+            let scans = record.scans().map(|scan| scan.unwrap()[beam]);
+            let found: Vec<f64> = scans.filter(|r| r.is_finite()).collect();
             assert_eq!(text("readings"), found.len().to_string());
             assert_eq!(text("missing"), (3 - found.len()).to_string());
             if found.is_empty() {
@@ -410,7 +411,7 @@ fn a_board_table_is_the_recording_to_the_bit() {
             if found.len() > 1 {
                 assert_eq!(number("sd_m"), record.summarize()[beam].sd);
             }
-            // The board in the rig, and the same board through the drawn mounting.
+            // The board in the rig frame, and the same board through the drawn mounting.
             let triple = |name: &str| ["x", "y", "z"].map(|axis| number(&name.replace('*', axis)));
             let point = nalgebra::Point3::from(triple("rig_center_*_m"));
             let back = record.room_from_rig * point;
@@ -456,10 +457,10 @@ fn a_blind_dataset_gives_the_same_board_table() {
     assert!(!at.join("blind/truth").exists());
     let read = |name: &str| std::fs::read(at.join(name)).unwrap();
     assert_eq!(read("seen.csv"), read("blind.csv"));
-    // What the file says is what is in memory: floats as the recording holds them.
-    let dataset = catoptric::io::read_dataset(&at.join("seen")).unwrap();
+    // The file equals the data in memory: floats as stored in the recording.
+    let dataset = catoptric::files::read_dataset(&at.join("seen")).unwrap();
     assert_eq!(read("seen.csv"), export::board_table(&dataset).unwrap());
-    // Only the columns that chapter 5 explains.
+    // Only the columns documented in chapter 5.
     let (header, _) = parsed(&read("seen.csv"));
     let guide = include_str!("../../docs/guide/5-files.md");
     let section = guide

@@ -1,6 +1,6 @@
-//! `catoptric::testing`: every scene it makes is valid, its gates fire on what they are for, and seldom for nothing.
+//! `catoptric::testing`: all generated scenes are valid, and its gates detect what they are for, with few false alarms.
 //!
-//! That the quantiles are right is the business of the unit tests of `study`.
+//! The quantiles are covered by the unit tests of `study`.
 
 use crate::scenes::scene;
 use catoptric::calib::{CalibError, Calibrator, Method};
@@ -16,7 +16,7 @@ use proptest::strategy::ValueTree;
 use proptest::test_runner::{RngSeed, TestRunner};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// A method whose calibration is changed afterwards.
+/// A method whose calibration is modified afterwards.
 struct Changed<F>(Method, F);
 
 impl<F: Fn(&mut Calibration)> Calibrator for Changed<F> {
@@ -112,7 +112,7 @@ fn honest_methods_pass_and_a_covariance_four_times_too_small_fails() {
     let honest = trials(&reference(), 1..=40, &Method::BeamGls).unwrap();
     Anees::over(&honest).gate(significance).unwrap();
     Coverage::over(&honest, 0.95).gate(significance).unwrap();
-    // It does not know of facets, and is at a fourth of what they allow.
+    // It does not use facets, so its efficiency is a fourth of the optimum.
     assert!(matches!(
         Efficiency::over(&honest).gate(0.9, significance),
         Err(Failure::Gate { .. })
@@ -154,10 +154,10 @@ fn a_global_counter_fails_determinism() {
     );
 }
 
-/// 4000 jobs of 50 honest, efficient trials each: at 1 % 40 fail by chance, 18 to 62 within 3.5 standard deviations. A
-/// share of 50 cannot be had at any rate, so that the coverage gate may fail less often, never more.
+/// 4000 jobs of 50 honest, efficient trials each: at 1 %, 40 false alarms are expected, 18 to 62 within 3.5 standard
+/// deviations. A share of 50 is discrete, so the coverage gate may fail less often, never more.
 #[test]
-fn false_alarms_are_as_rare_as_the_significance_says() {
+fn false_alarms_are_as_rare_as_the_significance_states() {
     const JOBS: u64 = 4000;
     let mut alarms = [0; 3];
     for job in 0..JOBS {
@@ -190,7 +190,7 @@ fn false_alarms_are_as_rare_as_the_significance_says() {
 }
 
 #[test]
-fn what_cannot_be_judged_is_no_pass() {
+fn what_cannot_be_judged_does_not_pass() {
     let abstaining = [Trial { seed: 1, drawn: None }];
     assert!(matches!(
         Anees::over(&abstaining).gate(Significance::PER_MILLE),

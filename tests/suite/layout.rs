@@ -1,25 +1,27 @@
-//! What `layout` says of a scene is what the simulator does.
+//! The results of `layout` agree with the simulator.
 //!
 //! Classes are compared with the truth of a simulation, element by element; ranges, spots, sensitivities and fields of
-//! regard with closed forms and with the simulator itself. These do not prove that the simulator's optics are right:
+//! regard with closed forms and with the simulator itself. These do not prove that the simulator's optics are correct;
 //! `physics` does.
 
 use crate::common::{VALID, folder_with, run, stderr, stdout};
-use catoptric::io::scene as scenes;
+use catoptric::cast::{Polygon, Shape};
+use catoptric::files::scene as scenes;
 use catoptric::layout::{self, Analysis, Class, Detail};
 use catoptric::model::beam;
-use catoptric::sim::cast::{Polygon, Shape};
-use catoptric::sim::footprint::{self, SubRay};
-use catoptric::sim::optics::{Mirrors, Role, Setting, Target};
-use catoptric::sim::reading::Sensor;
+use catoptric::sim::build::Structure;
+use catoptric::sim::build::color;
+use catoptric::sim::light::footprint::{self, SubRay};
+use catoptric::sim::light::{Mirrors, Role, Setting, Target};
+use catoptric::sim::receive::Sensor;
 use catoptric::sim::scene::{Facet, FacetShape, PolygonShape};
-use catoptric::sim::structure::Structure;
 use catoptric::sim::truth::BeamClass;
-use catoptric::sim::{Laboratory, Scene, color};
+use catoptric::sim::{Laboratory, Scene};
+use catoptric_fixtures::ust20lx;
 use nalgebra::{Point3, Rotation3, Unit, Vector3};
 use std::path::{Path, PathBuf};
 
-/// The layouts that are built in.
+/// The built-in layouts.
 const GALLERY: [&str; 4] = [
     "prototype.toml",
     "two-mirror.toml",
@@ -32,7 +34,7 @@ fn load(path: &str) -> Scene {
     scenes::load(&path, &[]).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
-/// Every scene of the repository that can be recorded.
+/// All scenes of the repository that can be recorded.
 fn recordable() -> Vec<(PathBuf, Scene)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
     let mut folders = vec![root];
@@ -52,7 +54,7 @@ fn recordable() -> Vec<(PathBuf, Scene)> {
     found
 }
 
-fn assert_is_the_truth(scene: &Scene, analysis: &Analysis, name: &str) {
+fn assert_equals_the_truth(scene: &Scene, analysis: &Analysis, name: &str) {
     let truth = Laboratory::new(scene, scene.seed).unwrap().truth().unwrap();
     assert_eq!(truth.beams.len(), analysis.elements.len());
     for (true_beam, element) in truth.beams.iter().zip(&analysis.elements) {
@@ -72,7 +74,7 @@ fn assert_is_the_truth(scene: &Scene, analysis: &Analysis, name: &str) {
         };
         assert_eq!(of_class, true_beam.status, "{at}");
         let exit = true_beam
-            .exit_direction()
+            .exit_direction(ust20lx::azimuth(true_beam.beam))
             .map(|v| libm::atan2(v.z, libm::hypot(v.x, v.y)).to_degrees());
         if let (Some(exit), Some(elevation)) = (exit, element.exit_elevation_deg) {
             assert!((exit - elevation).abs() < 1e-9, "{at}: {exit} {elevation}");
@@ -81,11 +83,11 @@ fn assert_is_the_truth(scene: &Scene, analysis: &Analysis, name: &str) {
 }
 
 #[test]
-fn classes_are_those_of_the_truth_in_every_scene() {
+fn classes_equal_those_of_the_truth_in_every_scene() {
     let scenes = recordable();
     assert!(scenes.len() > 30, "{}", scenes.len());
-    for layout in scenes::Layout::ALL {
-        let drawn = scenes::parse(scenes::scene_template(layout), "template.toml", &[]).unwrap();
+    for layout in scenes::Template::ALL {
+        let drawn = scenes::parse(layout.text(), "template.toml", &[]).unwrap();
         assert!(
             scenes.iter().any(|(_, scene)| *scene == drawn),
             "{layout:?} is missing"
@@ -93,14 +95,14 @@ fn classes_are_those_of_the_truth_in_every_scene() {
     }
     for (path, scene) in scenes {
         let analysis = layout::analyze(&scene, Some(scene.seed), Detail::Full).unwrap();
-        assert_is_the_truth(&scene, &analysis, &path.display().to_string());
+        assert_equals_the_truth(&scene, &analysis, &path.display().to_string());
     }
 }
 
 #[test]
 fn layouts_of_the_gallery_can_be_calibrated() {
     use catoptric::calib::{Calibrator, Method};
-    // The other two have many tests of their own.
+    // The other two have many tests elsewhere.
     for name in ["gallery/pyramid.toml", "gallery/altimeter.toml"] {
         let mut scene = load(name);
         scene.experiment.scans_per_pose = 30;
@@ -108,14 +110,14 @@ fn layouts_of_the_gallery_can_be_calibrated() {
             let laboratory = Laboratory::new(&scene, seed).unwrap();
             let (dataset, truth) = (laboratory.dataset().unwrap(), laboratory.truth().unwrap());
             let calibration = Method::Joint.calibrate(&dataset).unwrap();
-            let score = catoptric::score(&dataset, &calibration, Some(&truth));
+            let score = catoptric::score(&dataset, &calibration, Some(&truth)).expect("in memory");
             assert!(score.beams.solved >= 10, "{name} {seed}: {:?}", score.beams);
             assert_eq!(
                 (score.beams.missed, score.beams.wrong),
                 (Some(0), Some(0)),
                 "{name} {seed}"
             );
-            // Elements share the error of the mounting, so that one draw may be well above the bound.
+            // Elements share the error of the mounting, so one draw may be well above the bound.
             let (error, bound) = (score.per_axis_rms_deg, score.crlb_per_axis_deg);
             assert!(
                 error > 0.0 && error < 3.0 * bound && bound < 0.1,
@@ -126,7 +128,7 @@ fn layouts_of_the_gallery_can_be_calibrated() {
 }
 
 #[test]
-fn classes_of_a_drawing_are_those_of_a_structure_built_exactly_so() {
+fn classes_of_a_drawing_equal_those_of_a_structure_built_exactly() {
     for name in GALLERY {
         let mut scene = load(name);
         scene.superstructure.as_built = catoptric::sim::scene::AsBuilt {
@@ -139,12 +141,12 @@ fn classes_of_a_drawing_are_those_of_a_structure_built_exactly_so() {
         scene.scanner.mount.tilt_tolerance_deg = 0.0;
         scene.scanner.mount.shift_tolerance_mm = 0.0;
         let analysis = layout::analyze(&scene, None, Detail::Full).unwrap();
-        assert_is_the_truth(&scene, &analysis, name);
+        assert_equals_the_truth(&scene, &analysis, name);
         assert!(analysis.counts[&Class::Split] > 0 && analysis.counts[&Class::Deflected] > 10);
     }
 }
 
-/// A scanner without housing and one square mirror that a part of the scan meets.
+/// A scanner without housing and one square mirror that part of the scan hits.
 fn one_facet() -> Scene {
     let mut scene = load("prototype.toml");
     scene.scanner.housing = false;
@@ -170,7 +172,7 @@ fn one_facet() -> Scene {
 }
 
 #[test]
-fn the_field_of_one_flat_facet_is_its_closed_form() {
+fn the_field_of_one_flat_facet_equals_its_closed_form() {
     for turns in [true, false] {
         let mut scene = one_facet();
         scene.scanner.beam = Some(catoptric::sim::scene::BeamShape {
@@ -184,7 +186,7 @@ fn the_field_of_one_flat_facet_is_its_closed_form() {
         let facet = &analysis.facets[0];
         let own = || analysis.elements.iter().filter(|e| e.class == Class::Deflected);
         assert!(own().count() > 60 && facet.elements == own().count());
-        // step·2·sin(δ/2) for each element; without a turning spot N times the same.
+        // step·2·sin(δ/2) for each element; if the spot does not rotate, N times the same.
         let step = 0.25_f64.to_radians();
         let closed = if turns {
             own()
@@ -202,7 +204,7 @@ fn the_field_of_one_flat_facet_is_its_closed_form() {
             "{} {closed}",
             facet.solid_angle_sr
         );
-        // The field as a whole has the direct beams too, which this fan does not cross.
+        // The whole field also includes the direct beams, which this fan does not cross.
         let direct = analysis.direct_field_of_regard * 4.0 * std::f64::consts::PI;
         assert!((analysis.solid_angle_sr / (closed + direct) - 1.0).abs() < 1e-12);
         assert_eq!(
@@ -214,8 +216,8 @@ fn the_field_of_one_flat_facet_is_its_closed_form() {
 
 #[test]
 fn directions_near_one_fan_fill_a_strip_with_round_ends() {
-    // The fan of a flat facet is an arc of a great circle. A low wall around it all stops every beam that the mirror does
-    // not send below it, so that nothing else is seen; without a mirror and walls the scan itself is the arc.
+    // The fan of a flat facet is an arc of a great circle. A low wall all around stops every beam that the mirror does
+    // not deflect below it, so nothing else is seen; without mirror and walls the scan itself is the arc.
     let mut walled = one_facet();
     let mut bare = walled.clone();
     bare.superstructure.facet.clear();
@@ -242,19 +244,19 @@ fn directions_near_one_fan_fill_a_strip_with_round_ends() {
         assert_eq!(arcs.len(), 1, "{arcs:?}");
         let [first, last] = arcs[0].beams;
         assert!(last - first + 1 >= least);
-        let arc = beam::azimuth(last) - beam::azimuth(first);
+        let arc = ust20lx::azimuth(last) - ust20lx::azimuth(first);
         let near = layout::NEAR_DEG.to_radians();
         let strip = 2.0 * arc * near.sin() + 2.0 * std::f64::consts::PI * (1.0 - near.cos());
         let closed = strip / (4.0 * std::f64::consts::PI);
-        // Three of the 8000 directions that are asked.
+        // Three of the 8000 sampled directions.
         let found = analysis.share_within_5_deg;
         assert!((found - closed).abs() < 3.75e-4, "{found} {closed}");
     }
 }
 
 #[test]
-fn what_two_facets_see_twice_counts_once() {
-    // An upright mirror sends its fan back into the scan plane, most of it to where undeflected beams look already.
+fn directions_seen_by_two_facets_count_once() {
+    // An upright mirror sends its fan back into the scan plane, mostly to where undeflected beams are already.
     let mut scene = one_facet();
     scene.superstructure.facet[0].shape = FacetShape::Rectangle(catoptric::sim::scene::RectangleShape {
         center_mm: [60.0, 0.0, 0.0],
@@ -272,9 +274,9 @@ fn what_two_facets_see_twice_counts_once() {
     let [wide, narrow] = [0.008_f64, 0.00125].map(f64::tan);
     let cell = |scan_azimuth_deg: f64| {
         let (sin, cos) = scan_azimuth_deg.to_radians().sin_cos();
-        2.0 * beam::STEP * (wide * sin).hypot(narrow * cos).atan().sin()
+        2.0 * ust20lx::STEP * (wide * sin).hypot(narrow * cos).atan().sin()
     };
-    // Beyond the last beam of the scan nothing else looks. The fan is lower than the undeflected cells that it crosses.
+    // Beyond the last beam of the scan nothing else sees. The fan is lower than the undeflected cells that it crosses.
     let beyond: Vec<f64> = own
         .iter()
         .filter(|e| e.exit_azimuth_deg.unwrap().abs() > 135.125)
@@ -287,13 +289,13 @@ fn what_two_facets_see_twice_counts_once() {
         own.len()
     );
     let once = direct + beyond.iter().sum::<f64>();
-    // One cell may lie across the end of the scan.
+    // One cell may extend across the end of the scan.
     assert!(
         (analysis.solid_angle_sr - once).abs() < cell(9.0),
         "{} {once}",
         analysis.solid_angle_sr
     );
-    // Fans that cross at a point share next to nothing.
+    // Fans that cross at a point have almost nothing in common.
     let crossing = load("two-mirror.toml");
     let analysis = layout::analyze(&crossing, None, Detail::Full).unwrap();
     let sum: f64 = analysis.facets.iter().map(|f| f.solid_angle_sr).sum::<f64>()
@@ -307,7 +309,7 @@ fn what_two_facets_see_twice_counts_once() {
     );
 }
 
-/// The field of regard by asking each direction of a fine grid whether a cell holds it, every cell by itself.
+/// The field of regard by checking for each direction of a fine grid whether a cell contains it, cell by cell.
 fn counted_on_a_grid(scene: &Scene, analysis: &Analysis) -> f64 {
     let structure = Structure::nominal(scene).unwrap();
     let shape = scene.scanner.beam_shape();
@@ -326,7 +328,7 @@ fn counted_on_a_grid(scene: &Scene, analysis: &Analysis) -> f64 {
                 (Some(f.name.as_str()), direction - m * (2.0 * m.dot(&direction)))
             }));
             let seen = turned_back.into_iter().any(|(facet, u)| {
-                let Some(beam) = beam::nearest(u.y.atan2(u.x)) else {
+                let Some(beam) = ust20lx::nearest(u.y.atan2(u.x)) else {
                     return false;
                 };
                 let element = &analysis.elements[beam];
@@ -334,7 +336,7 @@ fn counted_on_a_grid(scene: &Scene, analysis: &Analysis) -> f64 {
                     None => element.class == Class::Direct,
                     Some(name) => element.class == Class::Deflected && element.facets[0] == name,
                 };
-                let (sin, cos) = beam::azimuth(beam).sin_cos();
+                let (sin, cos) = ust20lx::azimuth(beam).sin_cos();
                 own && u.z.asin().abs() <= (wide * sin).hypot(narrow * cos).atan()
             });
             if seen {
@@ -345,7 +347,7 @@ fn counted_on_a_grid(scene: &Scene, analysis: &Analysis) -> f64 {
     total
 }
 
-/// Moves the corners of a facet: turned about their mean, then shifted.
+/// Moves the corners of a facet: rotated about their mean, then shifted.
 fn moved(scene: &Scene, facet: usize, turn: Vector3<f64>, shift: Vector3<f64>) -> Scene {
     let structure = Structure::nominal(scene).unwrap();
     let corners = &structure.facets[facet].face.corners;
@@ -359,7 +361,7 @@ fn moved(scene: &Scene, facet: usize, turn: Vector3<f64>, shift: Vector3<f64>) -
     scene
 }
 
-/// The point at which a beam's chief ray is after a length, by the simulator.
+/// The point on a beam's chief ray at a given path length, from the simulator.
 fn point_at(scene: &Scene, beam: usize, range: f64) -> Point3<f64> {
     let structure = Structure::nominal(scene).unwrap();
     let sensor = Sensor::new(scene).unwrap();
@@ -403,8 +405,8 @@ fn sensitivities_are_the_simulators_finite_differences() {
                 worst = worst.max(by_turn);
             }
             let rms = facet.point_at_4m_per_0_1_deg_rms_mm.unwrap();
-            // Central differences of 0.1 mrad depart from the derivative by their square; the elements at both ends, which
-            // a turn may take off the mirror, are left out of the differences.
+            // Central differences of 0.1 mrad deviate from the derivative quadratically; the elements at both ends,
+            // which a rotation may move off the mirror, are excluded.
             let found: f64 = (square / count).sqrt();
             assert!(
                 (rms / found - 1.0).abs() < 1e-3,
@@ -429,7 +431,7 @@ fn sensitivities_are_the_simulators_finite_differences() {
     }
 }
 
-/// Whether a face-on target of a color before a beam's last leg, at a length of the whole way, returns an echo.
+/// Whether a face-on target of a color on a beam's last leg, at a given total path length, returns an echo.
 fn is_seen(scene: &Scene, beam: usize, range: f64, color_name: &str) -> bool {
     let structure = Structure::nominal(scene).unwrap();
     let sensor = Sensor::new(scene).unwrap();
@@ -472,9 +474,9 @@ fn the_longest_range_is_where_the_simulator_loses_a_target() {
         let [first, last] = facet.beams.unwrap();
         let element = &analysis.elements[(first + last) / 2];
         let dark = element.range_max_dark_m.unwrap();
-        // Two passes over a mirror of 0.9 take a tenth off the range.
+        // Two passes by a mirror of 0.9 reduce the range by a tenth.
         assert!((dark - 7.2).abs() < 1e-9, "{dark}");
-        // The light of a face-on target spreads over ranges that differ by 1 mm at most.
+        // The light of a face-on target is spread over ranges that differ by at most 1 mm.
         assert!(
             is_seen(&scene, element.beam, dark * 0.999, "dark"),
             "{}",
@@ -491,12 +493,12 @@ fn the_longest_range_is_where_the_simulator_loses_a_target() {
 }
 
 #[test]
-fn what_mirrors_swallow_is_too_faint() {
+fn light_absorbed_by_mirrors_is_too_faint() {
     let mut scene = load("prototype.toml");
     let bright = layout::analyze(&scene, None, Detail::Coarse).unwrap();
     scene.superstructure.mirror.reflectivity = 1e-3;
     let analysis = layout::analyze(&scene, None, Detail::Coarse).unwrap();
-    // 24 m · 10⁻³ is nearer than any of the mirrors.
+    // 24 m · 10⁻³ is closer than any of the mirrors.
     assert_eq!(analysis.counts[&Class::Deflected], 0);
     assert!(bright.counts[&Class::Deflected] > 400 && bright.counts[&Class::TooFaint] == 0);
     assert_eq!(
@@ -514,7 +516,7 @@ fn what_mirrors_swallow_is_too_faint() {
 }
 
 #[test]
-fn a_spot_is_as_wide_as_the_sub_rays_of_the_simulator() {
+fn a_spot_is_as_wide_as_the_simulated_sub_rays() {
     for preset in ["prototype.toml", "ust-20lx-cooper.toml"] {
         let scene = load(preset);
         let analysis = layout::analyze(&scene, None, Detail::Coarse).unwrap();
@@ -548,9 +550,9 @@ fn a_spot_is_as_wide_as_the_sub_rays_of_the_simulator() {
 }
 
 #[test]
-fn an_edge_cuts_a_beam_where_its_margin_is_gone() {
-    // The contour stands for 14 % of light outside and is drawn with 16 corners: between a tenth of a millimetre beyond an
-    // edge and a millimetre within, either may be.
+fn an_edge_cuts_a_beam_where_its_margin_is_zero() {
+    // The contour represents 14 % of the light outside and is drawn with 16 corners: between 0.1 mm beyond an edge and
+    // 1 mm inside it, either class is possible.
     let mut cut = 0;
     for scene in [load("prototype.toml"), one_facet()] {
         let analysis = layout::analyze(&scene, None, Detail::Full).unwrap();
@@ -574,7 +576,7 @@ fn an_edge_cuts_a_beam_where_its_margin_is_gone() {
 }
 
 #[test]
-fn size_and_mass_of_a_plain_structure_are_by_hand() {
+fn size_and_mass_of_a_plain_structure_agree_with_hand_calculation() {
     let mut scene = one_facet();
     scene.superstructure.post.push(catoptric::sim::scene::Post {
         name: "block".to_owned(),
@@ -593,14 +595,14 @@ fn size_and_mass_of_a_plain_structure_are_by_hand() {
     assert!((size.post_mass_g - 7.44).abs() < 1e-9, "{}", size.post_mass_g);
     assert!((size.structure_mass_g - 11.44).abs() < 1e-9);
     assert_eq!(size.scanner_mass_g, Some(130.0));
-    // Nothing is no negative nothing.
+    // Zero is never printed as −0.
     scene.superstructure.facet.clear();
     let none = layout::analyze(&scene, None, Detail::Coarse).unwrap().size;
     assert!(none.mirror_area_mm2 == 0.0 && none.mirror_area_mm2.is_sign_positive());
 }
 
 #[test]
-fn the_predicted_accuracy_is_the_bound_that_recordings_are_scored_by() {
+fn the_predicted_accuracy_is_the_bound_used_in_scores() {
     for name in ["two-mirror.toml", "reference-facet.toml", "prototype.toml"] {
         let mut scene = load(name);
         scene.experiment.scans_per_pose = 20;
@@ -609,7 +611,7 @@ fn the_predicted_accuracy_is_the_bound_that_recordings_are_scored_by() {
         let method = catoptric::calib::Method::Joint;
         let calibration =
             catoptric::calib::calibrate(&dataset, method, &catoptric::calib::Options::default()).unwrap();
-        let score = catoptric::score(&dataset, &calibration, Some(&truth));
+        let score = catoptric::score(&dataset, &calibration, Some(&truth)).expect("in memory");
         let predicted = layout::predict(&scene, scene.seed);
         let bound = predicted.per_axis_deg.unwrap();
         assert!(
@@ -639,7 +641,7 @@ fn the_verb_prints_judges_and_writes() {
     assert_eq!(json["field_of_regard"].as_f64(), Some(analysis.field_of_regard));
     assert_eq!(json["elements"].as_array().unwrap().len(), 1081);
     assert!(json["accuracy"]["per_axis_deg"].as_f64().unwrap() > 0.01);
-    // As built is another structure.
+    // The structure as built differs.
     let built = run(
         folder.path(),
         &[
@@ -690,7 +692,7 @@ fn the_verb_prints_judges_and_writes() {
         said.contains("not met: prototype: field_of_regard is 0.00")
             && said.contains("facets.left-1.elements is 60")
     );
-    // A figure that is not there meets no limit.
+    // A figure that does not exist meets no limit.
     let none = run(
         folder.path(),
         &["layout", &prototype, "--coarse", "--require", "accuracy<1"],
@@ -705,10 +707,10 @@ fn bad_requirements_are_refused() {
     for (requirement, said) in [
         ("field_of_regrad>=0.3", "did you mean field_of_regard?"),
         ("facets.*.margin_m>=0.3", "did you mean facets.*.margin_mm?"),
-        ("field_of_regard", "is no requirement"),
-        ("field_of_regard>=much", "is no requirement"),
-        (">=1", "is no requirement"),
-        ("field_of_regard>=inf", "is no requirement"),
+        ("field_of_regard", "is not a requirement"),
+        ("field_of_regard>=much", "is not a requirement"),
+        (">=1", "is not a requirement"),
+        ("field_of_regard>=inf", "is not a requirement"),
         ("wings>=2", "every number of --json has a name"),
     ] {
         let output = run(
@@ -776,7 +778,7 @@ fn pages_and_pictures_are_the_same_on_any_number_of_threads() {
         assert!(names.contains(&name), "{names:?}");
     }
     let page = String::from_utf8(one.iter().find(|(n, _)| n == "report.html").unwrap().1.clone()).unwrap();
-    // Self-contained: nothing is fetched.
+    // Self-contained: nothing is loaded from elsewhere.
     assert!(!page.contains("http") && !page.contains("<script") && page.contains("data:image/png;base64,"));
     assert!(
         !page.contains("could not be drawn")
@@ -786,7 +788,7 @@ fn pages_and_pictures_are_the_same_on_any_number_of_threads() {
     let json: serde_json::Value =
         serde_json::from_slice(&one.iter().find(|(n, _)| n == "layout.json").unwrap().1).unwrap();
     assert_eq!(json["layouts"].as_array().unwrap().len(), 2);
-    // Every SVG is a file of its own.
+    // Every SVG is a standalone file.
     for (name, bytes) in one.iter().filter(|(n, _)| n.ends_with(".svg")) {
         let text = String::from_utf8_lossy(bytes);
         assert!(
@@ -798,7 +800,7 @@ fn pages_and_pictures_are_the_same_on_any_number_of_threads() {
 }
 
 #[test]
-fn where_nothing_bounds_a_calibration_the_reason_is_said() {
+fn a_missing_bound_on_a_calibration_is_explained() {
     let (folder, _) = folder_with(VALID);
     for (set, reason) in [
         ("errors.model=\"none\"", "no bound: the scene has no errors"),

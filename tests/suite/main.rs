@@ -1,4 +1,4 @@
-//! One binary for all integration tests; each module says what it proves and what it does not.
+//! One binary for all integration tests; each module documents what it proves and what it does not.
 #![allow(clippy::unwrap_used, clippy::print_stderr, missing_docs)]
 
 mod bad_geometry;
@@ -14,10 +14,12 @@ mod consistency;
 mod detection;
 mod determinism;
 mod docs;
+mod door;
 mod edits;
 mod energy;
 mod export;
 mod gates;
+mod house;
 mod layout;
 mod mishaps;
 mod motion;
@@ -29,6 +31,7 @@ mod physics;
 mod pipeline;
 mod plan;
 mod properties;
+mod scan_geometry;
 mod scenes;
 mod streaming;
 mod study;

@@ -1,6 +1,6 @@
-//! Mishaps and outliers: what a recording shows of them, and what a calibration makes of that. Of the estimator's blind
-//! detection this proves that it finds what was put in and stays silent where nothing was; how often a smaller mishap
-//! escapes it, it does not say.
+//! Mishaps and outliers: what a recording shows of them, and their effect on a calibration. For the blind detection this
+//! proves that it finds what was injected and reports nothing otherwise, but not how often a smaller mishap escapes
+//! detection.
 
 use crate::scenes::{PROTOTYPE, TWO_MIRROR, scene};
 use catoptric::calib::{self, Method, Options};
@@ -9,16 +9,16 @@ use catoptric::score;
 use catoptric::sim::scene::{ErrorModel, Interference, MocapProfile};
 use catoptric::sim::{Laboratory, Scene};
 
-/// The first pose with a board before a facet.
+/// The first pose with a board in front of a facet.
 fn first_facet_pose(laboratory: &Laboratory) -> u32 {
     let of_facet = |n: &usize| laboratory.truth().expect("known").poses[*n].kind == PoseKind::Facet;
     let first = (0..laboratory.stretches()).find(of_facet).expect("there is one");
     u32::try_from(first).expect("few poses")
 }
 
-/// The scene with a mishap in its first pose before a facet.
+/// The scene with a mishap in its first pose in front of a facet.
 fn with_mishap(mut scene: Scene, what: &str) -> (Scene, u32) {
-    let laboratory = Laboratory::new(&scene, scene.seed).expect("the scene is good");
+    let laboratory = Laboratory::new(&scene, scene.seed).expect("the scene is valid");
     let pose = first_facet_pose(&laboratory);
     let mishap = format!("pose = {pose}\n{what}");
     scene.experiment.mishap = vec![toml::from_str(&mishap).expect("the test's own mishap parses")];
@@ -26,21 +26,22 @@ fn with_mishap(mut scene: Scene, what: &str) -> (Scene, u32) {
 }
 
 fn calibrated(scene: &Scene, seed: u64, method: Method) -> (Calibration, catoptric::score::Score) {
-    let laboratory = Laboratory::new(scene, seed).expect("the scene is good");
+    let laboratory = Laboratory::new(scene, seed).expect("the scene is valid");
     let dataset = laboratory.dataset().expect("recorded");
-    let calibration = calib::calibrate(&dataset, method, &Options::default()).expect("it calibrates");
-    let scored = score(&dataset, &calibration, Some(&laboratory.truth().expect("known")));
+    let calibration =
+        calib::calibrate(&dataset, method, &Options::default()).expect("the calibration succeeds");
+    let scored = score(&dataset, &calibration, Some(&laboratory.truth().expect("known"))).expect("in memory");
     (calibration, scored)
 }
 
 #[test]
-fn nothing_is_said_where_nothing_went_wrong() {
+fn nothing_is_reported_where_nothing_went_wrong() {
     for text in [PROTOTYPE, TWO_MIRROR] {
         for profile in [MocapProfile::Modern, MocapProfile::Cooper, MocapProfile::Ideal] {
             for seed in 1..=2 {
                 let mut scene = scene(text);
                 scene.mocap.profile = profile;
-                let laboratory = Laboratory::new(&scene, seed).expect("the scene is good");
+                let laboratory = Laboratory::new(&scene, seed).expect("the scene is valid");
                 let dataset = laboratory.dataset().expect("recorded");
                 let (right, warnings) = calib::tracking::put_right(&dataset);
                 assert!(matches!(right, std::borrow::Cow::Borrowed(_)));
@@ -51,17 +52,18 @@ fn nothing_is_said_where_nothing_went_wrong() {
 }
 
 #[test]
-fn exchanged_labels_are_named_and_put_back() {
+fn exchanged_labels_are_reported_and_corrected() {
     let names = ["P_p1", "P_p2", "P_p3", "P_p4", "P_p5"];
     for a in 0..names.len() {
         for b in a + 1..names.len() {
             let (first, second) = (names[a], names[b]);
             let what = format!("swapped_markers = [{first:?}, {second:?}]");
             let (scene, pose) = with_mishap(scene(TWO_MIRROR), &what);
-            let laboratory = Laboratory::new(&scene, scene.seed).expect("the scene is good");
+            let laboratory = Laboratory::new(&scene, scene.seed).expect("the scene is valid");
             let dataset = Dataset {
                 session: laboratory.session().expect("known"),
                 poses: vec![laboratory.pose_record(pose as usize).expect("recorded")],
+                id: None,
             };
             let (right, warnings) = calib::tracking::put_right(&dataset);
             assert_eq!(warnings.len(), 1, "{warnings:?}");
@@ -78,7 +80,7 @@ fn exchanged_labels_are_named_and_put_back() {
                 .expect("there is a board");
             let found = right.poses[0].room_from_board.expect("it was tracked");
             let off = found.inverse() * catoptric::model::Pose::from(stands);
-            // Markers are off by 0.15 mm each way.
+            // Marker errors are 0.15 mm per axis.
             assert!(
                 off.translation.vector.norm() < 5e-4 && off.rotation.angle() < 1e-3,
                 "{off}"
@@ -88,22 +90,23 @@ fn exchanged_labels_are_named_and_put_back() {
 }
 
 #[test]
-fn a_calibration_with_exchanged_labels_is_as_good_as_without() {
+fn a_calibration_with_exchanged_labels_is_as_accurate_as_without() {
     let clean = calibrated(&scene(TWO_MIRROR), 1, Method::BeamGls).1;
     let (scene, _) = with_mishap(scene(TWO_MIRROR), "swapped_markers = [\"P_p1\", \"P_p4\"]");
     let (calibration, scored) = calibrated(&scene, 1, Method::BeamGls);
     let warning = &calibration.warnings[0];
     assert!(
-        warning.ends_with("its pose was solved anew with the labels put right"),
+        warning.ends_with("its pose was solved anew with the labels corrected"),
         "{warning}"
     );
-    // The pose is solved from mean markers then, not averaged over the frames' poses: the same to the third digit.
+    // The pose is then solved from mean markers instead of averaged over the poses of the frames: the same to three
+    // digits.
     let ratio = scored.per_axis_rms_deg / clean.per_axis_rms_deg;
     assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
 }
 
 #[test]
-fn a_stray_label_and_a_board_that_moved_are_named_and_left_out() {
+fn a_misplaced_label_and_a_moved_board_are_reported_and_excluded() {
     let cases = [
         (
             "mislabelled = { marker = \"P_p3\", off_mm = [20, 0, 15] }",
@@ -123,7 +126,7 @@ fn a_stray_label_and_a_board_that_moved_are_named_and_left_out() {
             warning.contains(said) && warning.ends_with("the pose is left out"),
             "{warning}"
         );
-        // One board fewer of its facet's; what is left is as honest.
+        // The facet has one board fewer; the rest is as honest as before.
         let ratio = scored.per_axis_rms_deg / clean.per_axis_rms_deg;
         assert!(
             ratio < 1.5 && scored.nees_mean < 2.0,
@@ -133,17 +136,17 @@ fn a_stray_label_and_a_board_that_moved_are_named_and_left_out() {
     }
 }
 
-/// The same mishaps with nobody to find them cost far more: that is what the detection is worth.
+/// Undetected, the same mishaps cost far more: that is the value of the detection.
 #[test]
-fn a_board_that_moved_spoils_a_calibration_that_believes_it() {
+fn an_undetected_moved_board_spoils_a_calibration() {
     let (with, _) = with_mishap(scene(TWO_MIRROR), "swapped_markers = [\"P_p1\", \"P_p2\"]");
-    let laboratory = Laboratory::new(&with, 1).expect("the scene is good");
+    let laboratory = Laboratory::new(&with, 1).expect("the scene is valid");
     let mut dataset = laboratory.dataset().expect("recorded");
     let truth = laboratory.truth().expect("known");
     let rms = |dataset: &_| {
         let calibration =
-            calib::calibrate(dataset, Method::Beam, &Options::default()).expect("it calibrates");
-        let scored = score(dataset, &calibration, Some(&truth));
+            calib::calibrate(dataset, Method::Beam, &Options::default()).expect("the calibration succeeds");
+        let scored = score(dataset, &calibration, Some(&truth)).expect("in memory");
         (scored.per_axis_rms_deg, scored.beams.solved)
     };
     let (found, solved) = rms(&dataset);
@@ -157,9 +160,9 @@ fn a_board_that_moved_spoils_a_calibration_that_believes_it() {
     );
 }
 
-/// Directions with outliers are compared with those of the same seeds without: what outliers add to an error has nothing
-/// to do with the error that was there, so that the two add as squares. Errors themselves, which a whole run shares, would
-/// need hundreds of seeds to show a tenth.
+/// Directions with outliers are compared with those of the same seeds without: the error that outliers add is
+/// independent of the existing error, so both add as squares. The errors themselves, which a whole run shares, would
+/// need hundreds of seeds to resolve a tenth.
 #[test]
 fn outliers_cost_less_than_a_tenth() {
     let directions = |seed: u64, probability: f64, method| {
@@ -203,10 +206,10 @@ fn outliers_cost_less_than_a_tenth() {
     }
 }
 
-/// A detector whose walk nobody believes in, with a pulse twice as long as usual: the calibration says that something is
-/// wrong, and does not where nothing is.
+/// A detector with a walk error that is not believed, and a pulse twice as long as usual: the calibration reports that
+/// something is wrong, and reports nothing if nothing is.
 #[test]
-fn a_walk_that_nobody_believes_in_fires_the_residual_test() {
+fn a_walk_error_that_is_not_believed_triggers_the_residual_test() {
     let assessed = |model, pulse_fwhm_ns| {
         let mut scene = scene(TWO_MIRROR);
         scene.errors.model = model;
@@ -220,25 +223,26 @@ fn a_walk_that_nobody_believes_in_fires_the_residual_test() {
     let wrong = assessed(ErrorModel::Both, 8.0);
     assert!(wrong.global_test.p_value < 1e-6, "{:?}", wrong.global_test);
     assert!(
-        wrong.verdict.contains("something acts that nobody believes in"),
+        wrong.verdict.contains("there is an error that the beliefs omit"),
         "{}",
         wrong.verdict
     );
 }
 
-/// Boards that a calibration has not seen are where it says, give or take what it says.
+/// Boards that a calibration has not seen are where it predicts, to within its stated uncertainty.
 #[test]
-fn boards_left_out_are_predicted_as_well_as_stated() {
+fn held_out_boards_are_predicted_as_accurately_as_stated() {
     let options = Options {
         cross_validation: true,
         ..Options::default()
     };
-    // Of four runs, since boards of one run share their errors.
+    // Over four runs, since boards of one run share errors.
     let (mut found, mut expected) = (0.0, 0.0);
     for seed in 1..=4 {
-        let laboratory = Laboratory::new(&scene(TWO_MIRROR), seed).expect("the scene is good");
+        let laboratory = Laboratory::new(&scene(TWO_MIRROR), seed).expect("the scene is valid");
         let dataset = laboratory.dataset().expect("recorded");
-        let calibration = calib::calibrate(&dataset, Method::Joint, &options).expect("it calibrates");
+        let calibration =
+            calib::calibrate(&dataset, Method::Joint, &options).expect("the calibration succeeds");
         let held_out = calibration
             .assessment
             .and_then(|a| a.held_out)

@@ -1,17 +1,17 @@
-//! The search for better layouts finds what can be known, keeps what it must, and says the same every time.
+//! The search for better layouts finds known optima, keeps requirements, and gives the same result every time.
 //!
-//! What a candidate's goals are is compared with `layout` of the scene that is written. That the search finds the best
-//! there is, is shown only where that is known in closed form.
+//! The goals of a candidate are compared with `layout` of the written scene. That the search finds the optimum is shown
+//! only where it is known in closed form.
 
 use crate::common::{folder_with, run, stderr, stdout};
 use crate::parametric::PARAMETRIC;
-use catoptric::io::{scene, template::Template};
+use catoptric::files::{parametric::ParametricScene, scene};
 use catoptric::layout::{self, Detail, Requirement};
 use catoptric::optimize::{Goal, Optimum, Options, Wanted, optimize};
 use serde_json::Value;
 
-fn template(text: &str) -> Template {
-    Template::parse(text, "scene.toml", &[]).unwrap_or_else(|e| panic!("{e}"))
+fn template(text: &str) -> ParametricScene {
+    ParametricScene::parse(text, "scene.toml", &[]).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn options(goals: &[&str], requirements: &[&str], evaluations: usize) -> Options {
@@ -55,8 +55,8 @@ fn the_same_seed_gives_the_same_answer_on_any_number_of_threads() {
 
 #[test]
 fn a_known_optimum_is_found() {
-    // One facet alone decides how large the layout is, and farther is larger: the least distance is the best. Elements
-    // that look to 60° are nearest to 47° where the limit is 47°.
+    // A single facet determines the size of the layout, and farther is larger: the minimum distance is optimal.
+    // Elements that should look to 60° are closest at 47° if the limit is 47°.
     let text = r#"
         schema_version = 1
         name = "one"
@@ -103,7 +103,7 @@ fn a_known_optimum_is_found() {
     };
     let found = search(text, &directions);
     let best = found.best.unwrap();
-    // The four nearest of a fan whose beams are 0.25° apart are 0.25° away on average at the best.
+    // The four nearest elements of a fan with beams 0.25° apart are at best 0.25° away on average.
     assert!((best.parameters["rise_deg"] - 47.0).abs() < 0.5, "{best:?}");
     assert!(
         best.goals["directions"] < 0.3 && found.start.goals["directions"] > 10.0,
@@ -112,7 +112,7 @@ fn a_known_optimum_is_found() {
 }
 
 #[test]
-fn what_is_required_is_kept() {
+fn requirements_are_met() {
     let requirements = [
         "size.diameter_mm<=165",
         "facets.*.margin_across_mm>=3",
@@ -137,7 +137,7 @@ fn what_is_required_is_kept() {
 }
 
 #[test]
-fn a_search_that_is_told_to_stop_gives_what_it_has() {
+fn a_stopped_search_returns_what_it_has() {
     let mut batches = 0;
     let found = optimize(
         &template(PARAMETRIC),
@@ -177,7 +177,7 @@ fn the_hand_made_prototype_is_beaten_in_both_goals() {
     let goal = |of: &str, name: &str| found[of]["goals"][name].as_f64().unwrap();
     assert!(goal("best", "field_of_regard") > 1.02 * goal("start", "field_of_regard"));
     assert!(goal("best", "lost_beams") < 0.8 * goal("start", "lost_beams"));
-    // What is written is what was looked at, with every sub-ray.
+    // The written scene is the one that was evaluated, with every sub-ray.
     let path = folder.path().join("found/best.toml");
     let text = std::fs::read_to_string(&path).unwrap();
     assert!(
@@ -192,7 +192,7 @@ fn the_hand_made_prototype_is_beaten_in_both_goals() {
     let analysis = layout::analyze(&written, None, Detail::Full).unwrap();
     assert_eq!(analysis.field_of_regard, goal("best", "field_of_regard"));
     assert_eq!(analysis.lost as f64, goal("best", "lost_beams"));
-    // It can be simulated, and it says why it is better.
+    // It can be simulated, and the report explains why it is better.
     let checked = run(folder.path(), &["check", "found/best.toml"]);
     assert_eq!(checked.status.code(), Some(0), "{}", stderr(&checked));
     let left = found["why"]["left_as_it_was"].as_array().unwrap();
@@ -215,7 +215,7 @@ fn the_hand_made_prototype_is_beaten_in_both_goals() {
 }
 
 #[test]
-fn what_makes_no_search_is_said() {
+fn invalid_searches_are_explained() {
     let (folder, _) = folder_with(PARAMETRIC);
     let refuse = |arguments: &[&str], code: i32, words: &[&str]| {
         let mut all = vec!["optimize", "scene.toml", "--evaluations", "20", "--coarse"];
@@ -230,12 +230,12 @@ fn what_makes_no_search_is_said() {
     refuse(
         &["--goal", "feild_of_regard"],
         2,
-        &["is no goal", "did you mean field_of_regard?"],
+        &["is not a goal", "did you mean field_of_regard?"],
     );
     refuse(
         &["--goal", "szie.height_mm:up"],
         2,
-        &["is no figure", "did you mean size.height_mm?"],
+        &["is not a figure", "did you mean size.height_mm?"],
     );
     refuse(&["--goal", "directions"], 2, &["need one another"]);
     refuse(
@@ -246,14 +246,18 @@ fn what_makes_no_search_is_said() {
     refuse(
         &["--goal", "directions", "--direction", "90,-100"],
         2,
-        &["is no direction"],
+        &["is not a direction"],
     );
     refuse(&["--goal", "size", "--goal", "size"], 2, &["given twice"]);
-    refuse(&["--goal", "size", "--require", "lots<=3"], 2, &["is no figure"]);
+    refuse(
+        &["--goal", "size", "--require", "lots<=3"],
+        2,
+        &["is not a figure"],
+    );
     refuse(
         &["--goal", "size", "--require", "size.diameter_mm<=10"],
         1,
-        &["keeps every requirement", "diameter_mm is"],
+        &["meets every requirement", "diameter_mm is"],
     );
     let output = run(folder.path(), &["optimize", "scene.toml"]);
     assert_eq!(output.status.code(), Some(2));

@@ -1,28 +1,29 @@
-//! What the repository takes from Cooper, Raquet, Patton (2018): its tables, and Figure 5's layout.
+//! Data taken from Cooper, Raquet, Patton (2018): its tables, and the layout of Figure 5.
 //!
-//! The error tables come back by construction; these tests prove that nothing on the way distorts them, and that the
-//! constants taken from the tables are the tables' own. They do not prove that the sensor is like that.
+//! The error tables are reproduced by construction; these tests prove that nothing distorts them in between, and that the
+//! constants taken from the tables equal those of the tables. They do not prove that the sensor is like that.
 
 use crate::scenes::{BARE, PROTOTYPE, scene, set_board_ahead};
-use catoptric::model::{PoseKind, beam};
+use catoptric::model::PoseKind;
 use catoptric::sim::scene::{ErrorModel, Errors, Preset};
-use catoptric::sim::{Laboratory, structure::Structure};
+use catoptric::sim::{Laboratory, build::Structure};
+use catoptric_fixtures::ust20lx;
 
-/// Table 2: mean errors of three trials and their standard deviations, in metres.
+/// Table 2: mean errors of three trials and their standard deviations, in meters.
 const TABLE_2: [(f64, [f64; 3], [f64; 3]); 3] = [
     (0.5, [-0.0017, -0.0032, -0.0036], [0.0041, 0.0041, 0.0042]),
     (2.0, [0.0070, 0.0058, 0.0054], [0.0038, 0.0039, 0.0039]),
     (4.0, [0.0008, -0.0004, -0.0007], [0.0047, 0.0046, 0.0046]),
 ];
 
-/// Table 3: angle between board and beam in degrees, and mean errors of three trials, in metres.
+/// Table 3: angle between board and beam in degrees, and mean errors of three trials, in meters.
 const TABLE_3: [(f64, [f64; 3]); 3] = [
     (0.9, [0.0099, 0.0088, 0.0090]),
     (18.5, [0.0271, 0.0274, 0.0277]),
     (-44.7, [0.0354, 0.0357, 0.0330]),
 ];
 
-/// Table 1: distance, height and width of the spot of three neighbouring beams, in metres and millimetres.
+/// Table 1: distance, height and width of the spot of three neighboring beams, in meters and millimeters.
 const TABLE_1: [(f64, f64, f64); 5] = [
     (0.5, 3.2, 15.9),
     (1.0, 4.0, 33.3),
@@ -35,7 +36,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Slope and offset of the line through points, in the sense of least squares.
+/// Slope and offset of the least-squares line through points.
 fn line(points: &[(f64, f64)]) -> (f64, f64) {
     let n = points.len() as f64;
     let (x, y) = (
@@ -53,7 +54,7 @@ fn the_defaults_are_the_tables_means() {
     for (index, (range, means, sds)) in TABLE_2.iter().enumerate() {
         assert_eq!(errors.distance.range_m[index], *range);
         assert_eq!(errors.noise.range_m[index], *range);
-        // The defaults are given to a tenth of a millimetre.
+        // The defaults are rounded to a tenth of a millimeter.
         assert!(
             (errors.distance.error_mm[index] - 1e3 * mean(means)).abs() <= 0.05 + 1e-9,
             "{range} m"
@@ -79,10 +80,10 @@ fn equation_4_is_the_line_through_table_3() {
     let (gain, offset) = line(&points);
     let angle = Errors::default().angle;
     assert!((angle.gain_mm - gain).abs() < 0.05, "A_a = {gain} mm");
-    // The offset lives in E_r: nothing is left at normal incidence, where the table alone has B_a = +86.1 mm.
+    // The offset is part of E_r: it is zero at normal incidence, where the table alone has B_a = +86.1 mm.
     assert_eq!(angle.offset_mm, -angle.gain_mm);
     assert!((offset - 86.1).abs() < 0.05, "B_a = {offset} mm");
-    // The law misses its own table, as the documentation says.
+    // The law deviates from its own table, as documented.
     let worst = points
         .iter()
         .map(|(cos, error)| (gain * cos + offset - error).abs())
@@ -93,7 +94,7 @@ fn equation_4_is_the_line_through_table_3() {
 #[test]
 fn the_cooper_preset_is_table_1_read_as_three_beams() {
     let shape = Preset::Ust20lxCooper.beam_shape();
-    let step_mrad = 1e3 * beam::STEP;
+    let step_mrad = 1e3 * ust20lx::STEP;
     let but_2_m = TABLE_1.iter().filter(|(r, ..)| *r != 2.0);
     let (products, squares) = but_2_m.fold((0.0, 0.0), |(p, s), (r, _, w)| (p + r * w, s + r * r));
     let width = products / squares;
@@ -114,14 +115,15 @@ fn the_cooper_preset_is_table_1_read_as_three_beams() {
 
 #[test]
 fn no_straight_beam_has_all_of_table_1() {
-    // Within 5 % or 1 mm of every width: at 1, 2 and 3 m that asks for a beam whose width bends.
+    // Within 5 % or 1 mm of every width: at 1, 2 and 3 m that would require a beam whose width is not linear in distance.
     let allowed = |index: usize| {
         let (_, _, width) = TABLE_1[index];
         let slack = f64::max(1.0, 0.05 * width);
         (width - slack, width + slack)
     };
     let (at_1, at_2, at_3) = (allowed(1), allowed(2), allowed(3));
-    // Halfway between them a straight edge has the mean of both; even the least allowed is too much.
+    // Halfway between two distances a straight edge has the mean of both; even the smallest allowed values are too
+    // large.
     assert!(
         0.5 * (at_1.0 + at_3.0) > at_2.1 + 4.0,
         "{at_1:?} {at_2:?} {at_3:?}"
@@ -129,7 +131,7 @@ fn no_straight_beam_has_all_of_table_1() {
 }
 
 #[test]
-fn a_white_board_reads_table_2() {
+fn a_white_board_reads_as_in_table_2() {
     let scans = 4000_u32;
     for (range, means, sds) in TABLE_2 {
         let mut scene = scene(BARE);
@@ -141,14 +143,14 @@ fn a_white_board_reads_table_2() {
         assert_eq!(scene.errors.model, ErrorModel::Empirical);
         set_board_ahead(&mut scene, range);
         scene.experiment.scans_per_pose = scans;
-        let laboratory = Laboratory::new(&scene, 2).expect("the scene is good");
+        let laboratory = Laboratory::new(&scene, 2).expect("the scene is valid");
         let record = laboratory
             .stretch(2)
             .expect("recorded")
             .into_record()
             .expect("tracked");
         assert_eq!(record.label.kind, PoseKind::Direct);
-        let found = record.summarize()[beam::FORWARD];
+        let found = record.summarize()[ust20lx::FORWARD];
         // 3.2905 standard errors: 99.9 % of seeds. The defaults are rounded to 0.05 mm of the table.
         let (sd, n) = (mean(&sds), f64::from(scans));
         assert!(
@@ -176,11 +178,11 @@ fn the_prototype_is_figure_5_as_far_as_it_is_known() {
         as_drawn.scanner.mount.tilt_tolerance_deg = 0.0;
         as_drawn.scanner.mount.shift_tolerance_mm = 0.0;
         Laboratory::new(&as_drawn, 1)
-            .expect("the scene is good")
+            .expect("the scene is valid")
             .truth()
             .expect("known")
     };
-    let azimuth = |b: usize| beam::azimuth(b).to_degrees();
+    let azimuth = |b: usize| ust20lx::azimuth(b).to_degrees();
     // The forward ±60° are free; every facet serves about 15° between 62° and 128°.
     for b in &truth.beams {
         assert!(
@@ -219,7 +221,7 @@ fn the_prototype_is_figure_5_as_far_as_it_is_known() {
             );
             assert!(
                 before.is_none_or(|b| b * elevation < 0.0),
-                "{name} alternates with its neighbour"
+                "{name} alternates with its neighbor"
             );
             before = Some(elevation);
         }

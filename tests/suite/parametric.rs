@@ -1,15 +1,16 @@
-//! Parameters, expressions and patterns of a scene: what they come to, and what is said of those that come to nothing.
+//! Parameters, expressions and patterns of a scene: their values, and the messages for invalid ones.
 //!
-//! Places of errors are computed here by searching the text. That a copy is where its original's mirror image is, is
-//! proven in `crates/sim/src/pattern/tests.rs`.
+//! Expected error locations are found by searching the text. That a copy is at the mirror image of its original is
+//! proven in `crates/sim/src/build/pattern/tests.rs`.
 
 use crate::bad_input::{expect_one_in, place_of, problems_with};
 use crate::common::{VALID, folder_with, run, stderr, stdout};
 use crate::scenes::PROTOTYPE;
-use catoptric::io::scene;
+use catoptric::files::scene;
 use catoptric::layout::{self, Detail};
+use catoptric::sim::Scene;
+use catoptric::sim::build::layout as shapes;
 use catoptric::sim::scene::FacetShape;
-use catoptric::sim::{Scene, layout as shapes};
 use nalgebra::Point3;
 
 pub(crate) const PARAMETRIC: &str = include_str!("../../scenes/prototype-parametric.toml");
@@ -23,7 +24,12 @@ fn parsed(text: &str, sets: &[&str]) -> Scene {
 fn outlines(scene: &Scene) -> Vec<(String, Vec<Point3<f64>>)> {
     let facets = scene.superstructure.facet.iter();
     facets
-        .map(|f| (f.name.clone(), shapes::corners(&f.shape).unwrap()))
+        .map(|f| {
+            (
+                f.name.clone(),
+                shapes::corners(&f.shape, &Default::default()).unwrap(),
+            )
+        })
         .collect()
 }
 
@@ -45,7 +51,7 @@ fn the_parametric_prototype_is_the_prototype() {
             (&wanted.name, wanted.size_mm, wanted.yaw_deg)
         );
         for (found, written) in post.center_mm.iter().zip(wanted.center_mm) {
-            // The prototype's are written to a tenth of a millimetre.
+            // Those of the prototype are rounded to a tenth of a millimeter.
             assert!(
                 (found - written).abs() <= 0.05,
                 "{}: {found} {written}",
@@ -54,7 +60,7 @@ fn the_parametric_prototype_is_the_prototype() {
         }
     }
     assert_eq!(made.superstructure.post.len(), by_hand.superstructure.post.len());
-    // All else is the same word by word.
+    // Everything else is identical.
     let mut made = made;
     made.name = by_hand.name.clone();
     made.parameters.clear();
@@ -64,7 +70,7 @@ fn the_parametric_prototype_is_the_prototype() {
 }
 
 #[test]
-fn a_scene_worked_out_reads_back_as_itself() {
+fn an_evaluated_scene_is_read_back_unchanged() {
     let scene = parsed(PARAMETRIC, &["parameters.gap_deg=1.25"]);
     let text = scene::to_toml(&scene).unwrap();
     assert!(!text.contains("pattern") && !text.contains("\"="), "{text}");
@@ -86,7 +92,7 @@ fn a_parameter_is_set_by_its_name() {
     assert_eq!(distance(&parsed(&text, &[])), 70.0);
     let set = parsed(&text, &["parameters.far_mm=70"]);
     assert_eq!((distance(&set), set.parameters["more_mm"].value), (80.0, 75.0));
-    // Its limits stay, and are kept.
+    // Its limits remain and are enforced.
     assert_eq!(set.parameters["far_mm"].high, Some(80.0));
     let problems = problems_with(&text, &["parameters.far_mm=90"]);
     assert_eq!(
@@ -98,12 +104,12 @@ fn a_parameter_is_set_by_its_name() {
         problems.list[0].message,
         "the scene has no parameter `fra_mm`; did you mean parameters.far_mm?"
     );
-    // A set may be an expression itself.
+    // A setting may itself be an expression.
     let set = parsed(&text, &["parameters.far_mm= = 2 * 33"]);
     assert_eq!(distance(&set), 76.0);
 }
 
-/// The parametric prototype with one part replaced: one problem at `at`, saying all of `words`.
+/// The parametric prototype with one part replaced: one problem at `at`, with all of `words`.
 #[track_caller]
 fn expect_one(from: &str, to: &str, at: &str, words: &[&str]) {
     assert_eq!(PARAMETRIC.matches(from).count(), 1, "{from:?} must occur once");
@@ -111,7 +117,7 @@ fn expect_one(from: &str, to: &str, at: &str, words: &[&str]) {
 }
 
 #[test]
-fn a_wrong_expression_is_shown_where_it_is_wrong() {
+fn a_wrong_expression_is_reported_where_it_is() {
     let from = "\"= reach_2_mm\"";
     expect_one(
         from,
@@ -144,7 +150,7 @@ fn a_wrong_expression_is_shown_where_it_is_wrong() {
         "sine(90)",
         &["`sine`, which is no function", "did you mean `sin`?"],
     );
-    // A value that is out of range is one, however it came about.
+    // A value out of range is reported, however it was computed.
     expect_one(
         from,
         "\"= reach_2_mm - 90\"",
@@ -154,7 +160,7 @@ fn a_wrong_expression_is_shown_where_it_is_wrong() {
 }
 
 #[test]
-fn a_wrong_parameter_is_shown_where_it_is_wrong() {
+fn a_wrong_parameter_is_reported_where_it_is() {
     expect_one(
         "{ value = 12, low = 8",
         "{ value = 20, low = 8",
@@ -182,10 +188,7 @@ fn a_wrong_parameter_is_shown_where_it_is_wrong() {
     let circle = PARAMETRIC.replace("first_deg = 62 ", "first_deg = \"= third_deg\" ");
     let problems = problems_with(&circle, &[]);
     assert!(
-        problems
-            .list
-            .iter()
-            .any(|p| p.message.contains("goes round in a circle")),
+        problems.list.iter().any(|p| p.message.contains("is circular: `")),
         "{problems}"
     );
     let dash = PARAMETRIC.replace("first_deg = 62 ", "first-deg = 62 ");
@@ -193,7 +196,7 @@ fn a_wrong_parameter_is_shown_where_it_is_wrong() {
     let about = problems
         .list
         .iter()
-        .find(|p| p.message.contains("`first-deg` cannot stand"))
+        .find(|p| p.message.contains("`first-deg` cannot be used"))
         .unwrap();
     assert_eq!(
         problems.position(about),
@@ -203,7 +206,7 @@ fn a_wrong_parameter_is_shown_where_it_is_wrong() {
 }
 
 #[test]
-fn a_wrong_pattern_is_shown_where_it_is_wrong() {
+fn a_wrong_pattern_is_reported_where_it_is() {
     expect_one(
         "of = [\"left-1\", \"left-2\"",
         "of = [\"left-1\", \"lfet-2\"",
@@ -220,7 +223,7 @@ fn a_wrong_pattern_is_shown_where_it_is_wrong() {
         "\"right-3\", \"right-4\"]",
         "\"right-3\", \"left-1\"]",
         "[[superstructure.pattern]]",
-        &["in the copy \"left-1\"", "every name may be used once"],
+        &["in the copy \"left-1\"", "names must be unique"],
     );
     expect_one(
         "\"left_right\", \"up_down\"",
@@ -231,7 +234,7 @@ fn a_wrong_pattern_is_shown_where_it_is_wrong() {
 }
 
 #[test]
-fn a_ring_is_simulated_like_any_facets() {
+fn a_ring_is_simulated_like_any_other_facets() {
     let petal = r#"
         schema_version = 1
         name = "ring"
@@ -246,7 +249,7 @@ fn a_ring_is_simulated_like_any_facets() {
     let found = layout::analyze(&scene, None, Detail::Coarse).unwrap();
     let names: Vec<&str> = found.facets.iter().map(|f| f.name.as_str()).collect();
     assert_eq!(names, ["petal", "petal-2", "petal-3", "petal-4", "petal-5"]);
-    // A step of 30° is 120 beams, so every petal serves the same number of them and looks as high.
+    // A step of 30° is 120 beams, so every petal serves the same number of them at the same elevation.
     for (k, facet) in found.facets.iter().enumerate() {
         let [first, last] = facet.beams.unwrap();
         let [own_first, own_last] = found.facets[0].beams.unwrap();
@@ -258,14 +261,17 @@ fn a_ring_is_simulated_like_any_facets() {
 }
 
 #[test]
-fn a_plate_says_what_it_lacks() {
+fn a_plate_reports_what_it_lacks() {
     let plate = "shape.plate = { azimuth_deg = 70, beam = 800, distance_mm = 60, exit_azimuth_deg = 60, width_mm = 20, height_mm = 20 }";
     let from = VALID.lines().find(|l| l.starts_with("shape.wedge")).unwrap();
     let problems = problems_with(&VALID.replace(from, plate), &[]);
     let said = problems.to_string();
-    assert!(said.contains("names a beam, and `azimuth_deg` another"), "{said}");
     assert!(
-        said.contains("needs one direction, and has none, half of one, or two"),
+        said.contains("names a beam, and `azimuth_deg` names another"),
+        "{said}"
+    );
+    assert!(
+        said.contains("needs exactly one direction, but has none, half of one, or two"),
         "{said}"
     );
     assert_eq!(problems.list.len(), 2, "{said}");
@@ -281,7 +287,7 @@ fn a_plate_says_what_it_lacks() {
 }
 
 #[test]
-fn the_schema_for_editors_lets_numbers_be_expressions() {
+fn the_schema_for_editors_allows_expressions_for_numbers() {
     let schema = scene::file_schema();
     let wedge = &schema["$defs"]["Wedge"]["properties"];
     assert_eq!(
@@ -295,7 +301,7 @@ fn the_schema_for_editors_lets_numbers_be_expressions() {
         schema["$defs"]["Parameter"]["anyOf"][1]["required"],
         serde_json::json!(["value"])
     );
-    // Once worked out, they are numbers again.
+    // Once evaluated, they are numbers again.
     assert_eq!(
         scene::json_schema()["$defs"]["Wedge"]["properties"]["distance_mm"]["type"],
         "number"
@@ -303,13 +309,13 @@ fn the_schema_for_editors_lets_numbers_be_expressions() {
 }
 
 #[test]
-fn text_that_begins_with_an_equals_sign_is_text_where_text_belongs() {
+fn text_that_begins_with_an_equals_sign_is_text_where_text_is_expected() {
     let text = VALID.replacen("name = \"", "name = \"= ", 1);
     assert!(parsed(&text, &[]).name.starts_with("= "));
 }
 
 #[test]
-fn layout_shows_the_corners_it_works_with() {
+fn layout_shows_the_corners_it_uses() {
     let (folder, _) = folder_with(PARAMETRIC);
     let output = run(
         folder.path(),
@@ -325,7 +331,7 @@ fn layout_shows_the_corners_it_works_with() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let said = stdout(&output);
     let scene = parsed(PARAMETRIC, &["parameters.gap_deg=1"]);
-    let corner = shapes::corners(&scene.superstructure.facet[7].shape).unwrap()[2] * 1e3;
+    let corner = shapes::corners(&scene.superstructure.facet[7].shape, &Default::default()).unwrap()[2] * 1e3;
     let wanted = format!("({:.3}, {:.3}, {:.3})", corner.x, corner.y, corner.z);
     assert!(said.contains(&wanted), "{wanted} is not in {said}");
     let output = run(

@@ -1,32 +1,33 @@
-//! Closed-form scenes, and an oracle that never reflects a ray: it unfolds the mirrors instead.
+//! Closed-form scenes, and an oracle that never reflects a ray but unfolds the mirrors instead.
 //!
-//! These prove the geometry of the simulator and what a detector makes of it. They say nothing about whether the
-//! error tables are those of a real sensor; `paper` compares with those.
+//! These prove the geometry of the simulator and the readings of a detector. They do not prove that the error tables
+//! are those of a real sensor; `paper` compares with those.
 
 use crate::scenes::{BARE, scene, set_board_ahead};
+use catoptric::cast::Ray;
+use catoptric::cast::{Polygon, Shape};
 use catoptric::model::{MirrorPlane, beam};
-use catoptric::sim::cast::{Polygon, Shape};
-use catoptric::sim::color;
-use catoptric::sim::footprint::Ray;
+use catoptric::sim::build::Structure;
+use catoptric::sim::build::color;
+use catoptric::sim::light::{End, Mirrors, Path, Role, Setting, Target};
 use catoptric::sim::noise::{Draws, Purpose};
-use catoptric::sim::optics::{End, Mirrors, Path, Role, Setting, Target};
 use catoptric::sim::scene::{ErrorModel, Facet, FacetShape, PolygonShape};
-use catoptric::sim::structure::Structure;
 use catoptric::sim::{Laboratory, Scene};
+use catoptric_fixtures::ust20lx;
 use nalgebra::{Matrix4, Point3, Unit, Vector3};
 
-/// A direction drawn evenly over the sphere.
+/// A direction drawn uniformly on the sphere.
 fn random_direction(draws: &mut Draws) -> Unit<Vector3<f64>> {
     Unit::new_normalize(draws.normal3())
 }
 
-/// A convex quadrilateral around a point, its front towards the origin, turned at random by up to about 60°.
+/// A convex quadrilateral around a point, its front facing the origin, rotated randomly by up to about 60°.
 fn random_quad(draws: &mut Draws, center: Point3<f64>, size: f64) -> Vec<Point3<f64>> {
     let towards = -center.coords.normalize();
     let normal = Unit::new_normalize(towards + random_direction(draws).into_inner() * 0.8);
     let x = Unit::new_normalize(normal.cross(&random_direction(draws)));
     let y = normal.cross(&x);
-    // Corners of increasing angle on a circle make a convex polygon.
+    // Corners of increasing angle on a circle form a convex polygon.
     (0..4)
         .map(|k| {
             let angle = std::f64::consts::FRAC_PI_2 * (f64::from(k) + 0.8 * draws.uniform());
@@ -35,10 +36,10 @@ fn random_quad(draws: &mut Draws, center: Point3<f64>, size: f64) -> Vec<Point3<
         .collect()
 }
 
-/// Where a straight line from the origin meets a polygon, and how near to its edge, by fans of triangles.
+/// The intersection of a straight line from the origin with a polygon, by fans of triangles, and its clearance.
 ///
-/// The returned clearance is the smallest distance of the point from an edge's line, negative outside.
-fn meet(corners: &[Point3<f64>], direction: &Vector3<f64>) -> Option<(f64, f64)> {
+/// The clearance is the smallest distance of the point from the line of an edge, negative outside.
+fn intersect(corners: &[Point3<f64>], direction: &Vector3<f64>) -> Option<(f64, f64)> {
     let normal = (corners[1] - corners[0])
         .cross(&(corners[2] - corners[0]))
         .normalize();
@@ -51,7 +52,7 @@ fn meet(corners: &[Point3<f64>], direction: &Vector3<f64>) -> Option<(f64, f64)>
     let clearance = closed
         .map(|(a, b)| normal.dot(&(b - a).cross(&(point - a.coords))) / (b - a).norm())
         .fold(f64::INFINITY, f64::min);
-    // Unfolding an odd number of times turns the corners' sense round.
+    // An odd number of reflections reverses the order of the corners.
     let other = corners.iter().zip(corners.iter().cycle().skip(1));
     let reversed = other
         .map(|(a, b)| -normal.dot(&(b - a).cross(&(point - a.coords))) / (b - a).norm())
@@ -70,9 +71,9 @@ fn reflection(plane: &MirrorPlane) -> Matrix4<f64> {
     m
 }
 
-/// Follows a straight line through a space that is folded open at every mirror it crosses: facets met and length.
+/// Follows a straight line through space unfolded at every mirror it crosses; returns the facets hit and the length.
 ///
-/// `None` if a decision hangs on less than `clear` metres.
+/// `None` if a decision depends on less than `clear` meters.
 fn unfold(
     facets: &[Vec<Point3<f64>>],
     board: &[Point3<f64>],
@@ -90,7 +91,7 @@ fn unfold(
             if met.last() == Some(&index) {
                 continue;
             }
-            let Some((t, clearance)) = meet(&place(corners), direction) else {
+            let Some((t, clearance)) = intersect(&place(corners), direction) else {
                 continue;
             };
             if t <= before {
@@ -111,7 +112,7 @@ fn unfold(
         }
         let corners = place(&facets[index]);
         let normal = Unit::new_normalize((corners[1] - corners[0]).cross(&(corners[2] - corners[0])));
-        // The face is the side from which the corners run counter-clockwise, in a space mirrored `met.len()` times.
+        // The face is the side from which the corners are counterclockwise, in space mirrored `met.len()` times.
         let handed = if met.len() % 2 == 0 { 1.0 } else { -1.0 };
         if handed * normal.dot(direction) > 0.0 || met.len() == 4 {
             return Some((met, Some(t)));
@@ -175,7 +176,7 @@ fn unfolded_mirrors_agree_with_the_tracer() {
         let center = Point3::from(random_direction(&mut draws).into_inner() * (0.5 + 3.0 * draws.uniform()));
         let board = random_quad(&mut draws, center, 2.5);
         for shot in 0..8 {
-            // Half of the shots pass an edge of the first facet at 1 mm down to 1 nm, on either side.
+            // Half of the rays pass an edge of the first facet at 1 mm down to 1 nm, on either side.
             let near_edge = shot % 2 == 1;
             let direction = if near_edge {
                 let (a, b) = (facets[0][shot / 2 % 4], facets[0][(shot / 2 + 1) % 4]);
@@ -186,7 +187,7 @@ fn unfolded_mirrors_agree_with_the_tracer() {
                 let inside = facets[0].iter().map(|c| c.coords).sum::<Vector3<f64>>() / 4.0;
                 Unit::new_normalize(inside + draws.normal3() * 0.02)
             };
-            // Millimetres in the scene file cost the last bits of the corners: edges closer than this are not decided.
+            // Millimeters in the scene file round the corners: edges closer than this are not decided.
             let Some((met, length)) = unfold(&facets, &board, &direction, 1e-12) else {
                 continue;
             };
@@ -212,7 +213,7 @@ fn unfolded_mirrors_agree_with_the_tracer() {
             near_edges += usize::from(near_edge);
         }
     }
-    // The cases are what they claim to be.
+    // The random scenes contain the intended cases.
     assert!(
         by_bounces[1] > 2000 && by_bounces[2] > 300 && by_bounces[3] > 20,
         "{by_bounces:?}"
@@ -228,7 +229,7 @@ fn board_ahead(distance: f64, mut edit: impl FnMut(&mut Scene)) -> Laboratory {
     scene.experiment.room_scans = 1;
     scene.experiment.bare_scans = 1;
     edit(&mut scene);
-    Laboratory::new(&scene, 1).expect("the scene is good")
+    Laboratory::new(&scene, 1).expect("the scene is valid")
 }
 
 /// Number of the stretch with the board.
@@ -249,10 +250,10 @@ fn a_45_degree_mirror_and_a_wall_add_their_two_legs() {
             ],
         }),
     });
-    // The corners run so that the face looks back at the scanner and to the left.
-    let laboratory = Laboratory::new(&scene, 1).expect("the scene is good");
+    // The corners are ordered so that the face looks back at the scanner and to the left.
+    let laboratory = Laboratory::new(&scene, 1).expect("the scene is valid");
     let returns = laboratory.returns(1).expect("colors are built in");
-    let found = returns[beam::FORWARD].as_ref().expect("the wall is bright");
+    let found = returns[ust20lx::FORWARD].as_ref().expect("the wall is bright");
     assert_eq!(
         (found.role, found.facets.as_slice()),
         (Role::Wall, [0].as_slice())
@@ -264,7 +265,7 @@ fn a_45_degree_mirror_and_a_wall_add_their_two_legs() {
 fn a_static_wall_without_noise_never_varies() {
     let laboratory = board_ahead(2.0, |_| {});
     let stretch = laboratory.stretch(BOARD).expect("it is recorded");
-    let scans: Vec<&[f64]> = stretch.ranges.chunks(beam::COUNT).collect();
+    let scans: Vec<&[f64]> = stretch.ranges.chunks(ust20lx::COUNT).collect();
     assert!(scans.iter().all(|scan| scan == &scans[0]));
 }
 
@@ -273,8 +274,8 @@ fn every_point_of_a_flat_wall_is_on_it() {
     let laboratory = board_ahead(3.0, |_| {});
     let stretch = laboratory.stretch(BOARD).expect("it is recorded");
     let room = [5.0, 5.0];
-    for (index, range) in stretch.ranges[..beam::COUNT].iter().enumerate() {
-        let point = beam::direction(beam::azimuth(index)).into_inner() * *range;
+    for (index, range) in stretch.ranges[..ust20lx::COUNT].iter().enumerate() {
+        let point = beam::direction(ust20lx::azimuth(index)).into_inner() * *range;
         let to_walls = (room[0] - point.x.abs())
             .abs()
             .min((room[1] - point.y.abs()).abs());
@@ -303,12 +304,12 @@ fn a_board_edge_shares_the_beam_with_the_wall_behind() {
     let laboratory = board_ahead(4.7, |scene| scene.board[0].width_mm = 800.0);
     let returns = laboratory.returns(BOARD).expect("colors are built in");
     // Ahead of the scanner; elsewhere beams are shared by two walls.
-    let ahead = &returns[beam::FORWARD - 40..beam::FORWARD + 40];
+    let ahead = &returns[ust20lx::FORWARD - 40..ust20lx::FORWARD + 40];
     let shares: Vec<_> = ahead.iter().flatten().filter(|r| r.share < 1.0 - 1e-12).collect();
     assert!(!shares.is_empty(), "some beams meet the edge");
     for found in &shares {
         assert!(found.share > 0.0 && found.mixed != 0.0);
-        // 0.3 m to the wall is less than the pulse: one echo, between the two surfaces.
+        // 0.3 m to the wall is less than the pulse length: one echo, between the two surfaces.
         let range = found.range();
         assert!(
             range > 4.7 - 1e-6 && range < 5.0 / libm::cos(0.1) + 1e-6,
@@ -319,7 +320,7 @@ fn a_board_edge_shares_the_beam_with_the_wall_behind() {
 
 #[test]
 fn a_chief_ray_that_misses_does_not_lose_the_beam() {
-    // A strip narrower than the spot, beside the forward beam: the spot is 16 mrad · 2 m = 32 mm wide.
+    // A strip narrower than the spot, next to the forward beam: the spot is 16 mrad · 2 m = 32 mm wide.
     let laboratory = board_ahead(2.0, |scene| {
         scene.board[0].width_mm = 10.0;
         scene.board[0].marker = vec![
@@ -330,7 +331,7 @@ fn a_chief_ray_that_misses_does_not_lose_the_beam() {
         scene.experiment.pose[0].center_m[1] = 0.011;
     });
     let returns = laboratory.returns(BOARD).expect("colors are built in");
-    let forward = returns[beam::FORWARD].as_ref().expect("there is an echo");
+    let forward = returns[ust20lx::FORWARD].as_ref().expect("there is an echo");
     assert_eq!(forward.role, Role::Board);
     assert!(
         forward.share < 0.5 && (forward.range() - 2.0).abs() < 0.01,
@@ -352,13 +353,13 @@ fn light_grows_continuously_through_face_on() {
             scene.experiment.pose[0].normal = [-libm::cos(tilt), libm::sin(tilt), 0.0];
         });
         let returns = laboratory.returns(BOARD).expect("colors are built in");
-        returns[beam::FORWARD].as_ref().expect("it is bright").power
+        returns[ust20lx::FORWARD].as_ref().expect("it is bright").power
     };
     let face_on = power(0.0);
     for tilt in [1e-9, 1e-7, -1e-7] {
         assert!((power(tilt) / face_on - 1.0).abs() < 1e-9, "at {tilt}");
     }
-    // Eq. 1 in closed form: the board fills the spot.
+    // Eq. (1) in closed form: the board fills the spot.
     let expected = 0.9 * 0.02 * 0.02 * 0.9 * 10.0 / (4.0 * std::f64::consts::PI);
     assert!(
         (face_on / expected - 1.0).abs() < 1e-4,
@@ -367,8 +368,9 @@ fn light_grows_continuously_through_face_on() {
 }
 
 #[test]
-fn the_leading_edge_walks_as_its_closed_form() {
-    // Only the physical model shows it: a grey board at 2 m against the white one that is calibrated out.
+fn the_leading_edge_walks_as_in_its_closed_form() {
+    // Only the physical model shows it: a gray board at 2 m against the white one for which the walk error is
+    // calibrated out.
     let read = |color: &str| {
         let laboratory = board_ahead(2.0, |scene| {
             scene.errors.model = ErrorModel::Physical;
@@ -376,7 +378,7 @@ fn the_leading_edge_walks_as_its_closed_form() {
             scene.scanner.sub_rays = 1;
         });
         let returns = laboratory.returns(BOARD).expect("colors are built in");
-        returns[beam::FORWARD].as_ref().expect("it is bright").range()
+        returns[ust20lx::FORWARD].as_ref().expect("it is bright").range()
     };
     let sd = 0.5 * 299_792_458.0 * 4e-9 / (8.0 * std::f64::consts::LN_2).sqrt();
     let height = |reflectivity: f64| reflectivity / 4.0 / (0.1 / 64.0);
@@ -398,12 +400,12 @@ fn codes_are_never_turned_into_ranges() {
         scene.experiment.scans_per_pose = 50;
     });
     let stretch = laboratory.stretch(BOARD).expect("it is recorded");
-    let scans: Vec<&[f64]> = stretch.ranges.chunks(beam::COUNT).collect();
-    // The walls are out of range; the board is nearer than the scanner can tell most of the time.
+    let scans: Vec<&[f64]> = stretch.ranges.chunks(ust20lx::COUNT).collect();
+    // The walls are out of range; the board is nearer than the minimum range most of the time.
     assert!(scans.iter().all(|scan| scan[0] == f64::INFINITY));
     assert!(
         scans
             .iter()
-            .all(|scan| scan[beam::FORWARD] == f64::NEG_INFINITY || scan[beam::FORWARD] >= 0.021)
+            .all(|scan| scan[ust20lx::FORWARD] == f64::NEG_INFINITY || scan[ust20lx::FORWARD] >= 0.021)
     );
 }

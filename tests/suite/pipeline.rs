@@ -1,4 +1,4 @@
-//! The way from scene to report through the program, on an experiment small enough to run in a second.
+//! From scene to report through the program, on an experiment small enough to run in a second.
 
 use crate::common::{catoptric, run, stderr, stdout};
 use std::path::Path;
@@ -60,7 +60,7 @@ fn from_scene_to_report() {
     let score: serde_json::Value = serde_json::from_str(&score).unwrap();
     assert_eq!(score["verdict"], "pass");
     assert_eq!(score["beams"]["missed"], 0);
-    // No calibration from noisy data is as good as that.
+    // No calibration from noisy data is that accurate.
     let output = at(&["score", "data", "beam.json", "--max-rms-deg", "1e-9"]);
     assert_eq!(output.status.code(), Some(1));
     assert!(stdout(&output).starts_with("fail") && stderr(&output).starts_with("not good enough"));
@@ -96,7 +96,7 @@ fn from_scene_to_report() {
             .contains("</html>")
     );
 
-    // Without the truth the calibration is the same, byte for byte, and the score is blind.
+    // Without the truth, the calibration is the same, byte for byte, and the score is blind.
     std::fs::remove_dir_all(folder.path().join("data/truth")).unwrap();
     succeeds(&at(&["calibrate", "data", "--out", "blind.json"]));
     assert_eq!(read("blind.json"), read("beam.json"));
@@ -124,7 +124,7 @@ fn threads_and_a_second_run_change_no_file() {
 }
 
 #[test]
-fn simulate_keeps_what_is_there_and_prints_figures() {
+fn simulate_keeps_existing_files_and_prints_figures() {
     let folder = tempfile::tempdir().unwrap();
     let figures = succeeds(&simulate(folder.path(), "data", &["--json"]));
     let figures: serde_json::Value = serde_json::from_str(&figures).unwrap();
@@ -135,7 +135,7 @@ fn simulate_keeps_what_is_there_and_prints_figures() {
     assert_eq!(output.status.code(), Some(3));
     assert!(stderr(&output).contains("--replace"), "{}", stderr(&output));
     succeeds(&simulate(folder.path(), "data", &["--replace"]));
-    // What is not a dataset is never replaced.
+    // Anything that is not a dataset is never replaced.
     let mine = folder.path().join("mine");
     std::fs::create_dir(&mine).unwrap();
     std::fs::write(mine.join("thesis.tex"), "years of work").unwrap();
@@ -187,7 +187,7 @@ fn ctrl_c_leaves_nothing_behind() {
         .stderr(Stdio::piped())
         .spawn();
     let mut child = child.unwrap();
-    // The staging folder beside the scene says that writing has begun.
+    // The staging folder next to the scene shows that writing has begun.
     let begin = Instant::now();
     while std::fs::read_dir(folder.path()).unwrap().count() < 2 {
         assert!(begin.elapsed() < Duration::from_secs(60) && child.try_wait().unwrap().is_none());
@@ -205,7 +205,7 @@ fn ctrl_c_leaves_nothing_behind() {
     assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
     assert_eq!(
         stderr(&output),
-        "interrupted; nothing half-written was left behind\n"
+        "interrupted; no incomplete files were left behind\n"
     );
     let left: Vec<_> = std::fs::read_dir(folder.path())
         .unwrap()
@@ -215,7 +215,7 @@ fn ctrl_c_leaves_nothing_behind() {
 }
 
 #[test]
-fn demo_tells_the_whole_story_twice() {
+fn demo_runs_all_steps_twice() {
     let folder = tempfile::tempdir().unwrap();
     for _ in 0..2 {
         let output = run(folder.path(), &["demo", "--out", "d", "-q"]);

@@ -1,10 +1,11 @@
-//! Planned board poses, recorded by the simulator and calibrated: whether what `plan` predicts is what comes out.
+//! Planned board poses, recorded by the simulator and calibrated: whether the accuracy predicted by `plan` is attained.
 //!
-//! Compared is what is comparable. The bound leaves the mounting out, so the scanner sits where it is drawn. It is of a
-//! geometry, so the mirror is built nearly as drawn, and of the boards that a beam reads, so beams count that every board
-//! serves. It takes noise and d as the session believes them, so these beliefs are true here. And it leaves out that E_a
-//! changes with the direction, which tells a little more, so the law of E_a is flat, its uncertainty not. The estimator is
-//! `beam-gls`, which reaches the bound of an element by itself. It does not prove that no design is better.
+//! Only comparable quantities are compared. The bound excludes the mounting, so the scanner is mounted exactly as
+//! drawn. It is that of a geometry, so the mirror is built nearly as drawn, and of the boards that a beam reads, so
+//! only beams served by every board count. It assumes noise and d as the session believes them, so these beliefs are
+//! true here. It neglects that E_a changes with the direction, which adds a little information, so the law of E_a is
+//! flat, but its uncertainty is not. The estimator is `beam-gls`, which attains the bound of a single element. It does
+//! not prove that no design is better.
 
 use crate::common::{run, stderr, stdout};
 use crate::scenes::{PROTOTYPE, scene};
@@ -20,7 +21,7 @@ use rayon::prelude::*;
 
 const FACET: &str = "left-1";
 
-/// One facet of the default experiment, its scanner mounted as drawn.
+/// One facet of the default experiment, with the scanner mounted as drawn.
 fn one_facet() -> Scene {
     let mut scene = scene(PROTOTYPE);
     scene.superstructure.facet.truncate(1);
@@ -59,18 +60,18 @@ fn request(poses: usize, scene: &Scene) -> Request {
     }
 }
 
-/// Mean square error per axis over some beams, in deg², one for each of 60 seeds; nearly all of them must be solved.
+/// Mean square error per axis over some beams, in deg², for each of 60 seeds; nearly all of them must be solved.
 fn square_errors(scene: &Scene, beams: &[usize]) -> Vec<f64> {
     (1..=60)
         .into_par_iter()
         .map(|seed| {
-            let laboratory = Laboratory::new(scene, seed).expect("the scene is good");
+            let laboratory = Laboratory::new(scene, seed).expect("the scene is valid");
             let (dataset, truth) = (
                 laboratory.dataset().expect("recorded"),
                 laboratory.truth().expect("known"),
             );
-            let found =
-                calib::calibrate(&dataset, Method::BeamGls, &Options::default()).expect("it calibrates");
+            let found = calib::calibrate(&dataset, Method::BeamGls, &Options::default())
+                .expect("the calibration succeeds");
             let (mut sum, mut count) = (0.0, 0);
             for beam in beams {
                 let real = truth
@@ -92,7 +93,7 @@ fn square_errors(scene: &Scene, beams: &[usize]) -> Vec<f64> {
                 sum += 0.5 * (across * across + up * up);
                 count += 1;
             }
-            // Beams at the facet's edges are split, as built, and rightly unsolved.
+            // Beams at the edges of the facet are split, as built, and correctly unsolved.
             assert!(
                 count + 8 >= beams.len(),
                 "seed {seed}: {count} of {}",
@@ -103,7 +104,7 @@ fn square_errors(scene: &Scene, beams: &[usize]) -> Vec<f64> {
         .collect()
 }
 
-/// Beams of the facet that all of some poses serve.
+/// Beams of the facet that are served by all of some poses.
 fn served_by_all(designer: &Designer, situation: &Situation, chosen: &[usize]) -> Vec<usize> {
     let beams = situation.rays(FACET).into_iter().map(|ray| ray.0);
     let all = |beam: &usize| chosen.iter().all(|c| designer.candidate(*c).beams.contains(beam));
@@ -129,7 +130,7 @@ fn mean_of(values: &[f64]) -> (f64, f64) {
     (mean, (variance / n).sqrt())
 }
 
-/// Whether the mean square error is the square of a bound, to three of its own standard errors.
+/// Whether the mean square error equals the square of a bound, to three standard errors.
 #[track_caller]
 fn confirms(errors: &[f64], bound_deg: f64, what: &str) -> f64 {
     let (mean, error) = mean_of(errors);
@@ -140,7 +141,7 @@ fn confirms(errors: &[f64], bound_deg: f64, what: &str) -> f64 {
         mean / expected,
         error / expected
     );
-    // A test that the spread of its sample makes blind is none.
+    // If the sample scatters too much, the test proves nothing.
     assert!(
         error < 0.2 * expected,
         "{what}: too few seeds, {error} of {expected}"
@@ -181,13 +182,13 @@ fn five_planned_poses_are_worth_three_times_five_random_ones() {
         let drawn = designer.len();
         let rays = situation.rays(FACET);
         let middle = rays[rays.len() / 2].0;
-        // The same poses are possible for both: the same ranges, incidences and room.
+        // Both choose from the same possible poses: the same ranges, incidences and room.
         let mut state = 1_u64;
         let mut random: Vec<f64> = (0..200)
             .map(|_| {
                 let design: Vec<usize> = (0..5)
                     .map(|_| {
-                        // Knuth's linear congruences, of which the upper bits are good enough to pick by.
+                        // Knuth's linear congruential generator, whose upper bits are random enough for choosing.
                         state = state
                             .wrapping_mul(6_364_136_223_846_793_005)
                             .wrapping_add(1_442_695_040_888_963_407);
@@ -210,7 +211,7 @@ fn five_planned_poses_are_worth_three_times_five_random_ones() {
     }
 }
 
-/// The scene with boards before the middle beam, 1.3 m out, by tilt and direction in degrees.
+/// The scene with boards in front of the middle beam at 1.3 m, by tilt and its direction in degrees.
 fn with_boards(scene: &Scene, tilts: &[(f64, f64)]) -> Scene {
     let situation = situation(scene).unwrap();
     let rays = situation.rays(FACET);
@@ -247,8 +248,8 @@ fn next(dataset: &Dataset, scene: &Scene, poses: usize) -> Plan {
 }
 
 #[test]
-fn what_a_dataset_gains_is_what_was_predicted() {
-    // Little tilt, and all of it to one half: determined, but badly.
+fn the_gain_of_a_dataset_equals_the_predicted_gain() {
+    // Little tilt, and all of it to one side: determined, but poorly.
     let poor = with_boards(
         &one_facet(),
         &[(25.0, 0.0), (20.0, 70.0), (25.0, 140.0), (15.0, 30.0)],
@@ -272,8 +273,8 @@ fn what_a_dataset_gains_is_what_was_predicted() {
 }
 
 #[test]
-fn a_hinge_is_opened_by_a_pose_across() {
-    // Tilted along the fan, so that the boards are a hinge for all of its beams, not for the middle one alone.
+fn a_hinge_is_resolved_by_a_pose_across_it() {
+    // Tilted along the fan, so that the boards form a hinge for all of its beams, not only for the middle one.
     let scene = one_facet();
     let rays = situation(&scene).unwrap().rays(FACET);
     let (across, up) = catoptric::model::frame::tangent_basis(&rays[rays.len() / 2].2);
@@ -342,7 +343,7 @@ fn the_program_plans_the_same_on_any_number_of_threads() {
     assert_ne!(one, plan("2", "2"));
     let json: serde_json::Value = serde_json::from_str(&one).unwrap();
     assert_eq!(json["facets"][0]["poses"].as_array().unwrap().len(), 3);
-    // The page and the scene are written whole, and the scene is one.
+    // The page and the scene are complete, and the scene is valid.
     let output = at(&[
         "plan",
         "one.toml",
@@ -359,7 +360,7 @@ fn the_program_plans_the_same_on_any_number_of_threads() {
     assert_eq!(page.matches("<svg").count(), 2);
     assert!(page.contains("toward ψ") && !page.contains("http"));
     assert_eq!(at(&["check", "planned.toml"]).status.code(), Some(0));
-    // From its recording, which is then completed.
+    // From its recording, which is then extended.
     let output = at(&["simulate", "planned.toml", "--out", "data"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let output = at(&["plan", "data", "--poses", "1", "--out", "more.toml"]);
@@ -373,7 +374,7 @@ fn the_program_plans_the_same_on_any_number_of_threads() {
 }
 
 #[test]
-fn what_cannot_be_planned_is_said() {
+fn impossible_plans_are_explained() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(
         folder.path().join("one.toml"),
@@ -382,9 +383,9 @@ fn what_cannot_be_planned_is_said() {
     .unwrap();
     for (arguments, words) in [
         (&["--facet", "left-2"][..], "did you mean --facet left-1?"),
-        (&["--range-m", "8,9"], "nearer than the least range"),
+        (&["--range-m", "8,9"], "nearer than the minimum range"),
         (&["--range-m", "2"], "takes two numbers"),
-        (&["--range-m", "2,1"], "at least the least range"),
+        (&["--range-m", "2,1"], "at least the minimum range"),
         (&["--max-incidence-deg", "90"], "between 0 and 90"),
         (&["--poses", "0"], "--poses"),
         (&["--set", "board.0.width_mm=9000"], "reach through a wall"),

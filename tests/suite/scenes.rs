@@ -1,4 +1,4 @@
-//! Scenes for the tests, written out; random ones are those of `catoptric::testing`.
+//! Scenes for the tests as text; random ones are those of `catoptric::testing`.
 
 use catoptric::sim::Scene;
 use catoptric::sim::scene::{Board, BoardPose};
@@ -10,7 +10,7 @@ pub(crate) const PROTOTYPE: &str = include_str!("../../scenes/prototype.toml");
 /// The published layout of the repository.
 pub(crate) const TWO_MIRROR: &str = include_str!("../../scenes/two-mirror.toml");
 
-/// A scene from TOML that is known to be good.
+/// Parses a scene that is known to be valid.
 pub(crate) fn scene(toml: &str) -> Scene {
     toml::from_str(toml).expect("the test's own scene parses")
 }
@@ -45,7 +45,7 @@ dropout = 0
 model = "none"
 "#;
 
-/// Sets up one white board of 1 × 1 m, face-on at a distance before the scanner of [`BARE`].
+/// Adds one white board of 1 × 1 m, face-on at a distance in front of the scanner of [`BARE`].
 pub(crate) fn set_board_ahead(scene: &mut Scene, distance: f64) {
     scene.board.push(Board {
         name: "board".to_owned(),

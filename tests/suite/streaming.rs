@@ -1,19 +1,20 @@
-//! Recording as a stream: excerpts are the stretch, nothing depends on threads, memory does not grow with the scans, and a
-//! stopped run leaves nothing; and the structure's part in the beams' ways, compiled, is what tracing all of it finds.
+//! Recording as a stream: excerpts equal the stretch, nothing depends on threads, memory does not grow with the number of
+//! scans, and a stopped run leaves no files; the compiled paths by the structure equal those traced in full.
 //!
-//! Memory is counted in the readings that are on their way, as the program reports them. What the allocator makes of it is
-//! not measured here.
+//! Memory is counted in readings in flight, as reported by the program. The overhead of the allocator is not measured
+//! here.
 
 use crate::common::{catoptric, run, stderr, stdout};
 use crate::scenes::{PROTOTYPE, TWO_MIRROR, scene};
-use catoptric::io::scene::load;
-use catoptric::io::{DatasetWriter, Provenance};
-use catoptric::model::{Excerpt, Pose, beam};
+use catoptric::files::scene::load;
+use catoptric::files::{DatasetWriter, Provenance};
+use catoptric::model::{Excerpt, Pose};
+use catoptric::sim::build::Structure;
 use catoptric::sim::laboratory::Memory;
-use catoptric::sim::optics::{Mirrors, Setting};
+use catoptric::sim::light::{Mirrors, Setting};
 use catoptric::sim::scene::{Correlated, EchoChoice, Interference};
-use catoptric::sim::structure::Structure;
 use catoptric::sim::{Laboratory, Scene};
+use catoptric_fixtures::ust20lx;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use std::time::{Duration, Instant};
@@ -22,7 +23,7 @@ fn file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"))
 }
 
-/// Few scans of the two-mirror layout with every error by chance.
+/// A few scans of the two-mirror layout with all random errors.
 fn noisy() -> Scene {
     let mut scene = scene(TWO_MIRROR);
     scene.scanner.sub_rays = 5;
@@ -88,7 +89,7 @@ fn excerpts_are_the_stretch_whatever_their_length() {
                 joined.echoes.iter_mut().for_each(Vec::clear);
                 joined.tracks.iter_mut().for_each(|t| t.frames.clear());
                 for excerpt in excerpts(&laboratory, number, scans) {
-                    assert_eq!(excerpt.first_scan * beam::COUNT, joined.ranges.len());
+                    assert_eq!(excerpt.first_scan * ust20lx::COUNT, joined.ranges.len());
                     assert_eq!(excerpt.first_seen, whole.first_seen());
                     joined.ranges.extend(excerpt.part.ranges);
                     joined
@@ -100,7 +101,7 @@ fn excerpts_are_the_stretch_whatever_their_length() {
                         track.frames.extend(part.frames);
                     }
                 }
-                // Lost readings are no numbers.
+                // Lost readings are NaN.
                 let bits = |ranges: &[f64]| ranges.iter().map(|r| r.to_bits()).collect::<Vec<_>>();
                 assert_eq!(bits(&joined.ranges), bits(&whole.ranges));
                 assert_eq!(format!("{:?}", joined.echoes), format!("{:?}", whole.echoes));
@@ -111,7 +112,7 @@ fn excerpts_are_the_stretch_whatever_their_length() {
 }
 
 #[test]
-fn a_recording_of_excerpts_is_that_of_the_stretches_byte_by_byte() {
+fn a_recording_of_excerpts_equals_that_of_the_stretches_byte_for_byte() {
     let laboratory = Laboratory::new(&noisy(), 5).unwrap();
     let session = laboratory.session().unwrap();
     let folder = tempfile::tempdir().unwrap();
@@ -187,7 +188,7 @@ fn simulate(folder: &Path, out: &str, scene: &str, more: &[&str]) -> serde_json:
     serde_json::from_str(&stdout(&output)).unwrap()
 }
 
-/// A stretch of many excerpts with correlated noise, a flight, and every table of the truth.
+/// A stretch of many excerpts with correlated noise, a flight, and all tables of the truth.
 #[test]
 fn threads_change_no_file_of_long_stretches_and_flights() {
     let folder = tempfile::tempdir().unwrap();
@@ -222,7 +223,7 @@ fn threads_change_no_file_of_long_stretches_and_flights() {
 }
 
 #[test]
-fn ten_times_the_scans_are_no_more_in_memory() {
+fn ten_times_the_scans_need_no_more_memory() {
     let folder = tempfile::tempdir().unwrap();
     let held = |scans: usize| {
         let scans = format!("experiment.scans_per_pose={scans}");
@@ -239,14 +240,14 @@ fn ten_times_the_scans_are_no_more_in_memory() {
         figures["readings_held"].as_u64().unwrap()
     };
     let few = held(1000);
-    // Four excerpts of 64 scans that are made by two threads, and four that are written meanwhile.
+    // Four excerpts of 64 scans are simulated by two threads while four more are written.
     assert_eq!(few, 8 * 64 * 1081);
     assert_eq!(held(10_000), few);
 }
 
 #[cfg(unix)]
 #[test]
-fn a_run_stopped_within_a_stretch_leaves_nothing() {
+fn a_run_stopped_within_a_stretch_leaves_no_files() {
     let folder = tempfile::tempdir().unwrap();
     let scene = file("static-10000");
     let mut child = catoptric()
@@ -257,7 +258,7 @@ fn a_run_stopped_within_a_stretch_leaves_nothing() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // Until a chunk of the recording is there.
+    // Until a chunk of the recording exists.
     let begin = Instant::now();
     let written = || {
         let staged = std::fs::read_dir(folder.path()).unwrap().flatten();
@@ -277,8 +278,8 @@ fn a_run_stopped_within_a_stretch_leaves_nothing() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
-/// What every beam of a stretch brings home, once over the compiled rig and once traced as a whole.
-fn same_over_the_rig(laboratory: &Laboratory, number: usize) {
+/// Compares what every beam of a stretch returns, with the compiled rig and traced in full.
+fn same_with_the_compiled_rig(laboratory: &Laboratory, number: usize) {
     let sight = laboratory.sight(number).unwrap();
     let returns = sight.returns(0);
     let sensor = laboratory.sensor();
@@ -297,14 +298,14 @@ fn the_compiled_rig_changes_no_bit() {
         scene.scanner.sub_rays = scene.scanner.sub_rays.min(6);
         let laboratory = Laboratory::new(&scene, 3).unwrap();
         for number in [0, 1, laboratory.stretches() - 1] {
-            same_over_the_rig(&laboratory, number);
+            same_with_the_compiled_rig(&laboratory, number);
         }
     }
 }
 
-/// A box of the room that stands between the sensor and a mirror: the compiled ways do not hold, and are not taken.
+/// A box of the room between the sensor and a mirror: the compiled paths do not hold, and are not used.
 #[test]
-fn what_reaches_into_the_structure_is_seen() {
+fn objects_inside_the_structure_are_seen() {
     let mut scene = scene(TWO_MIRROR);
     scene.scanner.sub_rays = 3;
     let intruder = r#"
@@ -323,21 +324,21 @@ position_m = [0, 0.05, 1.76]
         bare.seen_from(&Pose::identity()),
         bare.seen_from(&Pose::translation(1.0, 0.0, 0.0))
     ]));
-    same_over_the_rig(&laboratory, 1);
+    same_with_the_compiled_rig(&laboratory, 1);
     let names = sight.setting().names();
-    let left = beam::nearest(std::f64::consts::FRAC_PI_2).unwrap();
+    let left = ust20lx::nearest(std::f64::consts::FRAC_PI_2).unwrap();
     let ends = sight.sub_ray_ends(0, left);
     let hits_intruder = ends.iter().any(|end| match end.stop {
-        catoptric::sim::reading::Stop::Hit { surface, .. } => names[surface] == "intruder",
+        catoptric::sim::receive::Stop::Hit { surface, .. } => names[surface] == "intruder",
         _ => false,
     });
     assert!(hits_intruder, "{ends:?}");
 }
 
-/// A room that is one mesh is all around the sensor: the compiled ways hold where nothing of it is near, and elsewhere all is
-/// traced as a whole.
+/// A room that is one mesh surrounds the sensor: the compiled paths hold where none of it is near; elsewhere everything
+/// is traced in full.
 #[test]
-fn flights_within_a_mesh_are_those_without_the_compiled_rig() {
+fn flights_within_a_mesh_equal_those_without_the_compiled_rig() {
     let mut scene = load(&file("flight-through-a-duct"), &[]).unwrap();
     let mirrors = self::scene(TWO_MIRROR).superstructure.facet;
     scene.superstructure.facet = mirrors;
@@ -359,9 +360,9 @@ fn flights_within_a_mesh_are_those_without_the_compiled_rig() {
     assert!(!rig.holds_in(&[here, gone]));
     for scan in [0, ends] {
         let returns = sight.returns(scan);
-        for beam in (0..beam::COUNT).step_by(9) {
+        for beam in (0..ust20lx::COUNT).step_by(9) {
             let ends = sight.sub_ray_ends(scan, beam);
-            // The chief ray is the first; its surface is the echo's unless another way is brighter.
+            // The chief ray is the first; its surface is that of the echo unless another path is brighter.
             let way: f64 = ends[0].path;
             if let Some(found) = &returns[beam]
                 && found.share > 0.999

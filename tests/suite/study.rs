@@ -1,10 +1,10 @@
-//! Studies: the same bytes whatever the way there, and verdicts that are right about contestants known to be right or wrong.
+//! Studies: the same bytes however computed, and correct verdicts about contestants known to be right or wrong.
 //!
-//! That the statistics' formulas are right is the business of their unit tests. Programs are those of any Unix.
+//! The formulas of the statistics are covered by their unit tests. The programs exist on any Unix.
 
 use crate::common::{catoptric, run, stderr, stdout};
 use catoptric::calib::{CalibError, Calibrator, Method};
-use catoptric::io::scene as scenes;
+use catoptric::files::scene as scenes;
 use catoptric::model::{Calibration, Dataset};
 use catoptric::study::{Contestant, Study, run as run_one, summarize};
 use rayon::prelude::*;
@@ -94,7 +94,7 @@ fn threads_and_shards_change_no_byte() {
 }
 
 #[test]
-fn an_interrupted_study_goes_on_and_a_finished_one_is_not_done_again() {
+fn an_interrupted_study_resumes_and_a_finished_one_is_not_repeated() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     assert!(study(at, "whole", &["--elements"]).status.success());
@@ -103,7 +103,7 @@ fn an_interrupted_study_goes_on_and_a_finished_one_is_not_done_again() {
         let text = read(&at.join("whole"), file);
         text.split_inclusive('\n').take(1 + rows).collect()
     };
-    // What an interruption leaves: the plan and the first chunk.
+    // What remains after an interruption: the plan and the first chunk.
     let rows = 32 * METHODS;
     let runs = first("runs.csv", rows);
     let last = runs.lines().last().unwrap();
@@ -127,7 +127,7 @@ fn an_interrupted_study_goes_on_and_a_finished_one_is_not_done_again() {
     assert_eq!(results(at, "resumed"), whole);
     assert!(
         read(&resumed, "times.csv").contains(",9876543"),
-        "the chunk was done again"
+        "the chunk was computed again"
     );
     let left: Vec<String> = std::fs::read_dir(&resumed)
         .unwrap()
@@ -141,7 +141,7 @@ fn an_interrupted_study_goes_on_and_a_finished_one_is_not_done_again() {
     assert_eq!(results(at, "resumed"), whole);
     assert_eq!(read(&resumed, "times.csv"), times);
 
-    // A chunk that lacks a run is no chunk.
+    // A chunk that lacks a run is invalid.
     leave(&first("runs.csv", rows - 1));
     let refused = study(at, "resumed", &["--elements"]);
     assert_eq!(refused.status.code(), Some(2));
@@ -160,7 +160,7 @@ fn foreign_folders_and_shards_are_refused() {
     let other = study(at, "a", &["--shard", "2/2"]);
     assert_eq!(other.status.code(), Some(2));
     assert!(
-        stderr(&other).contains("shard 1/2, 2/2 asked for"),
+        stderr(&other).contains("shard 1/2, 2/2 requested"),
         "{}",
         stderr(&other)
     );
@@ -188,7 +188,8 @@ fn foreign_folders_and_shards_are_refused() {
     let foreign = run(at, &["study", "merge", "a", "b", "--out", "m"]);
     assert_eq!(foreign.status.code(), Some(2));
     assert!(
-        stderr(&foreign).contains("another study") && stderr(&foreign).contains("18 seeds, 17 there"),
+        stderr(&foreign).contains("not parts of the same study")
+            && stderr(&foreign).contains("18 seeds, 17 there"),
         "{}",
         stderr(&foreign)
     );
@@ -197,11 +198,11 @@ fn foreign_folders_and_shards_are_refused() {
         (["--methods", "jont"], "jont"),
         (["--axis", "errors.drift_sd_mm"], "--axis"),
         (["--axis", "errors.drift_sd=1,2"], "drift_sd_mm"),
-        (["--axis", "errors.drift_sd_mm=1,2,1"], "1 is there twice"),
+        (["--axis", "errors.drift_sd_mm=1,2,1"], "1 is given twice"),
         (["--axis", "errors.drift_sd_mm=1:2"], "from:to:steps"),
         (
             ["--axis=errors.drift_sd_mm=1,2", "--axis=errors.drift_sd_mm=3"],
-            "is an axis already",
+            "already has an axis",
         ),
         (
             ["--axis=errors.drift_sd_mm=1,2", "--set=errors.drift_sd_mm=3"],
@@ -222,7 +223,7 @@ fn foreign_folders_and_shards_are_refused() {
 }
 
 #[test]
-fn programs_are_contestants_and_their_failures_results() {
+fn programs_are_contestants_and_their_failures_are_results() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let ours = format!(
@@ -255,7 +256,7 @@ fn programs_are_contestants_and_their_failures_results() {
         let known = all.iter().find(|m| m["method"] == name);
         known.unwrap_or_else(|| panic!("{name} is in the table"))
     };
-    // What went through files is what was in memory, as far as the recording's resolution goes.
+    // Data that went through files equal those in memory, up to the resolution of the recording.
     let rms = |name: &str| of(name)["per_axis_rms_deg"].as_f64().unwrap();
     assert_eq!(of("ours")["failed"], 0);
     assert!((rms("ours") / rms("closed-form") - 1.0).abs() < 1e-2, "{found}");
@@ -268,7 +269,7 @@ fn programs_are_contestants_and_their_failures_results() {
         ),
         ("nonsense", "what it wrote cannot be read: {out}:1"),
         ("hanging", "it did not end within 2 s"),
-        // A blind dataset has no truth to look at.
+        // A blind dataset contains no truth.
         ("peeking", "{dataset}/truth/truth.json"),
     ] {
         let failure = of(name)["failure"].as_str().unwrap();
@@ -296,21 +297,21 @@ fn script(folder: &Path, name: &str, text: &str) -> String {
     format!("sh {}", folder.join(name).display())
 }
 
-/// A program that starts another, notes both and waits for it; it fails at once if there is a file `go`.
+/// A program that starts another, records both process IDs and waits; it fails immediately if there is a file `go`.
 fn hanging(folder: &Path) -> String {
     let at = folder.display();
     let text = format!("test -e {at}/go && exit 3\nsleep 300 &\necho $$ $! >> {at}/processes\nwait\n");
     script(folder, "hang.sh", &text)
 }
 
-/// Waits until the processes that a hanging program noted are gone.
+/// Waits until the processes recorded by a hanging program are gone.
 #[cfg(unix)]
 fn all_ended(folder: &Path) -> bool {
     let noted = read(folder, "processes");
     assert!(noted.split_whitespace().count() >= 2, "{noted:?}");
     let is_there = |process: &str| {
         let state = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
-        // Whoever has adopted an ended one need not have asked after it yet.
+        // The parent of a process that has ended may not have waited for it yet.
         let lives = std::process::Command::new("kill")
             .args(["-0", process])
             .stderr(std::process::Stdio::null())
@@ -326,7 +327,7 @@ fn all_ended(folder: &Path) -> bool {
 
 #[cfg(unix)]
 #[test]
-fn what_a_hanging_program_has_started_ends_with_it() {
+fn child_processes_of_a_hanging_program_end_with_it() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let (scene, program) = (scene(), format!("hanging={}", hanging(at)));
@@ -407,7 +408,7 @@ fn ctrl_c_ends_programs_and_keeps_none_of_their_failures() {
         .map(|f| f.unwrap().file_name())
         .collect();
     assert_eq!(left, ["plan.json"]);
-    // What goes on from there is as if nothing had been.
+    // Resuming gives the same result as an uninterrupted study.
     std::fs::write(at.join("go"), "").unwrap();
     for out in ["s", "t"] {
         let done = catoptric().args(arguments(out)).current_dir(at).output().unwrap();
@@ -422,7 +423,7 @@ fn ctrl_c_ends_programs_and_keeps_none_of_their_failures() {
 fn a_program_that_states_a_hundredth_of_its_covariance_is_over_confident() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    // Both calibrate alike; the second divides every number of every covariance.
+    // Both calibrate identically; the second divides every number of every covariance.
     let calibrate = format!(
         "{} calibrate --quiet \"$1\" --method beam-gls --out \"$2\" > \"$2.said\" || exit 1\n",
         env!("CARGO_BIN_EXE_catoptric")
@@ -464,7 +465,7 @@ left > 0 && /^ *-?[0-9]/ { end = /,$/ ? "," : ""; sub(/,$/, ""); printf "%.17g%s
     assert!(bold["coverage_95_interval"][1].as_f64().unwrap() < 0.95);
 }
 
-/// One of our methods that states its standard deviations so many times as large as they are.
+/// One of our methods with its stated standard deviations multiplied by a factor.
 struct Stating {
     name: &'static str,
     times: f64,
@@ -486,7 +487,7 @@ impl Calibrator for Stating {
 }
 
 #[test]
-fn confidence_that_is_not_earned_is_called_so() {
+fn unjustified_confidence_is_reported() {
     let sets = ["experiment.scans_per_pose=10".to_owned()];
     let reference = scenes::load(scene().as_ref(), &sets).unwrap();
     let stating = |name, times| Contestant::Own(Arc::new(Stating { name, times }));
@@ -521,7 +522,7 @@ fn confidence_that_is_not_earned_is_called_so() {
         (bold.anees / honest.anees - 9.0).abs() < 1e-9
             && (9.0 * timid.anees / honest.anees - 1.0).abs() < 1e-9
     );
-    // 95 % is outside of what the bold one's coverage can be, and inside the honest one's.
+    // 95 % is outside the coverage interval of the over-confident one, and inside that of the honest one.
     let [low, high] = honest.coverage_95_interval;
     assert!((low..high).contains(&0.95), "{low} to {high}");
     assert!(
@@ -530,7 +531,7 @@ fn confidence_that_is_not_earned_is_called_so() {
         bold.coverage_95_interval
     );
     assert_eq!((oracle.verdict.as_str(), oracle.per_axis_rms_deg), ("exact", 0.0));
-    // The room's angles come by way of poses, and back.
+    // The angles in the room are computed via poses, and back.
     assert!(
         oracle.per_axis_rms_room_deg < 1e-9,
         "{}",

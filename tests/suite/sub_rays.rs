@@ -1,19 +1,19 @@
-//! The table of every sub-ray against the table of every return, and against what can be said without either.
+//! The table of every sub-ray compared with the table of every return, and with results independent of both.
 //!
-//! This proves that the energy of a beam is all listed and that the listed light is the light of its echoes. Where that
-//! light goes is proven in `physics` and `traps`.
+//! This proves that the energy of a beam is listed completely and that the listed light is the light of its echoes. The
+//! paths of that light are covered by `physics` and `traps`.
 
 use crate::common::{VALID, folder_with, run, stderr};
 use crate::scenes::{BARE, scene};
-use catoptric::model::beam;
-use catoptric::sim::optics::{Mirrors, Setting};
-use catoptric::sim::reading::{Sensor, Stop, SubRayLight};
+use catoptric::sim::build::Structure;
+use catoptric::sim::light::{Mirrors, Setting};
+use catoptric::sim::receive::{Sensor, Stop, SubRayLight};
 use catoptric::sim::scene::{Facet, FacetShape, RectangleShape};
-use catoptric::sim::structure::Structure;
+use catoptric_fixtures::ust20lx;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The columns, as the guide lists them.
+/// The columns, as listed in the guide.
 const COLUMNS: &str = "pose,scan,beam,sub_ray,wide,narrow,weight,light,facets,end,surface,name,path_m,cos_incidence,\
                        power_w,x_m,y_m,z_m";
 
@@ -60,7 +60,7 @@ fn by_beam(rows: Vec<BTreeMap<String, String>>) -> Beams {
     beams
 }
 
-/// Power of each way and surface: (facets, surface) and name.
+/// Power of each path and surface: (facets, surface) and name.
 fn powers(rows: &[BTreeMap<String, String>]) -> BTreeMap<(String, String), BTreeMap<String, f64>> {
     let mut sums = BTreeMap::<_, BTreeMap<String, f64>>::new();
     for row in rows.iter().filter(|r| r["end"] == "hit") {
@@ -83,7 +83,7 @@ fn the_rows_of_a_beam_are_its_energy_and_its_echoes() {
     assert_eq!(text.lines().next(), Some(COLUMNS));
     let beams = by_beam(table(folder.path(), "sub_rays.csv"));
     let returns = by_beam(table(folder.path(), "returns.csv"));
-    assert_eq!(beams.len() % beam::COUNT, 0);
+    assert_eq!(beams.len() % ust20lx::COUNT, 0);
     for (key, rows) in &beams {
         let numbers: Vec<f64> = rows.iter().map(|r| number(r, "sub_ray")).collect();
         assert!(numbers.iter().copied().eq((0..19).map(f64::from)), "{key:?}");
@@ -96,7 +96,7 @@ fn the_rows_of_a_beam_are_its_energy_and_its_echoes() {
         let rows = &beams[key];
         let sums = powers(rows);
         for echo in found {
-            // Two walls are both a "wall": the echo is one of them.
+            // Two walls are both a "wall": the echo is that of one of them.
             let power = number(echo, "power_w");
             let sums = &sums[&(echo["facets"].clone(), echo["surface"].clone())];
             // Only the order of summation differs.
@@ -119,7 +119,7 @@ fn the_rows_of_a_beam_are_its_energy_and_its_echoes() {
             .iter()
             .filter(|r| r["end"] == "hit" && r["facets"].is_empty())
         {
-            // Without an aperture every sub-ray starts in the sensor's origin.
+            // Without an aperture, every sub-ray starts at the sensor's origin.
             let from_origin = libm::hypot(
                 libm::hypot(number(row, "x_m"), number(row, "y_m")),
                 number(row, "z_m"),
@@ -170,7 +170,7 @@ fn ghosts_and_dust_are_listed_as_such() {
         }
     }
     assert!(echoes_of_mirrors > 10, "{echoes_of_mirrors}");
-    // Threads change nothing.
+    // The number of threads changes nothing.
     let read = || std::fs::read(folder.path().join("set/truth/sub_rays.csv")).unwrap();
     let before = read();
     let threads = [&sets[..], &["experiment.scans_per_pose=1"]].concat();
@@ -191,9 +191,9 @@ fn ghosts_and_dust_are_listed_as_such() {
 }
 
 #[test]
-fn light_that_ends_nowhere_has_no_place() {
+fn light_that_hits_nothing_has_no_position() {
     let mut scene = scene(BARE);
-    // Ahead two mirrors face each other at 45° and only one of them may be met.
+    // Straight ahead, two mirrors face each other at 45°, and only one bounce is allowed.
     scene.superstructure.max_bounces = 1;
     let facet = |name: &str, center_mm: [f64; 3], normal: [f64; 3]| Facet {
         name: name.to_owned(),
@@ -212,14 +212,14 @@ fn light_that_ends_nowhere_has_no_place() {
     let structure = Structure::nominal(&scene).unwrap();
     let setting = Setting::new(&scene, &structure, Mirrors::Attached, Vec::new()).unwrap();
     let sensor = Sensor::new(&scene).unwrap();
-    let ahead = sensor.sub_ray_ends(&setting, beam::FORWARD);
+    let ahead = sensor.sub_ray_ends(&setting, ust20lx::FORWARD);
     assert_eq!(ahead.len(), 19);
     for end in &ahead {
         assert_eq!((&end.stop, end.light), (&Stop::Trapped, SubRayLight::Beam));
         assert_eq!(end.facets, [0]);
         assert!((end.path - 0.08).abs() < 1e-3 && end.path > 0.0);
     }
-    // The chief ray's way to the last mirror it met.
+    // The chief ray's path to the last mirror it hit.
     assert!((ahead[0].path - 0.08).abs() < 1e-15, "{:?}", ahead[0]);
     let behind = sensor.sub_ray_ends(&setting, 0);
     assert!(
@@ -232,7 +232,7 @@ fn light_that_ends_nowhere_has_no_place() {
 }
 
 #[test]
-fn in_flight_every_scan_has_rows_of_its_own() {
+fn in_flight_every_scan_has_its_own_rows() {
     let flight = r#"
 [[flight]]
 name = "ahead"
@@ -257,7 +257,7 @@ waypoint = [
         scans
     };
     let (rays, returns) = (in_flight("sub_rays.csv"), in_flight("returns.csv"));
-    assert_eq!(rays.len(), 2 * beam::COUNT);
+    assert_eq!(rays.len(), 2 * ust20lx::COUNT);
     let mut moved = 0;
     for ((scan, beam), rows) in &rays {
         assert!(scan == "0" || scan == "1", "{scan:?}");
@@ -276,6 +276,6 @@ waypoint = [
         let other = &rays[&("0".to_owned(), beam.clone())];
         moved += usize::from(scan == "1" && other[0]["path_m"] != rows[0]["path_m"]);
     }
-    // Between the scans the rig goes 50 mm: all that is not on the rig itself is elsewhere.
+    // Between the scans the rig moves 50 mm: everything that is not on the rig itself is elsewhere.
     assert!(moved > 900, "{moved}");
 }

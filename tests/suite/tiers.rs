@@ -1,11 +1,11 @@
-//! The tiers ask what their comments say they ask: our methods give the good answers, through the files.
+//! The tiers are as described in their comments: our methods give the expected results, through the files.
 //!
-//! One seed, few scans: this proves that the tiers are what they claim to be and that no method falls for one. It does not
-//! prove how good a method is on average.
+//! One seed, few scans: this proves that the tiers are as described and that no method fails on one. It does not prove
+//! how good a method is on average.
 
 use catoptric::calib::{Calibrator, Method};
-use catoptric::io::scene;
-use catoptric::io::{DatasetWriter, Provenance, read_dataset};
+use catoptric::files::scene;
+use catoptric::files::{DatasetWriter, Provenance, read_dataset};
 use catoptric::sim::{Laboratory, Truth, noise};
 use catoptric::{Score, Verdict, score};
 use std::path::Path;
@@ -43,23 +43,23 @@ const FEW_SCANS: [&str; 3] = [
 fn scored(name: &str, sets: &[&str], method: Method) -> Score {
     let (dataset, truth) = tier(name, sets);
     let calibration = method.calibrate(&dataset).unwrap();
-    score(&dataset, &calibration, Some(&truth))
+    score(&dataset, &calibration, Some(&truth)).expect("in memory")
 }
 
 #[test]
-fn tier_0_comes_back_to_a_millionth_of_a_radian() {
+fn tier_0_is_recovered_to_a_millionth_of_a_radian() {
     for method in [Method::Beam, Method::Joint] {
         let found = scored("t0-noise-free", &[], method);
         assert_eq!(found.verdict, Verdict::Pass, "{:?}", found.warnings);
         assert_eq!(Some(found.beams.solved), found.beams.deflected);
         let worst = found.direction_deg.max.to_radians();
-        // Not exact either: files hold ranges as 32-bit floats.
+        // The errors are not zero either: files store ranges as 32-bit floats.
         assert!(worst < 1e-6 && worst > 1e-12, "{}: {worst:e} rad", method.name());
     }
 }
 
 #[test]
-fn tiers_1_to_4_grow_harder_and_outliers_spoil_no_direction() {
+fn tiers_1_to_4_are_increasingly_hard_and_outliers_spoil_no_direction() {
     let of = |name| scored(name, &FEW_SCANS, Method::Beam);
     let tiers = [
         "t1-noise",
@@ -74,7 +74,7 @@ fn tiers_1_to_4_grow_harder_and_outliers_spoil_no_direction() {
         assert_eq!(found.beams.abstained, 0);
         assert_eq!(found.open.map(|o| o.elements), Some(0));
     }
-    // The bound is what a tier makes possible, whatever a single draw does.
+    // The bound shows what a tier makes possible, independent of a single draw.
     assert!(noise.alone_crlb_per_axis_deg < markers.alone_crlb_per_axis_deg);
     assert!(markers.alone_crlb_per_axis_deg < 0.7 * biases.alone_crlb_per_axis_deg);
     assert_eq!(outliers.verdict, Verdict::Pass, "{:?}", outliers.warnings);
@@ -91,7 +91,7 @@ fn tier_5_is_not_answered_with_a_guess() {
     let (dataset, truth) = tier("t5-degenerate", &FEW_SCANS);
     for method in [Method::Beam, Method::BeamGls, Method::Joint] {
         let calibration = method.calibrate(&dataset).unwrap();
-        let found = score(&dataset, &calibration, Some(&truth));
+        let found = score(&dataset, &calibration, Some(&truth)).expect("in memory");
         let open = found.open.unwrap();
         assert_eq!(
             found.verdict,
@@ -108,10 +108,11 @@ fn tier_5_is_not_answered_with_a_guess() {
                 .filter(|b| b.facet.as_deref() == Some(facet) && b.deflection().is_some())
                 .count()
         };
-        // Their ranges tell the open direction only by how they bend over it, which no covariance states rightly.
+        // Their ranges determine the open direction only by their curvature along it, which no covariance states
+        // correctly.
         assert_eq!((solved_before("hinge"), solved_before("face-on")), (0, 0));
         if method != Method::Joint {
-            assert_eq!(open.solved, 0, "an element by itself cannot know");
+            assert_eq!(open.solved, 0, "a single element cannot know");
         }
         assert!(solved_before("sound") > 50);
     }

@@ -1,16 +1,17 @@
-//! What `tolerance` says of manufacturing errors is what reflection does to them.
+//! The effect of manufacturing errors in `tolerance` equals that of reflection.
 //!
-//! Errors of directions are compared with closed forms, the structures with those that are simulated. These do not prove
-//! that real mirrors are off by what a scene says.
+//! Errors of directions are compared with closed forms, the structures with the simulated ones. These do not prove that
+//! real mirrors have the errors that a scene states.
 
 use crate::common::{run, stderr, stdout};
-use catoptric::io::scene as scenes;
+use catoptric::files::scene as scenes;
 use catoptric::layout::{self, Class, Detail};
 use catoptric::model::beam;
+use catoptric::sim::build::Structure;
 use catoptric::sim::scene::AsBuilt;
-use catoptric::sim::structure::Structure;
 use catoptric::sim::{Laboratory, Scene};
 use catoptric::tolerance::{Bounds, Built, Calibrated, Cause, Workshop, calibrate};
+use catoptric_fixtures::ust20lx;
 use std::path::Path;
 
 fn root(path: &str) -> String {
@@ -30,7 +31,7 @@ const EXACT: AsBuilt = AsBuilt {
     thickness_sd_mm: 0.0,
 };
 
-/// One plane facet of 60 pencil beams; the scanner sits where it is drawn.
+/// One flat facet of 60 pencil beams; the scanner is mounted as drawn.
 fn one_facet(as_built: AsBuilt) -> Scene {
     let mut scene = load("reference-facet.toml", &[]);
     scene.superstructure.as_built = as_built;
@@ -43,7 +44,7 @@ fn built(workshop: &Workshop, seeds: std::ops::RangeInclusive<u64>) -> Vec<Built
 }
 
 #[test]
-fn a_tilt_turns_beams_by_its_closed_form() {
+fn a_tilt_rotates_beams_by_its_closed_form() {
     let sigma = 0.1_f64;
     let scene = one_facet(AsBuilt {
         tilt_sd_deg: sigma,
@@ -52,7 +53,7 @@ fn a_tilt_turns_beams_by_its_closed_form() {
     let m = Structure::nominal(&scene).unwrap().facets[0].face.normal;
     let workshop = Workshop::new(&scene).unwrap();
     let draws = built(&workshop, 1..=4000);
-    // E|δv|² = 4σ²(1 + cos² i), over the elements of the facet; they share its turn, so that structures are the sample.
+    // E|δv|² = 4σ²(1 + cos² i), over the elements of the facet; they share its rotation, so structures are the sample.
     let sigma = sigma.to_radians();
     let ratios: Vec<f64> = draws
         .iter()
@@ -63,7 +64,7 @@ fn a_tilt_turns_beams_by_its_closed_form() {
                 .departures
                 .iter()
                 .map(|d| {
-                    let cos = m.dot(&beam::direction(beam::azimuth(d.beam)));
+                    let cos = m.dot(&beam::direction(ust20lx::azimuth(d.beam)));
                     4.0 * sigma * sigma * (1.0 + cos * cos)
                 })
                 .sum();
@@ -76,7 +77,7 @@ fn a_tilt_turns_beams_by_its_closed_form() {
     // 3.2905 standard errors: one seed in a thousand. They are 6 % of the square, 3 % of the root mean square.
     let limit = 3.2905 * (variance / n).sqrt();
     assert!(limit < 0.07 && (mean - 1.0).abs() < limit, "{mean} ± {limit}");
-    // And the summary is their root mean square.
+    // The summary is their root mean square.
     let found = workshop.summarize(&draws);
     let all = || draws.iter().flat_map(|d| &d.whole.departures);
     let square: f64 = all().map(|d| d.direction.to_degrees().powi(2)).sum();
@@ -89,7 +90,7 @@ fn a_tilt_turns_beams_by_its_closed_form() {
 }
 
 #[test]
-fn every_element_is_off_by_what_its_facet_s_normal_is() {
+fn every_element_has_the_error_of_its_facet_s_normal() {
     let scene = one_facet(AsBuilt {
         tilt_sd_deg: 1.0,
         shift_sd_mm: 0.5,
@@ -103,7 +104,7 @@ fn every_element_is_off_by_what_its_facet_s_normal_is() {
             .normal;
         assert!(draw.whole.departures.len() > 50);
         for departure in &draw.whole.departures {
-            let u = beam::direction(beam::azimuth(departure.beam)).into_inner();
+            let u = beam::direction(ust20lx::azimuth(departure.beam)).into_inner();
             let reflected = |m: &nalgebra::Vector3<f64>| u - m * (2.0 * m.dot(&u));
             let (from, to) = (reflected(&drawn), reflected(&normal));
             let angle = from.cross(&to).norm().atan2(from.dot(&to));
@@ -116,7 +117,7 @@ fn every_element_is_off_by_what_its_facet_s_normal_is() {
 }
 
 #[test]
-fn a_thicker_mirror_moves_points_by_twice_as_much_and_turns_nothing() {
+fn a_thicker_mirror_moves_points_by_twice_as_much_and_rotates_nothing() {
     let scene = one_facet(AsBuilt {
         thickness_sd_mm: 0.1,
         ..EXACT
@@ -130,7 +131,7 @@ fn a_thicker_mirror_moves_points_by_twice_as_much_and_turns_nothing() {
     for draw in built(&workshop, 1..=200) {
         let structure = Structure::as_built(&scene, draw.whole.seed).unwrap();
         let facet = &structure.facets[0];
-        // The bare structure stays; the face is as far before it as the mirror is thick.
+        // The bare structure stays; the face is in front of it by the thickness of the mirror.
         assert_eq!(facet.backing.corners, drawn.backing.corners);
         let ahead = facet
             .face
@@ -156,8 +157,8 @@ fn a_thicker_mirror_moves_points_by_twice_as_much_and_turns_nothing() {
 }
 
 #[test]
-fn the_experimenter_adds_the_thickness_that_is_written_on_the_mirror() {
-    // Step 3 measures the bare structure, which is where it was; the mirror's face is not where it is said to be.
+fn the_experimenter_adds_the_nominal_thickness_of_the_mirror() {
+    // Step 3 measures the bare structure, whose pose is correct; the face of the mirror is not at its nominal pose.
     let scene = |thickness_sd_mm| {
         let mut scene = one_facet(AsBuilt {
             thickness_sd_mm,
@@ -180,13 +181,13 @@ fn the_experimenter_adds_the_thickness_that_is_written_on_the_mirror() {
     {
         assert!((a - b).abs() < 1e-12, "{a} {b}");
     }
-    // He knows that mirrors differ.
+    // The session believes that mirror thicknesses vary.
     assert!(other.bare_structure.distance_sd_mm >= 0.3);
     assert!(exact.bare_structure.distance_sd_mm < other.bare_structure.distance_sd_mm);
 }
 
 #[test]
-fn structures_are_those_that_are_simulated() {
+fn structures_equal_the_simulated_ones() {
     for name in ["prototype.toml", "gallery/pyramid.toml", "gallery/altimeter.toml"] {
         let scene = load(name, &[]);
         let workshop = Workshop::new(&scene).unwrap();
@@ -210,7 +211,9 @@ fn structures_are_those_that_are_simulated() {
                 beam::spherical(azimuth, elevation)
             };
             for departure in &draw.whole.departures {
-                let exit = truth.beams[departure.beam].exit_direction().unwrap();
+                let exit = truth.beams[departure.beam]
+                    .exit_direction(ust20lx::azimuth(departure.beam))
+                    .unwrap();
                 let angle = beam::angle_between(&drawn_exit(departure.beam), &exit);
                 assert!(
                     (departure.direction - angle).abs() < 1e-9,
@@ -229,7 +232,7 @@ fn structures_are_those_that_are_simulated() {
 }
 
 #[test]
-fn nothing_is_off_in_a_structure_that_is_built_as_drawn() {
+fn a_structure_built_as_drawn_has_no_errors() {
     let workshop = Workshop::new(&one_facet(EXACT)).unwrap();
     let found = workshop.summarize(&built(&workshop, 1..=2));
     assert_eq!(found.direction_deg.max, Some(0.0));
@@ -238,14 +241,14 @@ fn nothing_is_off_in_a_structure_that_is_built_as_drawn() {
 }
 
 #[test]
-fn what_calibrations_leave_is_what_a_study_finds() {
+fn the_errors_left_by_calibrations_are_those_that_a_study_finds() {
     let scene = load("reference-facet.toml", &[]);
     let runs: Vec<_> = [1, 2, 3].map(|seed| calibrate(&scene, seed).unwrap()).to_vec();
     let found = Calibrated::of(&runs);
     let mean = runs.iter().map(|r| r.square).sum::<f64>() / 3.0;
     assert!((found.per_axis_deg.unwrap().to_radians().powi(2) / mean - 1.0).abs() < 1e-12);
     assert_eq!((found.structures, found.failed), (3, 0));
-    // Each experiment's bound is predicted before anything is recorded: the boards and the structure are the same.
+    // The bound of each experiment is predicted before anything is recorded: boards and structure are the same.
     let predicted: Vec<_> = [1, 2, 3].map(|seed| layout::predict(&scene, seed)).to_vec();
     let bounds = Bounds::of(&predicted);
     let ratio = bounds.per_axis_deg.unwrap() / found.bound_per_axis_deg.unwrap();
@@ -291,7 +294,7 @@ fn the_verb_judges_and_writes_the_same_on_any_number_of_threads() {
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!((&json["schema_version"], &json["draws"]), (&1.into(), &20.into()));
     assert_eq!(json["calibrated"]["structures"], 1);
-    // Calibration is what it is for.
+    // Calibration reduces the errors.
     let left = json["calibrated"]["direction_rms_deg"].as_f64().unwrap();
     assert!(left < 0.1 * json["direction_deg"]["rms"].as_f64().unwrap());
 }
@@ -343,8 +346,8 @@ fn requirements_decide_the_exit_code() {
             "did you mean facets.*.direction_deg.rms?",
         ),
         ("wings<1", "every number of --json has a name"),
-        ("bound.per_axis_deg<1", "is no figure"),
-        ("direction_deg.p95", "is no requirement"),
+        ("bound.per_axis_deg<1", "is not a figure"),
+        ("direction_deg.p95", "is not a requirement"),
     ] {
         let (code, said) = with(requirement, &[]);
         assert_eq!(code, Some(2), "{requirement}: {said}");

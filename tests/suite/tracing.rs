@@ -1,17 +1,17 @@
 //! `trace`: chains of mirrors in any attitude, glass, two-sided mirrors, meshes, and its files.
 //!
-//! Proven is where light goes and what is left of it; what a detector makes of it is proven elsewhere.
+//! Proven are the paths of light and its remaining power; the readings of detectors are covered elsewhere.
 
 use crate::common::{catoptric, run, stderr, stdout};
-use crate::traps::{file, forward, path, ray, trap, way};
-use catoptric::io::{mesh, npy, scene};
-use catoptric::model::beam;
-use catoptric::sim::footprint::Ray;
+use crate::traps::{file, forward, path, ray, traced_path, trap};
+use catoptric::cast::Ray;
+use catoptric::files::{mesh, npy, scene};
+use catoptric::sim::light::Role;
 use catoptric::sim::noise::{Draws, Purpose};
-use catoptric::sim::optics::Role;
 use catoptric::sim::scene::{Glass, PlanePolygon, PlaneRectangle, PlaneShape, RoomMirror};
 use catoptric::sim::trace::Fate;
 use catoptric::sim::{Laboratory, Scene};
+use catoptric_fixtures::ust20lx;
 use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
 fn mirror(name: &str, corners: &[Point3<f64>]) -> RoomMirror {
@@ -30,7 +30,7 @@ fn mirror(name: &str, corners: &[Point3<f64>]) -> RoomMirror {
     }
 }
 
-/// A chain of tilted rectangles from a polyline: each mirror stands at a knee and faces half-way between the two legs.
+/// A chain of tilted rectangles along a polyline: each mirror is at a knee and bisects the two legs.
 fn chain(knees: &[Point3<f64>], draws: &mut Draws) -> Vec<Vec<Point3<f64>>> {
     knees
         .windows(3)
@@ -43,7 +43,7 @@ fn chain(knees: &[Point3<f64>], draws: &mut Draws) -> Vec<Vec<Point3<f64>>> {
         .collect()
 }
 
-/// The images of a point behind mirrors in turn, each a 3 × 3 reflection about a plane: no ray is followed.
+/// The image of a point behind successive mirrors, each a 3 × 3 reflection in a plane: no ray is followed.
 fn unfolded(corners: &[Vec<Point3<f64>>], end: &Point3<f64>) -> Point3<f64> {
     corners.iter().rev().fold(*end, |p, c| {
         let n = (c[1] - c[0]).cross(&(c[2] - c[0])).normalize();
@@ -56,7 +56,7 @@ fn unfolded(corners: &[Vec<Point3<f64>>], end: &Point3<f64>) -> Point3<f64> {
 fn chains_of_tilted_mirrors_agree_with_their_images() {
     let mut draws = Draws::new(23, Purpose::Placement, 0);
     for length in 4..=9 {
-        // A zigzag with random knees: the legs are a metre or so and do not cross the other mirrors.
+        // A zigzag with random knees: the legs are about one meter long and do not cross the other mirrors.
         let knees: Vec<Point3<f64>> = (0..length + 2)
             .map(|i| {
                 let side = if i % 2 == 0 { -0.5 } else { 0.5 };
@@ -77,11 +77,11 @@ fn chains_of_tilted_mirrors_agree_with_their_images() {
                 origin: knees[0],
                 direction: Unit::new_normalize(aim - knees[0]),
             };
-            let (vertices, met, fate) = way(&scene, &start);
+            let (vertices, met, fate) = traced_path(&scene, &start);
             assert_eq!(fate, Fate::Escaped);
             assert_eq!(met, (0..length).map(|i| format!("m{i}")).collect::<Vec<_>>());
             for (i, vertex) in vertices.iter().enumerate() {
-                // In unfolded space the path is the straight line from its origin to the vertex's image.
+                // In unfolded space, the path is the straight line from its origin to the image of the vertex.
                 let image = unfolded(&corners[..i], &vertex.point);
                 let straight = image - start.origin;
                 assert!((vertex.path - straight.norm()).abs() < 1e-12);
@@ -118,8 +118,8 @@ fn sin_cos(angle: f64) -> [f64; 2] {
 
 #[test]
 fn chains_of_rectangles_turned_by_yaw_pitch_and_roll_agree_with_matrices() {
-    // The corners of a mirror 0.2 m wide, metres from the origin, fix its normal to 1e-14 or so; seven of them, met at up to
-    // 60°, take that to some 1e-13 m.
+    // The corners of a mirror 0.2 m wide, meters from the origin, determine its normal to about 1e-14; seven mirrors
+    // hit at up to 60° increase that to about 1e-13 m.
     let mut draws = Draws::new(29, Purpose::Placement, 0);
     let mut compared = 0;
     for round in 0..300 {
@@ -129,7 +129,7 @@ fn chains_of_rectangles_turned_by_yaw_pitch_and_roll_agree_with_matrices() {
         scene.room.mirror.clear();
         let origin = draws.normal3();
         let first = draws.normal3().normalize();
-        // The chain as it should be: points, directions after them, and paths.
+        // The expected chain: points, outgoing directions, and path lengths.
         let (mut at, mut along, mut total) = (origin, first, 0.0);
         let mut expected = Vec::new();
         while scene.room.mirror.len() < length {
@@ -144,7 +144,7 @@ fn chains_of_rectangles_turned_by_yaw_pitch_and_roll_agree_with_matrices() {
             at += along * leg;
             total += leg;
             along -= normal_in_room * (2.0 * normal_in_room.dot(&along));
-            // The ray meets the rectangle beside its center.
+            // The ray hits the rectangle off its center.
             let center = draws.normal3();
             let beside = normal.cross(&draws.normal3()).normalize() * 0.05;
             scene.room.mirror.push(RoomMirror {
@@ -162,9 +162,9 @@ fn chains_of_rectangles_turned_by_yaw_pitch_and_roll_agree_with_matrices() {
             });
             expected.push((at, along, total));
         }
-        let (vertices, met, fate) = way(&scene, &ray(origin.into(), first.into()));
+        let (vertices, met, fate) = traced_path(&scene, &ray(origin.into(), first.into()));
         if met.iter().enumerate().any(|(i, name)| *name != format!("m{i}")) || met.len() < length {
-            // Another mirror of the chain stands in the way.
+            // Another mirror of the chain is in between.
             continue;
         }
         compared += 1;
@@ -181,17 +181,18 @@ fn chains_of_rectangles_turned_by_yaw_pitch_and_roll_agree_with_matrices() {
     assert!(compared > 200, "{compared} of 300 chains");
 }
 
-/// The way through a plate of glass by Snell's law in angles: where it leaves along the plate, and the optical path.
+/// The path through a glass plate by Snell's law in angles: the offset along the plate where it leaves, and its optical
+/// length.
 fn plate(angle: f64, index: f64, thickness: f64) -> (f64, f64) {
     let inside = libm::asin(libm::sin(angle) / index);
-    // Down at the angle inside, and up again after the silver.
+    // Down at the angle inside, and up again after the silvering.
     let down = thickness * libm::tan(inside);
     let leg = libm::hypot(down, thickness);
     (2.0 * down, 2.0 * index * leg)
 }
 
 #[test]
-fn a_glass_mirror_lengthens_and_shifts_and_does_not_turn() {
+fn a_glass_mirror_lengthens_and_shifts_but_does_not_rotate() {
     let mut scene = trap("mirror-and-wall");
     for (thickness_mm, longer_mm, walk_mm) in [(1.0, 3.4, 1.1), (2.0, 6.8, 2.1), (3.0, 10.3, 3.2)] {
         scene.room.mirror[0].glass = Some(Glass {
@@ -199,17 +200,17 @@ fn a_glass_mirror_lengthens_and_shifts_and_does_not_turn() {
             thickness_mm,
             ghost: false,
         });
-        let (vertices, met, _) = way(&scene, &ray([0.0; 3], [1.0, 0.0, 0.0]));
+        let (vertices, met, _) = traced_path(&scene, &ray([0.0; 3], [1.0, 0.0, 0.0]));
         assert_eq!(met, ["fold", "fold", "fold", "wall"]);
         let (walk, longer) = plate(std::f64::consts::FRAC_PI_4, 1.51, thickness_mm * 1e-3);
         assert!(((vertices[2].point - vertices[0].point).norm() - walk).abs() < 1e-15);
-        // The light leaves farther along the mirror, which is nearer to the wall by walk/√2.
+        // The light leaves farther along the mirror, which is closer to the wall by walk/√2.
         let expected = 3.75 + longer - walk * 0.5_f64.sqrt();
         assert!((path(&vertices) - expected).abs() < 1e-12);
         assert!((longer * 1e3 - longer_mm).abs() < 0.05 && (walk * 1e3 - walk_mm).abs() < 0.05);
         let out = vertices[2].direction.unwrap();
         assert!((out.into_inner() - Vector3::y()).norm() < 1e-15);
-        // Snell at both passages of the front, with the direction in the glass that the vertices give.
+        // Snell's law at both passages of the front, with the direction in the glass from the vertices.
         let normal = Vector3::new(-1.0, 1.0, 0.0).normalize();
         for (direction, sign) in [(vertices[0].direction, -1.0), (vertices[1].direction, 1.0)] {
             let cos = sign * normal.dot(&direction.unwrap());
@@ -234,17 +235,18 @@ fn a_ghost_and_dust_take_their_energy_from_the_beam() {
     let alone = forward(&scene);
     scene.superstructure.mirror.glass = glass(true);
     let found = forward(&scene);
-    // Fresnel at 45°, written out for the two polarisations: sin² and tan² of the angles' difference over their sum.
+    // Fresnel's equations at 45°, for the two polarizations: sin² and tan² of the difference of the angles over their
+    // sum.
     let (a, b) = (std::f64::consts::FRAC_PI_4, libm::asin(0.5_f64.sqrt() / 1.51));
     let square = |x: f64| x * x;
     let front =
         0.5 * (square(libm::sin(a - b) / libm::sin(a + b)) + square(libm::tan(a - b) / libm::tan(a + b)));
-    // One part: both ways end on the ceiling by the same facet.
+    // A single return: both paths end on the ceiling via the same facet.
     assert!((found.share - (square(1.0 - front) + front)).abs() < 1e-12 && found.share < 1.0);
     let (walk, longer) = plate(a, 1.51, 3e-3);
     let far = alone.geometric;
     assert!((far - (3.0 + longer - walk * 0.5_f64.sqrt())).abs() < 1e-12);
-    // The mirror's reflectivity is 0.9; the ghost has none of it, and no glass in its way of 3 m.
+    // The mirror's reflectivity is 0.9; the ghost loses nothing to it, and its path of 3 m has no glass.
     let ghost = alone.power * square(front / 0.9) * square(far / 3.0);
     let expected = alone.power * square(square(1.0 - front)) + ghost;
     assert!((found.power / expected - 1.0).abs() < 1e-12);
@@ -260,29 +262,29 @@ fn a_ghost_and_dust_take_their_energy_from_the_beam() {
 }
 
 #[test]
-fn two_sided_mirrors_reflect_with_their_backs_at_their_thickness() {
+fn two_sided_mirrors_reflect_with_their_backs_too_at_their_thickness() {
     let mut scene = trap("facet-edge");
     let back = ray([2.5, 0.02, 0.0], [-1.0, 0.0, 0.0]);
-    let (vertices, met, _) = way(&scene, &back);
+    let (vertices, met, _) = traced_path(&scene, &back);
     assert_eq!((met, path(&vertices)), (vec!["plate".to_owned()], 1.5));
     assert_eq!(vertices[0].direction, None, "an opaque back");
     for thickness_mm in [0.0, 4.0] {
         scene.room.mirror[0].two_sided = true;
         scene.room.mirror[0].thickness_mm = thickness_mm;
-        let (vertices, met, _) = way(&scene, &back);
+        let (vertices, met, _) = traced_path(&scene, &back);
         assert_eq!(met, ["plate", "ahead"]);
         let to_back = 1.5 - thickness_mm * 1e-3;
         assert!((path(&vertices) - (to_back + to_back + 0.5)).abs() < 1e-14);
-        let (_, met, _) = way(&scene, &ray([0.0; 3], [1.0, 0.0, 0.0]));
+        let (_, met, _) = traced_path(&scene, &ray([0.0; 3], [1.0, 0.0, 0.0]));
         assert_eq!(met, ["plate", "behind"]);
     }
     // The rim of the body is opaque.
-    let (vertices, met, _) = way(&scene, &ray([1.002, 1.0, 0.0], [0.0, -1.0, 0.0]));
+    let (vertices, met, _) = traced_path(&scene, &ray([1.002, 1.0, 0.0], [0.0, -1.0, 0.0]));
     assert_eq!((met, vertices[0].direction), (vec!["plate".to_owned()], None));
     assert!((path(&vertices) - 0.9).abs() < 1e-14);
 }
 
-/// A cube of the given edge around the origin as STL text.
+/// A cube with a given edge around the origin as STL text.
 fn cube_stl(edge: f64) -> String {
     let h = 0.5 * edge;
     let mut text = "solid cube\n".to_owned();
@@ -309,7 +311,7 @@ fn cube_stl(edge: f64) -> String {
 }
 
 #[test]
-fn a_mesh_is_read_beside_its_scene_and_kept_with_the_truth() {
+fn a_mesh_is_read_next_to_its_scene_and_kept_with_the_truth() {
     let folder = tempfile::tempdir().unwrap();
     let text = std::fs::read_to_string(file("label")).unwrap();
     let text = format!(
@@ -340,7 +342,7 @@ fn a_mesh_is_read_beside_its_scene_and_kept_with_the_truth() {
     std::fs::write(&cube, cube_stl(100.0)).unwrap();
     let output = run(folder.path(), &["simulate", "scene.toml", "--out", "a"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    // The dataset makes itself again without the file.
+    // The dataset can be recreated without the file.
     std::fs::remove_file(&cube).unwrap();
     let output = run(folder.path(), &["simulate", "a/truth/scene.toml", "--out", "b"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
@@ -348,11 +350,11 @@ fn a_mesh_is_read_beside_its_scene_and_kept_with_the_truth() {
         let read = |dataset: &str| std::fs::read(folder.path().join(dataset).join(name)).unwrap();
         assert!(read("a") == read("b"), "{name}");
     }
-    // The beam at 45° meets the cube's edge, 0.25·√2 m away; the one at 135° the rod's side.
+    // The beam at 45° hits the edge of the cube, 0.25·√2 m away; the one at 135° the side of the rod.
     let kept = scene::load(&folder.path().join("b/truth/scene.toml"), &[]).unwrap();
     let returns = Laboratory::new(&kept, 1).unwrap().returns(1).unwrap();
     let at = |degrees: f64| {
-        returns[beam::nearest(degrees.to_radians()).unwrap()]
+        returns[ust20lx::nearest(degrees.to_radians()).unwrap()]
             .as_ref()
             .unwrap()
             .range()
@@ -366,7 +368,7 @@ fn a_mesh_is_read_beside_its_scene_and_kept_with_the_truth() {
 }
 
 #[test]
-fn trace_reads_and_writes_both_formats_alike() {
+fn trace_reads_and_writes_both_formats_identically() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let scene = file("mirror-and-wall");
@@ -433,7 +435,7 @@ fn trace_reads_and_writes_both_formats_alike() {
 }
 
 #[test]
-fn rays_that_are_none_are_refused_with_their_place() {
+fn invalid_rays_are_refused_with_their_location() {
     let folder = tempfile::tempdir().unwrap();
     let scene = file("mirror-and-wall");
     let refuse = |name: &str, bytes: &[u8], what: &str| {
@@ -523,7 +525,7 @@ fn a_scene_without_a_laboratory_is_traced_and_not_recorded() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn trace_meets_full_disks_and_closed_pipes() {
+fn trace_reports_full_disks_and_closed_pipes() {
     let folder = tempfile::tempdir().unwrap();
     let row = "0,0,0,1,0,0\n".repeat(20_000);
     std::fs::write(
@@ -558,7 +560,7 @@ fn trace_meets_full_disks_and_closed_pipes() {
 }
 
 #[test]
-fn a_mesh_that_was_read_is_written_without_loss() {
+fn a_mesh_round_trips_without_loss() {
     let cube = mesh::parse_mesh(cube_stl(0.3).as_bytes(), "cube.stl").unwrap();
     assert_eq!((cube.vertices().len(), cube.triangles().len()), (8, 12));
     assert_eq!(mesh::parse_mesh(&mesh::to_ply(&cube), "cube.ply").unwrap(), cube);

@@ -1,18 +1,21 @@
-//! The hard scenes of `scenes/traps/`: each file says in its first comment what it must give, and gives it here.
+//! The hard scenes of `scenes/traps/`: each file states the expected result in its first comment, and is tested for it
+//! here.
 //!
-//! Proven is that none of these mistakes is made in its own scene; that they are made nowhere is for the properties and
-//! the physics to prove.
+//! Proven is that none of these mistakes is made in its own scene; that they are made nowhere else is covered by the
+//! properties and the physics.
 
 use crate::common::{run, stderr};
-use catoptric::io::scene;
+use catoptric::cast::Ray;
+use catoptric::files::scene;
 use catoptric::model::beam;
-use catoptric::sim::footprint::{Ray, SubRay, sub_rays};
-use catoptric::sim::optics::Role;
-use catoptric::sim::reading::{Return, Stop};
+use catoptric::sim::light::Role;
+use catoptric::sim::light::footprint::{SubRay, sub_rays};
+use catoptric::sim::receive::{Return, Stop};
 use catoptric::sim::scene::{BeamShape, Limits, Preset};
 use catoptric::sim::trace::{Fate, Scenery, Vertex};
 use catoptric::sim::truth::BeamClass;
 use catoptric::sim::{Laboratory, Scene};
+use catoptric_fixtures::ust20lx;
 use nalgebra::{Point3, Unit, Vector3};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -32,8 +35,8 @@ pub(crate) fn ray(origin: [f64; 3], direction: [f64; 3]) -> Ray {
     }
 }
 
-/// The way of a ray, the names of what it meets, and how it ends.
-pub(crate) fn way(scene: &Scene, ray: &Ray) -> (Vec<Vertex>, Vec<String>, Fate) {
+/// The path of a ray, the names of what it hits, and how it ends.
+pub(crate) fn traced_path(scene: &Scene, ray: &Ray) -> (Vec<Vertex>, Vec<String>, Fate) {
     let scenery = Scenery::new(scene).unwrap();
     let tracer = scenery.tracer(1000).unwrap();
     let mut vertices = Vec::new();
@@ -50,11 +53,11 @@ pub(crate) fn path(vertices: &[Vertex]) -> f64 {
 pub(crate) fn forward(scene: &Scene) -> Return {
     // The second stretch is the empty room.
     let returns = Laboratory::new(scene, 1).unwrap().returns(1).unwrap();
-    returns[beam::FORWARD].clone().expect("it is bright")
+    returns[ust20lx::FORWARD].clone().expect("it is bright")
 }
 
 #[test]
-fn every_trap_says_what_it_shows_and_is_a_valid_scene() {
+fn every_trap_states_what_it_shows_and_is_a_valid_scene() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/traps");
     let mut count = 0;
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -73,7 +76,7 @@ fn every_trap_says_what_it_shows_and_is_a_valid_scene() {
 
 #[test]
 fn mirror_and_wall() {
-    let (vertices, met, fate) = way(&trap("mirror-and-wall"), &ray([0.0; 3], [1.0, 0.0, 0.0]));
+    let (vertices, met, fate) = traced_path(&trap("mirror-and-wall"), &ray([0.0; 3], [1.0, 0.0, 0.0]));
     assert_eq!(
         (met, fate),
         (vec!["fold".to_owned(), "wall".to_owned()], Fate::Hit)
@@ -86,10 +89,10 @@ fn ridge() {
     let scene = trap("ridge");
     let laboratory = Laboratory::new(&scene, 1).unwrap();
     let truth = laboratory.truth().unwrap();
-    assert_eq!(truth.beams[beam::FORWARD].status, BeamClass::Split);
+    assert_eq!(truth.beams[ust20lx::FORWARD].status, BeamClass::Split);
     let found = forward(&scene);
     assert_eq!(found.role, Role::Wall);
-    // Rays that meet the ridge itself may go either way.
+    // Rays that hit the ridge itself may be reflected to either side.
     let on_ridge = |r: &&SubRay| r.wide.abs() < 1e-9;
     let undecided: f64 = sub_rays(256).iter().filter(on_ridge).map(|r| r.weight).sum();
     assert!(
@@ -98,7 +101,7 @@ fn ridge() {
     );
     for y in [-0.04, -1e-9, 1e-9, 0.03] {
         // In the room the rig is 2 m up.
-        let (vertices, met, _) = way(&scene, &ray([0.0, y, 2.0], [1.0, 0.0, 0.0]));
+        let (vertices, met, _) = traced_path(&scene, &ray([0.0, y, 2.0], [1.0, 0.0, 0.0]));
         let expected = if y > 0.0 {
             ["left", "+y wall"]
         } else {
@@ -118,7 +121,7 @@ fn facet_edge() {
         (-0.1 + 1e-9, "behind", 3.0),
         (-0.1 - 1e-9, "ahead", 3.0),
     ] {
-        let (vertices, met, _) = way(&scene, &ray([0.0, y, 0.0], [1.0, 0.0, 0.0]));
+        let (vertices, met, _) = traced_path(&scene, &ray([0.0, y, 0.0], [1.0, 0.0, 0.0]));
         assert_eq!(met.last().unwrap(), end);
         assert!((path(&vertices) - length).abs() < 1e-15);
     }
@@ -131,7 +134,7 @@ fn nearest_first() {
     for order in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
         let listed = trap("nearest-first").room.mirror;
         scene.room.mirror = order.map(|i: usize| listed[i].clone()).to_vec();
-        let (vertices, met, _) = way(&scene, &ahead);
+        let (vertices, met, _) = traced_path(&scene, &ahead);
         assert_eq!(met, ["first", "left"]);
         assert!((path(&vertices) - 2.0).abs() < 1e-15);
     }
@@ -139,7 +142,8 @@ fn nearest_first() {
 
 #[test]
 fn no_offset() {
-    let (vertices, met, fate) = way(&trap("no-offset"), &ray([-0.0005, -0.0005, 0.0], [1.0, 1.0, 0.0]));
+    let (vertices, met, fate) =
+        traced_path(&trap("no-offset"), &ray([-0.0005, -0.0005, 0.0], [1.0, 1.0, 0.0]));
     assert_eq!((met.len(), fate), (201, Fate::Hit));
     assert!(met[..200].chunks(2).all(|pair| pair == ["upper", "lower"]));
     assert_eq!(met[200], "wall");
@@ -155,12 +159,12 @@ fn label() {
         (Role::Wall, [0].as_slice())
     );
     assert!((found.range() - 3.0).abs() < 1e-12, "{found:?}");
-    // The mirror stands at 45° and turns the light straight up.
+    // The mirror is at 45° and deflects the light straight up.
     let [on_mirror] = found.facet_cos_incidence[..] else {
         panic!("{found:?}")
     };
     assert!((on_mirror - 0.5_f64.sqrt()).abs() < 1e-12, "{on_mirror}");
-    let (_, met, _) = way(&scene, &ray([0.0, 0.0, 2.0], [1.0, 0.0, 0.0]));
+    let (_, met, _) = traced_path(&scene, &ray([0.0, 0.0, 2.0], [1.0, 0.0, 0.0]));
     assert_eq!(met, ["lift", "ceiling"]);
 }
 
@@ -183,11 +187,11 @@ fn board_edge() {
 #[test]
 fn grazing() {
     let scene = trap("grazing");
-    let (vertices, met, _) = way(&scene, &ray([0.0, 0.0, 0.00005], [1.0, 0.0, -0.0001]));
+    let (vertices, met, _) = traced_path(&scene, &ray([0.0, 0.0, 0.00005], [1.0, 0.0, -0.0001]));
     assert_eq!(met, ["floor", "wall"]);
     assert!((vertices[1].point.z - 0.00015).abs() < 1e-15);
     assert!((path(&vertices) - 2.0 * (1.0 + 1e-8_f64).sqrt()).abs() < 1e-12);
-    let (_, met, _) = way(&scene, &ray([0.0, 0.0, 1e-9], [1.0, 0.0, 1e-9]));
+    let (_, met, _) = traced_path(&scene, &ray([0.0, 0.0, 1e-9], [1.0, 0.0, 1e-9]));
     assert_eq!(met, ["wall"]);
 }
 
@@ -200,7 +204,7 @@ const ROOM: usize = 1;
 #[test]
 fn tied_distances() {
     let laboratory = laboratory("tied-distances");
-    let ends = laboratory.sight(ROOM).unwrap().sub_ray_ends(0, beam::FORWARD);
+    let ends = laboratory.sight(ROOM).unwrap().sub_ray_ends(0, ust20lx::FORWARD);
     assert_eq!(ends.len(), 256);
     let distances: BTreeSet<u64> = ends.iter().map(|e| e.path.to_bits()).collect();
     assert!(
@@ -209,7 +213,8 @@ fn tied_distances() {
         distances.len()
     );
     assert!(ends.iter().all(|e| matches!(e.stop, Stop::Hit { .. })));
-    // Eq. 1 with τ_o = 0.9, D_R = 20 mm, ρ_t = 0.9, P_t = 10 W, θ_R = π; face on the cosine is 5 m over the path.
+    // Eq. (1) with τ_o = 0.9, D_R = 20 mm, ρ_t = 0.9, P_t = 10 W, θ_R = π; face on, the cosine is 5 m over the path
+    // length.
     let term =
         |w: f64, r: f64| 0.9 * 0.02 * 0.02 * 0.9 * 10.0 * w * (5.0 / r) / (r * r * std::f64::consts::PI);
     let expected: f64 = ends.iter().map(|e| term(e.sub_ray.weight, e.path)).sum();
@@ -222,7 +227,7 @@ fn tied_distances() {
 fn full_angle() {
     let found = forward(&trap("full-angle"));
     assert_eq!(found.role, Role::Object);
-    // An edge is decided to 0.3 % with 4096 rays, and there are two.
+    // An edge is located to 0.3 % with 4096 rays, and there are two.
     let expected = libm::erf(std::f64::consts::SQRT_2);
     assert!((found.share - expected).abs() < 0.006, "{}", found.share);
 }
@@ -243,22 +248,22 @@ fn equal_noise() {
     };
     let (first, second) = (noise(ROOM), noise(ROOM + 1));
     let n = first.len();
-    assert_eq!((n, second.len()), (200 * beam::COUNT, 200 * beam::COUNT));
+    assert_eq!((n, second.len()), (200 * ust20lx::COUNT, 200 * ust20lx::COUNT));
     let all: BTreeSet<u64> = first.iter().chain(&second).map(|z| z.to_bits()).collect();
-    assert_eq!(all.len(), 2 * n, "no noise comes twice");
+    assert_eq!(all.len(), 2 * n, "no noise value repeats");
     let correlation = |a: &[f64], b: &[f64]| {
         let sum: f64 = a.iter().zip(b).map(|(x, y)| x * y).sum();
         sum / a.len().min(b.len()) as f64
     };
     // 99.9 % for each; the seed is fixed.
-    let bound = 3.2905 / ((n - beam::COUNT) as f64).sqrt();
+    let bound = 3.2905 / ((n - ust20lx::COUNT) as f64).sqrt();
     assert!((correlation(&first, &first) - 1.0).abs() < bound * 2.0_f64.sqrt());
     assert!(
         correlation(&first, &first[1..]).abs() < bound,
         "neighboring beams"
     );
     assert!(
-        correlation(&first, &first[beam::COUNT..]).abs() < bound,
+        correlation(&first, &first[ust20lx::COUNT..]).abs() < bound,
         "successive scans"
     );
     assert!(correlation(&first, &second).abs() < bound, "stretches");
@@ -267,13 +272,14 @@ fn equal_noise() {
 #[test]
 fn no_return() {
     let stretch = laboratory("no-return").stretch(ROOM).unwrap();
-    let ahead = beam::nearest(-8.0_f64.to_radians()).unwrap()..=beam::nearest(8.0_f64.to_radians()).unwrap();
+    let ahead =
+        ust20lx::nearest(-8.0_f64.to_radians()).unwrap()..=ust20lx::nearest(8.0_f64.to_radians()).unwrap();
     let mut aside = Vec::new();
-    for scan in stretch.ranges.chunks(beam::COUNT) {
+    for scan in stretch.ranges.chunks(ust20lx::COUNT) {
         assert!(scan[ahead.clone()].iter().all(|r| *r == f64::INFINITY));
-        aside.push(scan[beam::FORWARD + 360]);
+        aside.push(scan[ust20lx::FORWARD + 360]);
     }
-    // The noise is there: mean and spread over 200 scans, at 99.9 %.
+    // Noise is present: mean and spread over 200 scans, at 99.9 %.
     let n = aside.len() as f64;
     let mean = aside.iter().sum::<f64>() / n;
     let variance = aside.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>() / (n - 1.0);
@@ -338,10 +344,10 @@ fn workers() {
 #[test]
 fn static_wall() {
     let ranges = laboratory("static-wall").stretch(ROOM).unwrap().ranges;
-    assert_eq!(ranges.len(), 1000 * beam::COUNT);
-    for beam in 0..beam::COUNT {
+    assert_eq!(ranges.len(), 1000 * ust20lx::COUNT);
+    for beam in 0..ust20lx::COUNT {
         let first = ranges[beam];
-        let of_beam = ranges.iter().skip(beam).step_by(beam::COUNT);
+        let of_beam = ranges.iter().skip(beam).step_by(ust20lx::COUNT);
         let squares: f64 = of_beam.map(|r| (r - first) * (r - first)).sum();
         assert!(
             first.is_finite() && squares == 0.0,
@@ -353,9 +359,9 @@ fn static_wall() {
 #[test]
 fn flat_wall() {
     let ranges = laboratory("flat-wall").stretch(ROOM).unwrap().ranges;
-    assert_eq!(ranges.len(), beam::COUNT);
+    assert_eq!(ranges.len(), ust20lx::COUNT);
     for (index, range) in ranges.iter().enumerate() {
-        let point = beam::direction(beam::azimuth(index)).into_inner() * *range;
+        let point = beam::direction(ust20lx::azimuth(index)).into_inner() * *range;
         let off = (point.x.abs() - 5.0).abs().min((point.y.abs() - 3.0).abs());
         assert!(off < 1e-9, "beam {index} is {off} m off");
     }
@@ -395,7 +401,7 @@ fn same_direction() {
                 continue;
             };
             let mut vertices = Vec::new();
-            let direction = beam::direction(beam::azimuth(index));
+            let direction = beam::direction(ust20lx::azimuth(index));
             let origin = Point3::new(0.0, 0.0, 2.0);
             assert_eq!(
                 tracer.follow(&Ray { origin, direction }, &mut vertices),

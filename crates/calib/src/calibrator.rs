@@ -1,10 +1,11 @@
-//! What calibrates: one interface for our methods and for anybody's.
+//! The interface of a calibrator, the same for our methods and for third-party ones.
 
 use crate::error::CalibError;
-use crate::options::{Method, Options};
+use crate::method::Method;
+use crate::options::Options;
 use catoptric_model::{Calibration, Dataset};
 
-/// Something that turns a dataset into a calibration, and sees nothing else.
+/// Turns a dataset into a calibration, and sees nothing else.
 ///
 /// ```
 /// use catoptric_calib::{CalibError, Calibrator, Method};
@@ -16,10 +17,10 @@ use catoptric_model::{Calibration, Dataset};
 /// }
 /// ```
 pub trait Calibrator {
-    /// The word that tables and files call it by.
+    /// The name used in tables and files.
     fn name(&self) -> &str;
 
-    /// One entry for each element that was looked at.
+    /// One entry for each element that was examined.
     ///
     /// # Errors
     /// [`CalibError`] if no calibration can be made from the dataset at all.

@@ -1,21 +1,21 @@
-//! What can keep a calibration from starting. An element that cannot be solved is data, not an error.
+//! The errors that keep a calibration from starting. An element that cannot be solved is data, not an error.
 
-use catoptric_model::ModelError;
+use catoptric_model::{ModelError, Stopped, Unreadable};
 
-/// A dataset or a request that no calibration can be made from.
+/// A dataset or a request from which no calibration can be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CalibError {
-    /// The dataset's parts do not fit together.
+    /// The parts of the dataset are inconsistent.
     #[error(transparent)]
     Dataset(#[from] ModelError),
-    /// A number of the session that cannot be what it is said to be.
+    /// An impossible number in the session.
     #[error("session: {key} is {found}, needed: {needed}")]
     Session {
-        /// Which number.
+        /// Key of the number.
         key: String,
-        /// What it has to be.
+        /// The values allowed.
         needed: &'static str,
-        /// What it is.
+        /// The value found.
         found: f64,
     },
     /// A nominal facet whose corners span no plane.
@@ -23,32 +23,32 @@ pub enum CalibError {
     Facet {
         /// Its name.
         name: String,
-        /// How many corners it has.
+        /// Number of its corners.
         corners: usize,
     },
-    /// Boards that tell nothing of the bare sensor.
+    /// The boards do not characterize the bare sensor.
     #[error("the sensor cannot be characterized: {what}")]
     Characterization {
         /// What is missing.
         what: String,
     },
-    /// A facet that the session does not hold.
+    /// A facet that is not in the session.
     #[error("no facet is called {name:?}; there are {known}")]
     UnknownFacet {
-        /// The name asked for.
+        /// The name requested.
         name: String,
-        /// The names there are.
+        /// The names available.
         known: String,
     },
-    /// No board can stand where a facet's beams go.
+    /// No board can be placed where a facet's beams go.
     #[error("no board pose before facet {facet:?} is possible: {reason}")]
     NoPlace {
         /// The facet.
         facet: String,
-        /// What is in the way.
+        /// The obstacle.
         reason: String,
     },
-    /// A calibrator that is not ours and gave no calibration.
+    /// A third-party calibrator gave no calibration.
     #[error("{name}: {what}")]
     Foreign {
         /// Its name.
@@ -56,10 +56,38 @@ pub enum CalibError {
         /// What happened.
         what: String,
     },
-    /// A name that is no method's.
-    #[error("no method is called {name:?}; there are {}", crate::options::Method::ALL.map(crate::options::Method::name).join(", "))]
+    /// Readings that the dataset's recording gives no more.
+    #[error(transparent)]
+    Unreadable(#[from] Unreadable),
+    /// The work was stopped on request.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+    /// An unknown name of a method.
+    #[error("no method is called {name:?}; there are {known}")]
     UnknownMethod {
-        /// The name asked for.
+        /// The name requested.
         name: String,
+        /// The names available.
+        known: String,
+        /// The name that was probably meant.
+        nearest: Option<&'static str>,
     },
+}
+
+impl CalibError {
+    /// Advice on how to correct the error, if known.
+    pub fn help(&self) -> Option<String> {
+        match self {
+            Self::UnknownMethod { nearest, .. } => nearest.map(|name| format!("did you mean {name:?}?")),
+            Self::Dataset(_)
+            | Self::Session { .. }
+            | Self::Facet { .. }
+            | Self::Characterization { .. }
+            | Self::UnknownFacet { .. }
+            | Self::NoPlace { .. }
+            | Self::Foreign { .. }
+            | Self::Unreadable(_)
+            | Self::Stopped(_) => None,
+        }
+    }
 }

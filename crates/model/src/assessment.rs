@@ -1,29 +1,29 @@
-//! How far a calibration is to be believed, as its own data tell: part of `calibration.json`.
+//! How far a calibration can be trusted, as determined from its own data: part of `calibration.json`.
 
 use serde::{Deserialize, Serialize};
 
-/// What a method that estimates everything at once says about itself.
+/// The self-assessment of a method that estimates everything at once.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Assessment {
-    /// What a person would say, in a sentence or two.
+    /// Remarks for the reader, in a sentence or two.
     pub verdict: String,
-    /// Whether the residuals are as large as the errors believed in make them.
+    /// Whether the residuals are as large as the assumed errors predict.
     pub global_test: ChiSquaredTest,
-    /// How far the facets are from plane.
+    /// Slope error of the facets.
     pub planeness: Planeness,
-    /// The errors believed in, and as large as the readings say they are.
+    /// The assumed errors, and their size as estimated from the readings.
     pub variance_components: Vec<VarianceComponent>,
-    /// What all elements share: mounting and biases.
+    /// Parameters shared by all elements: mounting and biases.
     pub parameters: Vec<SharedParameter>,
-    /// Correlations of the shared parameters, row by row.
+    /// Correlations of the shared parameters, in row-major order.
     pub correlations: Vec<Vec<f64>>,
-    /// Facets whose planes the boards leave open, and why.
+    /// Facets whose planes the boards do not determine, and why.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub open: Vec<String>,
     /// Largest studentized residual.
     pub largest_residual: LargestResidual,
-    /// What boards that were left out of the calibration say of it.
+    /// Errors on boards that were left out of the calibration.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub held_out: Option<HeldOut>,
 }
@@ -34,23 +34,23 @@ pub struct Assessment {
 pub struct ChiSquaredTest {
     /// χ².
     pub chi_squared: f64,
-    /// Residuals less estimated parameters, priors counted as residuals.
+    /// Number of residuals minus number of estimated parameters; priors count as residuals.
     pub degrees_of_freedom: usize,
-    /// Chance of a χ² at least as large, if all beliefs hold.
+    /// Probability of a χ² at least as large if all assumptions hold.
     pub p_value: f64,
 }
 
-/// How far facets are from plane, 1σ, and the test that they are plane.
+/// Slope error of the facets, 1σ, and the test of the hypothesis that they are flat.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Planeness {
     /// Tilt of a facet's normal along its fan about its mean, about each axis, in degrees.
     pub figure_deg: f64,
-    /// Departure τ of a beam's direction from what its facet gives it, along each axis, in degrees.
+    /// Deviation τ of a beam's direction from the one its facet's plane gives, along each axis, in degrees.
     pub departure_deg: f64,
-    /// Likelihood ratio against facets that are plane.
+    /// Likelihood ratio against perfectly flat facets.
     pub statistic: f64,
-    /// Chance of a ratio at least as large if they are.
+    /// Probability of a ratio at least as large if the facets are flat.
     pub p_value: f64,
 }
 
@@ -58,29 +58,29 @@ pub struct Planeness {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VarianceComponent {
-    /// What it is.
+    /// Name of the error.
     pub name: String,
-    /// 1σ as believed, in millimetres.
+    /// 1σ as assumed, in millimeters.
     pub believed_mm: f64,
-    /// 1σ as found, in millimetres; absent where the readings say nothing of it.
+    /// 1σ as estimated, in millimeters; absent if the readings do not constrain it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub found_mm: Option<f64>,
-    /// 1σ of that, in millimetres.
+    /// Standard error of that estimate, in millimeters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub found_sd_mm: Option<f64>,
 }
 
-/// A number that all elements share.
+/// A parameter shared by all elements.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SharedParameter {
-    /// What it is, with its unit: its change from what was believed.
+    /// Name and unit of the parameter, which is a change from its prior value.
     pub name: String,
-    /// Change from what was believed before.
+    /// Change from the prior value.
     pub change: f64,
-    /// 1σ before.
+    /// 1σ of the prior.
     pub believed_sd: f64,
-    /// 1σ after.
+    /// 1σ of the estimate.
     pub sd: f64,
 }
 
@@ -100,14 +100,14 @@ pub struct LargestResidual {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HeldOut {
-    /// Boards left out, each once.
+    /// Number of boards left out, one at a time.
     pub boards: usize,
-    /// Means of an element's readings of them.
+    /// Number of element means on those boards.
     pub means: usize,
-    /// Root mean square of what they differ from the prediction, in millimetres.
+    /// Root mean square difference from the prediction, in millimeters.
     pub rms_mm: f64,
-    /// What it should be by the stated covariance and the errors believed in, in millimetres.
+    /// Its expected value, given the stated covariance and the assumed errors, in millimeters.
     pub expected_mm: f64,
-    /// Mean difference, in millimetres.
+    /// Mean difference, in millimeters.
     pub mean_mm: f64,
 }

@@ -1,36 +1,7 @@
-//! Beams of the bare scanner and what a mirror makes of them: azimuth, deflection, exit direction.
+//! Beams of the bare scanner and their deflection by a mirror: base direction, deflection, exit direction.
 
 use nalgebra::{Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
-
-/// Beams of one scan of a 270° scanner with 0.25° between them.
-pub const COUNT: usize = 1081;
-
-/// Azimuth between neighbouring beams, in radians (0.25°).
-pub const STEP: f64 = 0.25 * std::f64::consts::PI / 180.0;
-
-/// The beam that looks along the x axis of the sensor frame.
-pub const FORWARD: usize = 540;
-
-/// Base azimuth θ_b of a beam, counter-clockwise from the x axis of the sensor frame, in radians.
-///
-/// ```
-/// use catoptric_model::beam;
-/// assert_eq!(beam::azimuth(540), 0.0);
-/// assert!((beam::azimuth(1080).to_degrees() - 135.0).abs() < 1e-12);
-/// ```
-#[doc(alias = "theta_b")]
-pub fn azimuth(beam: usize) -> f64 {
-    (beam as f64 - FORWARD as f64) * STEP
-}
-
-/// The beam whose azimuth is nearest to the given one; `None` outside the scan.
-pub fn nearest(azimuth: f64) -> Option<usize> {
-    let step = (azimuth / STEP).round() + FORWARD as f64;
-    // In range by the check just made, so nothing is cut off.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    (0.0..COUNT as f64).contains(&step).then_some(step as usize)
-}
 
 /// Direction of an undeflected beam: (cos θ_b, sin θ_b, 0).
 pub fn direction(azimuth: f64) -> Unit<Vector3<f64>> {
@@ -45,7 +16,7 @@ pub fn spherical(azimuth: f64, elevation: f64) -> Unit<Vector3<f64>> {
     Unit::new_unchecked(Vector3::new(cos_e * cos_a, cos_e * sin_a, sin_e))
 }
 
-/// What the mirror does to one beam: the three numbers that a calibration is about.
+/// What the mirror does to one beam: the three numbers that a calibration determines.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Deflection {
     /// Azimuth added by the mirror, in radians.
@@ -54,13 +25,13 @@ pub struct Deflection {
     /// Elevation of the outgoing ray above the scan plane, in radians.
     #[doc(alias = "phi")]
     pub elevation: f64,
-    /// Distance from the sensor origin to the deflection point, in metres.
+    /// Distance from the sensor origin to the deflection point, in meters.
     #[doc(alias = "d")]
     pub distance: f64,
 }
 
 impl Deflection {
-    /// The deflection that leaves a beam as it is.
+    /// The deflection of an undeflected beam.
     pub const NONE: Self = Self {
         azimuth: 0.0,
         elevation: 0.0,
@@ -78,9 +49,9 @@ impl Deflection {
         Point3::from(direction(beam_azimuth).into_inner() * self.distance)
     }
 
-    /// The deflection of a beam that leaves in a given direction; the added azimuth is within (−π, π].
+    /// The deflection of a beam that exits in a given direction; the added azimuth is within (−π, π].
     pub fn from_exit(beam_azimuth: f64, exit: &Unit<Vector3<f64>>, distance: f64) -> Self {
-        // In the frame turned by θ_b the added azimuth is read off directly, without a wrap-around.
+        // In a frame rotated by θ_b, the added azimuth is read off directly, without wrap-around.
         let (sin, cos) = libm::sincos(beam_azimuth);
         let along = exit.x * cos + exit.y * sin;
         let across = exit.y * cos - exit.x * sin;
@@ -92,7 +63,7 @@ impl Deflection {
     }
 }
 
-/// Angle between two directions, in radians: exact for small angles, where an arc cosine is not.
+/// Angle between two directions, in radians: accurate for small angles, unlike an arc cosine.
 pub fn angle_between(a: &Unit<Vector3<f64>>, b: &Unit<Vector3<f64>>) -> f64 {
     libm::atan2(a.cross(b).norm(), a.dot(b))
 }
@@ -100,15 +71,6 @@ pub fn angle_between(a: &Unit<Vector3<f64>>, b: &Unit<Vector3<f64>>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn nearest_inverts_azimuth_for_every_beam() {
-        for beam in 0..COUNT {
-            assert_eq!(nearest(azimuth(beam)), Some(beam));
-        }
-        assert_eq!(nearest(azimuth(1080) + STEP), None);
-        assert_eq!(nearest(azimuth(0) - STEP), None);
-    }
 
     #[test]
     fn from_exit_inverts_exit_direction() {

@@ -1,4 +1,4 @@
-//! Range errors of the scanner: Cooper, Eqs. (3)–(5), with the tables that the equations need.
+//! Range errors of the scanner: Cooper, Eqs. (3)–(5), with the tables that these equations need.
 //!
 //! A bias is *measured − true* and is subtracted to correct.
 
@@ -6,7 +6,7 @@ use crate::range::{CorrectedRange, RawRange};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// The three error terms of Eq. 3, in metres, each by itself.
+/// The three error terms of Eq. (3), individually, in meters.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct BiasTerms {
     /// Error that depends on the target's distance.
@@ -28,7 +28,7 @@ impl BiasTerms {
     }
 }
 
-/// Everything Eq. 3 subtracts, as a table of distances, a cosine law and a line per color.
+/// Everything that Eq. (3) subtracts: a table over distance, a cosine law, and a line for each color.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RangeBias {
@@ -38,7 +38,7 @@ pub struct RangeBias {
     /// E_a.
     #[serde(default)]
     pub angle: AngleBias,
-    /// E_c by the name of the color; a color that is not listed has none.
+    /// E_c by color name; zero for a color that is not listed.
     #[serde(default)]
     pub color: BTreeMap<String, ColorBias>,
 }
@@ -51,7 +51,7 @@ pub struct ColoredBias<'a> {
 }
 
 impl ColoredBias<'_> {
-    /// The three terms for a target at `range` metres under a given incidence.
+    /// The three terms for a target at `range` meters at a given incidence.
     #[inline]
     pub fn terms(&self, range: f64, cos_incidence: f64) -> BiasTerms {
         BiasTerms {
@@ -62,38 +62,38 @@ impl ColoredBias<'_> {
     }
 }
 
-/// E_r as a table over distance, interpolated linearly and constant outside (Cooper, Table 2).
+/// E_r as a table over distance, linearly interpolated and constant outside (Cooper, Table 2).
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DistanceBias {
-    /// Distances in metres, strictly increasing.
+    /// Distances in meters, strictly increasing.
     pub range_m: Vec<f64>,
-    /// Errors in millimetres at those distances.
+    /// Errors at those distances, in millimeters.
     pub error_mm: Vec<f64>,
 }
 
-/// E_a = A_a·cos θ_N + B_a — Cooper, Eq. (4) — and, where that law misses the measured errors, a table on top of it.
+/// E_a = A_a·cos θ_N + B_a — Cooper, Eq. (4) — plus a table where that law does not fit the measured errors.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AngleBias {
-    /// A_a, in millimetres.
+    /// A_a, in millimeters.
     #[doc(alias = "A_a")]
     pub gain_mm: f64,
-    /// B_a, in millimetres.
+    /// B_a, in millimeters.
     #[doc(alias = "B_a")]
     pub offset_mm: f64,
-    /// What is added to the law; with A_a = B_a = 0 the table is all there is.
+    /// Table added to the law; with A_a = B_a = 0 it replaces the law.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub table: Option<AngleTable>,
 }
 
-/// Range errors over the incidence, interpolated linearly in θ_N and constant outside.
+/// Range errors over incidence, linearly interpolated in θ_N and constant outside.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AngleTable {
     /// Incidences θ_N in degrees, strictly increasing.
     pub incidence_deg: Vec<f64>,
-    /// Errors in millimetres at those incidences.
+    /// Errors at those incidences, in millimeters.
     pub error_mm: Vec<f64>,
 }
 
@@ -101,17 +101,17 @@ pub struct AngleTable {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ColorBias {
-    /// A_c, in millimetres per metre.
+    /// A_c, in millimeters per meter.
     #[doc(alias = "A_c")]
     pub slope_mm_per_m: f64,
-    /// B_c, in millimetres.
+    /// B_c, in millimeters.
     #[doc(alias = "B_c")]
     pub offset_mm: f64,
 }
 
-/// Weights of a table's nodes in the value interpolated linearly at `x`, held constant outside the table.
+/// Weights of a table's nodes in the value linearly interpolated at `x`, held constant outside the table.
 ///
-/// At most two nodes, as (index, weight); all weights are 0 for an empty table. `nodes` must increase strictly.
+/// Two nodes at most, as (index, weight); all weights are 0 for an empty table. `nodes` must be strictly increasing.
 #[inline]
 pub fn interpolation_weights(nodes: &[f64], x: f64) -> [(usize, f64); 2] {
     let n = nodes.len();
@@ -129,7 +129,7 @@ pub fn interpolation_weights(nodes: &[f64], x: f64) -> [(usize, f64); 2] {
     [(above - 1, 1.0 - t), (above, t)]
 }
 
-/// The value of a table at `x`, interpolated linearly and constant outside; 0 for an empty table.
+/// The value of a table at `x`, linearly interpolated and constant outside; 0 for an empty table.
 pub fn interpolate(nodes: &[f64], values: &[f64], x: f64) -> f64 {
     interpolation_weights(nodes, x)
         .iter()
@@ -138,17 +138,17 @@ pub fn interpolate(nodes: &[f64], values: &[f64], x: f64) -> f64 {
 }
 
 impl DistanceBias {
-    /// Weight of each table node in the interpolated value: (index, weight) of at most two nodes.
+    /// Weight of each table node in the interpolated value: (index, weight) of two nodes at most.
     ///
-    /// The derivative of E_r with respect to its nodes, which an error budget needs.
+    /// This is the derivative of E_r with respect to its nodes, as an error budget needs it.
     #[inline]
     pub fn weights(&self, range: f64) -> [(usize, f64); 2] {
         interpolation_weights(&self.range_m, range)
     }
 
-    /// Range error caused by the target's distance, in metres.
+    /// Range error caused by the target's distance, in meters.
     ///
-    /// Unlike the paper, which fits a line that misses its own Table 2 by up to 5 mm, this is the table itself.
+    /// The paper fits a line that misses its own Table 2 by up to 5 mm; this interpolates the table itself.
     #[doc(alias = "E_r")]
     #[inline]
     pub fn error(&self, range: f64) -> f64 {
@@ -160,10 +160,10 @@ impl DistanceBias {
 }
 
 impl AngleBias {
-    /// Range error caused by the beam's incidence on the target, in metres: E_a = A_a·cos θ_N + B_a — Eq. (4).
+    /// Range error caused by the beam's incidence on the target, in meters: E_a = A_a·cos θ_N + B_a — Eq. (4).
     ///
-    /// Takes cos θ_N, `0 ≤ cos θ_N ≤ 1`. Unlike the paper, whose law misses its own Table 3 by up to 8 mm, this adds
-    /// a table where one is given.
+    /// Takes cos θ_N, `0 ≤ cos θ_N ≤ 1`. The paper's law misses its own Table 3 by up to 8 mm; this adds a table
+    /// if one is given.
     #[doc(alias = "E_a")]
     #[inline]
     pub fn error(&self, cos_incidence: f64) -> f64 {
@@ -175,7 +175,7 @@ impl AngleBias {
 }
 
 impl AngleTable {
-    /// The table's value under an incidence given by its cosine, in metres; a cosine beyond ±1 by rounding is 1.
+    /// The table's value at an incidence given by its cosine, in meters; a cosine rounded beyond ±1 counts as ±1.
     #[inline]
     pub fn error(&self, cos_incidence: f64) -> f64 {
         let incidence = libm::acos(cos_incidence.clamp(-1.0, 1.0)).to_degrees();
@@ -184,7 +184,7 @@ impl AngleTable {
 }
 
 impl ColorBias {
-    /// Range error caused by the target's color, in metres: E_c = A_c·R + B_c — Eq. (5).
+    /// Range error caused by the target's color, in meters: E_c = A_c·R + B_c — Eq. (5).
     #[doc(alias = "E_c")]
     #[inline]
     pub fn error(&self, range: f64) -> f64 {
@@ -193,7 +193,7 @@ impl ColorBias {
 }
 
 impl RangeBias {
-    /// The biases on targets of one color, for those who ask often.
+    /// The biases on targets of one color, for repeated evaluation.
     #[inline]
     pub fn on(&self, color: &str) -> ColoredBias<'_> {
         ColoredBias {
@@ -202,7 +202,7 @@ impl RangeBias {
         }
     }
 
-    /// The three terms for a target at `range` metres under a given incidence and color.
+    /// The three terms for a target at `range` meters at a given incidence and color.
     #[inline]
     pub fn terms(&self, range: f64, cos_incidence: f64, color: &str) -> BiasTerms {
         self.on(color).terms(range, cos_incidence)
@@ -210,8 +210,8 @@ impl RangeBias {
 
     /// The corrected range r − E_a − E_c − E_r — Eq. (3).
     ///
-    /// `range` and `cos_incidence` describe the target as it is believed to be; the errors vary slowly enough that
-    /// a range good to centimetres is good to micrometres here.
+    /// `range` and `cos_incidence` are estimates of the target's; the errors vary so slowly that centimeter accuracy of
+    /// the range gives micrometer accuracy here.
     #[inline]
     pub fn correct(&self, raw: RawRange, range: f64, cos_incidence: f64, color: &str) -> CorrectedRange {
         CorrectedRange(raw.0 - self.terms(range, cos_incidence, color).total())
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn the_table_is_met_at_its_nodes_and_held_outside() {
+    fn the_table_is_exact_at_its_nodes_and_constant_outside() {
         for (range, mm) in [
             (0.5, -2.8),
             (2.0, 6.1),
@@ -260,8 +260,8 @@ mod tests {
     }
 
     #[test]
-    fn a_table_of_incidences_stands_on_the_law() {
-        // Table 3, means over its three trials, at the angles it was really measured at.
+    fn a_table_of_incidences_is_added_to_the_law() {
+        // Table 3, means over its three trials, at the angles actually measured.
         let table = AngleTable {
             incidence_deg: vec![0.9, 18.5, 44.7],
             error_mm: vec![9.233, 27.4, 34.7],
@@ -278,7 +278,7 @@ mod tests {
             (31.6, 31.05),
             (80.0, 34.7),
         ] {
-            // The arc cosine loses half of the digits near 1, where the table is flat.
+            // The arc cosine loses half of its digits near 1, where the table is flat.
             assert!(
                 (at(&alone, degrees) - mm * 1e-3).abs() < 1e-12,
                 "at {degrees} degrees"

@@ -1,4 +1,4 @@
-//! Target boards: the plane a beam is ranged against, and the rectangle that bounds it.
+//! Target boards: the plane whose range a beam measures, and the rectangle that bounds it.
 
 use crate::error::ModelError;
 use crate::frame::Pose;
@@ -9,7 +9,7 @@ use nalgebra::{Point3, Unit, Vector3};
 pub struct BoardPlane {
     /// A point c of the plane.
     pub point: Point3<f64>,
-    /// Unit normal n; its sign does not matter to a range.
+    /// Unit normal n; its sign has no effect on a range.
     pub normal: Unit<Vector3<f64>>,
 }
 
@@ -19,7 +19,7 @@ impl BoardPlane {
         Self { point, normal }
     }
 
-    /// The plane z = 0 of a board whose pose is known.
+    /// The plane z = 0 of a board with a known pose.
     pub fn of_pose(a_from_board: &Pose) -> Self {
         Self {
             point: Point3::from(a_from_board.translation.vector),
@@ -58,17 +58,17 @@ impl BoardPlane {
     }
 }
 
-/// A rectangle in its own plane z = 0, centred on the origin.
+/// A rectangle in its own plane z = 0, centered on the origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rectangle {
-    /// Extent along x, in metres.
+    /// Extent along x, in meters.
     pub width: f64,
-    /// Extent along y, in metres.
+    /// Extent along y, in meters.
     pub height: f64,
 }
 
 impl Rectangle {
-    /// Whether a point of the plane lies inside by at least `margin` metres (outside, for a negative margin).
+    /// Whether a point of the plane is inside by at least `margin` meters (outside, if the margin is negative).
     pub fn contains(&self, point_in_board: &Point3<f64>, margin: f64) -> bool {
         point_in_board.x.abs() <= 0.5 * self.width - margin
             && point_in_board.y.abs() <= 0.5 * self.height - margin
@@ -91,20 +91,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn three_points_give_the_plane_through_them() {
+    fn three_points_determine_their_plane() {
         let points = [
             Point3::new(1.0, 0.0, 0.2),
             Point3::new(1.0, 2.0, -0.1),
             Point3::new(1.5, 0.3, 1.0),
         ];
-        let plane = BoardPlane::from_points(points[0], points[1], points[2]).expect("they span a plane");
+        let plane =
+            BoardPlane::from_points(points[0], points[1], points[2]).expect("the points span a plane");
         for p in points {
             assert!(plane.normal.dot(&(p - plane.point)).abs() < 1e-15);
         }
     }
 
     #[test]
-    fn collinear_points_are_refused() {
+    fn collinear_points_are_rejected() {
         let at = |t: f64| Point3::new(1.0 + t, 2.0 * t, -t);
         assert!(matches!(
             BoardPlane::from_points(at(0.0), at(0.5), at(1.0)),

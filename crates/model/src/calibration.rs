@@ -1,15 +1,19 @@
-//! The result: `calibration.json`, which is also what anybody's own calibrator submits.
+//! The result: `calibration.json`, which third-party calibrators submit as well.
 
 use crate::assessment::Assessment;
 use crate::beam::Deflection;
 use crate::bias::RangeBias;
-use crate::frame::PoseData;
+use crate::dataset::Dataset;
+use crate::error::ModelError;
+pub use crate::mount::MountEstimate;
+use crate::scan::ScanAngles;
+use crate::session::Session;
 use serde::{Deserialize, Serialize};
 
-/// Version of `calibration.json`.
-pub const SCHEMA_VERSION: u32 = 1;
+/// Version of `calibration.json`. Version 1 had neither `scanner` nor `dataset`.
+pub const SCHEMA_VERSION: u32 = 2;
 
-/// What became of an element.
+/// Outcome for an element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
@@ -21,14 +25,14 @@ pub enum Status {
     TooFewPoses,
     /// The boards do not determine both angles.
     Unobservable,
-    /// The iteration did not settle.
+    /// The iteration did not converge.
     NotConverged,
-    /// Its readings are not those of one beam on one board.
+    /// Its readings are not consistent with one beam on one board.
     Rejected,
 }
 
 impl Status {
-    /// All of them, in the order of the file format's documentation.
+    /// All statuses, in the order of the file format's documentation.
     pub const ALL: [Self; 6] = [
         Self::Solved,
         Self::Direct,
@@ -38,7 +42,7 @@ impl Status {
         Self::Rejected,
     ];
 
-    /// The word files use.
+    /// The word used in files.
     pub fn word(self) -> &'static str {
         match self {
             Self::Solved => "solved",
@@ -51,13 +55,13 @@ impl Status {
     }
 }
 
-/// What is known about one element. An angle that cannot be observed is absent, never a number.
+/// The result for one element. An unobservable angle is absent, never a number.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BeamEstimate {
-    /// Index of the beam, 0…1080.
+    /// Index of the beam, from 0.
     pub beam: usize,
-    /// What became of it.
+    /// Its status.
     pub status: Status,
     /// Why it was not solved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -71,33 +75,33 @@ pub struct BeamEstimate {
     /// φ, in radians.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub elevation_rad: Option<f64>,
-    /// d, in metres.
+    /// d, in meters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distance_m: Option<f64>,
-    /// Covariance of (θ_a, φ) under every error believed in, in square radians.
+    /// Covariance of (θ_a, φ) under all assumed errors, in square radians.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance_rad2: Option<[[f64; 2]; 2]>,
-    /// The paper's own covariance, σ²(HᵀH)⁻¹ with range noise alone, in square radians.
+    /// The paper's covariance, σ²(HᵀH)⁻¹ with range noise alone, in square radians.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise_covariance_rad2: Option<[[f64; 2]; 2]>,
-    /// Direction in (θ_a, φ) that the boards leave free.
+    /// Direction in (θ_a, φ) that the boards do not determine.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub null_direction: Option<[f64; 2]>,
-    /// Boards used.
+    /// Number of boards used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub poses: Option<usize>,
-    /// Readings used.
+    /// Number of readings used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub readings: Option<usize>,
-    /// Steps of the iteration.
+    /// Number of iterations.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub iterations: Option<usize>,
-    /// Root mean square of the residuals over the boards, in metres.
+    /// Root mean square of the residuals over the boards, in meters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rms_residual_m: Option<f64>,
 }
 
-/// What is known about one facet: the plane m·x = h in the sensor frame.
+/// The result for one facet: the plane m·x = h in the sensor frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FacetEstimate {
@@ -105,27 +109,13 @@ pub struct FacetEstimate {
     pub facet: String,
     /// Unit normal m.
     pub normal: [f64; 3],
-    /// h, in metres.
+    /// h, in meters.
     pub offset_m: f64,
-    /// Covariance of (two tilts in radians, offset in metres).
+    /// Covariance of (two tilts in radians, offset in meters).
     pub covariance: [[f64; 3]; 3],
 }
 
-/// Where the sensor sits in the rig body.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MountEstimate {
-    /// Origin of the sensor in the rig frame, in metres.
-    pub translation_m: [f64; 3],
-    /// Rotation from sensor to rig (x, y, z, w).
-    pub rotation_xyzw: [f64; 4],
-    /// Covariance of a small motion of the sensor frame: three shifts in metres, three turns in radians, about the
-    /// sensor's own axes.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub covariance: Option<[[f64; 6]; 6]>,
-}
-
-/// A calibration: one entry for each element that was looked at.
+/// A calibration: one entry for each element that was analyzed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
@@ -135,6 +125,12 @@ pub struct Calibration {
     pub method: String,
     /// Frame of the angles; always "sensor".
     pub frame: String,
+    /// The scanner it belongs to; not checked if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scanner: Option<ScanAngles>,
+    /// [`Dataset::id`] of the dataset it was made from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dataset: Option<String>,
     /// The elements.
     pub beams: Vec<BeamEstimate>,
     /// The facets, for methods that estimate them.
@@ -146,10 +142,10 @@ pub struct Calibration {
     /// Range biases, for methods that estimate them.
     #[serde(default)]
     pub bias: Option<RangeBias>,
-    /// What the method noticed about the dataset that its user should know, in words.
+    /// Notes by the method about the dataset, as text for the user.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
-    /// How far it is to be believed, for methods that can tell.
+    /// Self-assessment, for methods that provide one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub assessment: Option<Assessment>,
 }
@@ -186,21 +182,30 @@ impl BeamEstimate {
     }
 }
 
-impl MountEstimate {
-    /// The pose `rig_from_sensor`.
-    pub fn pose(&self) -> crate::frame::Pose {
-        (&PoseData {
-            translation_m: self.translation_m,
-            rotation_xyzw: self.rotation_xyzw,
-        })
-            .into()
-    }
-}
-
 impl Calibration {
+    /// Whether it belongs to the scanner of a session, as far as it states one.
+    ///
+    /// # Errors
+    /// [`ModelError::OtherScanner`].
+    pub fn check_scanner(&self, session: &Session) -> Result<(), ModelError> {
+        let dataset = *session.scanner.scan.angles();
+        match self.scanner {
+            Some(calibration) if !calibration.same_as(&dataset) => {
+                Err(ModelError::OtherScanner { calibration, dataset })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The dataset it was made from and the given one, if their identifiers differ.
+    pub fn other_dataset<'a>(&'a self, dataset: &'a Dataset) -> Option<[&'a str; 2]> {
+        let ids = [self.dataset.as_deref()?, dataset.id.as_deref()?];
+        (!ids[0].eq_ignore_ascii_case(ids[1])).then_some(ids)
+    }
+
     /// The entry of a beam.
     pub fn beam(&self, beam: usize) -> Option<&BeamEstimate> {
-        // Our own files list every element in order; others' need not.
+        // Our own files list every element in order; third-party files may not.
         self.beams
             .get(beam)
             .filter(|b| b.beam == beam)

@@ -1,10 +1,10 @@
-//! What step 1 finds out about the bare sensor: `characterization.json`.
+//! The result of step 1 about the bare sensor: `characterization.json`.
 //!
-//! Tables 1 to 4 of the paper as measured, and the numbers of Eqs. 3 to 5 fitted to them. Errors are *measured − true*.
+//! Tables 1 to 4 of the paper as measured, and the fitted parameters of Eqs. (3)–(5). Errors are *measured − true*.
 
 use crate::bias::RangeBias;
-use crate::calibration::MountEstimate;
-use crate::dataset::{SpotNote, TestKind};
+use crate::label::{SpotNote, TestKind};
+use crate::mount::MountEstimate;
 use serde::{Deserialize, Serialize};
 
 /// Version of `characterization.json`.
@@ -23,70 +23,70 @@ pub struct Characterization {
     /// How the spot grows with the distance; absent without spots at two distances.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spot_law: Option<SpotLaw>,
-    /// Tables 2 to 4: every stretch with a board before beams that nothing deflects, in the order of recording.
+    /// Tables 2 to 4: every stretch with a board in front of undeflected beams, in the order of recording.
     pub stretches: Vec<StretchRow>,
-    /// What Eq. 3 is to subtract. E_a is the law of Eq. 4, with a table on top of it where the law is rejected.
+    /// The biases that Eq. (3) subtracts. E_a is the law of Eq. (4), plus a table if the law is rejected.
     pub bias: RangeBias,
-    /// The numbers that were fitted.
+    /// The fitted parameters.
     pub parameters: Vec<Parameter>,
-    /// Their covariance, in the units of the parameters, row by row.
+    /// Their covariance, in the units of the parameters, in row-major order.
     pub covariance: Vec<Vec<f64>>,
-    /// What the boards do not tell.
+    /// Parameters that the boards do not determine.
     #[serde(default)]
     pub not_observed: Vec<NotObserved>,
-    /// Eq. 5 as a line through E_r over the distance; absent without three distances.
+    /// Eq. (5) as a line through E_r over distance; absent with fewer than three distances.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distance_line: Option<Law>,
-    /// What the cosine law leaves at each incidence that was tested.
+    /// Residuals of the cosine law at each incidence tested.
     #[serde(default)]
     pub angle_misfit: Vec<MisfitRow>,
-    /// Whether Eq. 4's law and its misfits go together; absent without three incidences.
+    /// Goodness of fit of the law of Eq. (4); absent with fewer than three incidences.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angle_law: Option<Fit>,
     /// Table 4: white noise of one reading, by color and distance.
     pub noise: Vec<NoiseRow>,
-    /// Scatter of the means over trials of one setting; absent without repetition.
+    /// Scatter of the means over repeated trials of one setting; absent without repetition.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trial_scatter: Option<Scatter>,
-    /// How well the model fits all means together.
+    /// Goodness of fit of the model to all means together.
     pub fit: Fit,
-    /// Where the sensor sits in the rig, as it came out beside the errors.
+    /// Mounting of the sensor in the rig, estimated together with the errors.
     pub rig_from_sensor: MountEstimate,
 }
 
-/// The spot of neighbouring beams on a board.
+/// The spot of neighboring beams on a board.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SpotRow {
     /// Number of the pose.
     pub pose: usize,
-    /// Distance to the board, in metres.
+    /// Distance to the board, in meters.
     pub distance_m: f64,
     /// The spot.
     pub spot: SpotNote,
 }
 
-/// Lines through the extents of the spot: extent = offset + slope·distance.
+/// Lines fitted to the extents of the spot: extent = offset + slope·distance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SpotLaw {
-    /// Growth of the width, in millimetres per metre: full milliradians.
+    /// Growth of the width, in millimeters per meter (full angle in milliradians).
     pub width_slope_mrad: f64,
-    /// Width at distance 0, in millimetres.
+    /// Width at distance 0, in millimeters.
     pub width_offset_mm: f64,
-    /// Growth of the height, in millimetres per metre.
+    /// Growth of the height, in millimeters per meter.
     pub height_slope_mrad: f64,
-    /// Height at distance 0, in millimetres.
+    /// Height at distance 0, in millimeters.
     pub height_offset_mm: f64,
 }
 
-/// What one beam, the one nearest to the board's center, read of a board.
+/// Readings of one board by one beam, the one nearest to the board's center.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StretchRow {
     /// Number of the pose.
     pub pose: usize,
-    /// What was tested; absent for a board that was set up to find the mounting.
+    /// What was tested; absent for a board that was set up to determine the mounting.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub test: Option<TestKind>,
     /// Number of the setting.
@@ -101,19 +101,19 @@ pub struct StretchRow {
     pub color: String,
     /// The beam.
     pub beam: usize,
-    /// Distance along it to the board as tracked, in metres.
+    /// Distance along the beam to the board as tracked, in meters.
     pub distance_m: f64,
-    /// Angle between the board's normal and the beam, in degrees; negative if the normal is turned to smaller azimuths.
+    /// Angle between the board's normal and the beam, in degrees; negative if the normal points to smaller azimuths.
     pub incidence_deg: f64,
-    /// Readings that are ranges.
+    /// Number of readings that are ranges.
     pub readings: usize,
-    /// Their mean less the distance, in millimetres.
+    /// Their mean minus the distance, in millimeters.
     pub mean_error_mm: f64,
-    /// Their standard deviation, in millimetres.
+    /// Their standard deviation, in millimeters.
     pub sd_mm: f64,
 }
 
-/// A number of Eqs. 3 to 5.
+/// A parameter of Eqs. (3)–(5).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parameter {
@@ -122,7 +122,7 @@ pub struct Parameter {
     /// The color it belongs to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub color: Option<String>,
-    /// The distance it belongs to, in metres.
+    /// The distance it belongs to, in meters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distance_m: Option<f64>,
     /// `mm` or `mm/m`.
@@ -133,7 +133,7 @@ pub struct Parameter {
     pub sd: f64,
 }
 
-/// A number that the boards leave open.
+/// A parameter that the boards do not determine.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NotObserved {
@@ -150,9 +150,9 @@ pub struct NotObserved {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Law {
-    /// A_c, in millimetres per metre.
+    /// A_c, in millimeters per meter.
     pub slope_mm_per_m: f64,
-    /// B_c, in millimetres.
+    /// B_c, in millimeters.
     pub offset_mm: f64,
     /// Covariance of slope and offset.
     pub covariance: [[f64; 2]; 2],
@@ -160,7 +160,7 @@ pub struct Law {
     pub fit: Fit,
 }
 
-/// A sum of squared residuals in their own standard deviations, and what it is held against.
+/// A sum of squared residuals in units of their standard deviations, with its degrees of freedom.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fit {
@@ -170,33 +170,33 @@ pub struct Fit {
     pub degrees_of_freedom: usize,
 }
 
-/// What the cosine law leaves at an incidence.
+/// Residual of the cosine law at one incidence.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MisfitRow {
-    /// Incidence θ_N, in degrees, whichever way the board was turned.
+    /// Incidence θ_N, in degrees, regardless of the direction in which the board was turned.
     pub incidence_deg: f64,
-    /// Stretches.
+    /// Number of stretches.
     pub stretches: usize,
-    /// E_a by the law, in millimetres.
+    /// E_a by the law, in millimeters.
     pub law_mm: f64,
-    /// Measured E_a less the law, in millimetres.
+    /// Measured E_a minus the law, in millimeters.
     pub misfit_mm: f64,
-    /// Standard deviation of the misfit, in millimetres.
+    /// Standard deviation of the misfit, in millimeters.
     pub sd_mm: f64,
 }
 
-/// White noise of a color at a distance.
+/// White noise for one color and distance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseRow {
     /// Color.
     pub color: String,
-    /// Distance, in metres.
+    /// Distance, in meters.
     pub distance_m: f64,
-    /// Standard deviation of one reading, in millimetres.
+    /// Standard deviation of one reading, in millimeters.
     pub sd_mm: f64,
-    /// Readings less the means taken from them.
+    /// Number of readings minus number of means.
     pub degrees_of_freedom: usize,
 }
 
@@ -204,9 +204,9 @@ pub struct NoiseRow {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scatter {
-    /// Standard deviation, in millimetres.
+    /// Standard deviation, in millimeters.
     pub sd_mm: f64,
-    /// Repetitions less the settings.
+    /// Number of repetitions minus number of settings.
     pub degrees_of_freedom: usize,
 }
 
@@ -216,14 +216,14 @@ impl Fit {
         self.chi_squared / self.degrees_of_freedom as f64
     }
 
-    /// Whether χ² is beyond the value that one fit in a thousand exceeds by chance.
+    /// Whether χ² exceeds its 0.999 quantile.
     pub fn is_rejected(&self) -> bool {
         self.degrees_of_freedom > 0 && self.chi_squared > upper_quantile(self.degrees_of_freedom)
     }
 }
 
-/// χ² that is exceeded with probability 0.001 by chance (Wilson and Hilferty 1931: 3 % high for one degree of freedom, and
-/// ever closer for more).
+/// The 0.999 quantile of χ² (Wilson and Hilferty 1931: 3 % high for one degree of freedom, and increasingly accurate
+/// for more).
 fn upper_quantile(degrees_of_freedom: usize) -> f64 {
     /// Standard normal deviate of that probability.
     const Z: f64 = 3.090_232_306_167_813;
@@ -233,14 +233,14 @@ fn upper_quantile(degrees_of_freedom: usize) -> f64 {
 }
 
 impl Characterization {
-    /// The fitted number with a symbol, of a color where it belongs to one.
+    /// The fitted parameter with a symbol, of a color if it belongs to one.
     pub fn parameter(&self, symbol: &str, color: Option<&str>) -> Option<&Parameter> {
         self.parameters
             .iter()
             .find(|p| p.symbol == symbol && p.color.as_deref() == color)
     }
 
-    /// Root mean square of the standard deviations of all parameters with a symbol, in their unit; 0 without any.
+    /// Root mean square of the standard deviations of all parameters with a symbol, in their unit; 0 if there are none.
     pub fn typical_sd(&self, symbol: &str) -> f64 {
         let squares = self
             .parameters
@@ -257,8 +257,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_quantile_is_the_tables() {
-        // χ² at 0.999: 10.828, 29.588, 149.449 for 1, 10, 100 degrees of freedom; the law is a little high for few.
+    fn the_quantile_matches_the_tables() {
+        // χ² at 0.999: 10.828, 29.588, 149.449 for 1, 10, 100 degrees of freedom; the formula is slightly high for few.
         for (n, table, high) in [(1, 10.828, 0.031), (10, 29.588, 0.006), (100, 149.449, 0.0006)] {
             let off = upper_quantile(n) / table - 1.0;
             assert!((0.0..high).contains(&off), "{n}: {off}");

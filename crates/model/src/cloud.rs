@@ -1,21 +1,86 @@
-//! From a planar scan to points in space: Cooper, Eqs. (9) and (10).
+//! Point clouds: the lift of a planar scan into space, Cooper, Eqs. (9) and (10), and the cloud it gives.
 
 use crate::beam::{self, Deflection};
 use nalgebra::{Point3, Rotation3, Vector3};
 
-/// The rotation that takes the base beam's direction to the outgoing one: Rz(θ_b + θ_a)·Ry(−φ)·Rz(−θ_b).
+/// Frame of a cloud.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum CloudFrame {
+    /// The laser base frame.
+    Sensor,
+    /// The marker body on the superstructure.
+    Rig,
+    /// The frame of motion capture.
+    #[default]
+    Room,
+}
+
+impl CloudFrame {
+    /// All frames.
+    pub const ALL: [Self; 3] = [Self::Sensor, Self::Rig, Self::Room];
+
+    /// The word used in files and commands.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Sensor => "sensor",
+            Self::Rig => "rig",
+            Self::Room => "room",
+        }
+    }
+
+    /// A one-line description.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Sensor => "The laser base frame",
+            Self::Rig => "The marker body on the superstructure",
+            Self::Room => "The frame of motion capture",
+        }
+    }
+}
+
+/// A point and the reading it comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CloudPoint {
+    /// Position, in meters.
+    pub position: Point3<f64>,
+    /// Beam.
+    pub beam: usize,
+    /// Index of the scan in its stretch, from 0.
+    pub scan: usize,
+}
+
+/// A point cloud, with counts of the readings it omits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointCloud {
+    /// Its frame.
+    pub frame: CloudFrame,
+    /// Stretch it was made from.
+    pub pose: usize,
+    /// Whether the mounting was taken from the drawing because the calibration has none.
+    pub mount_is_nominal: bool,
+    /// The points, scan by scan.
+    pub points: Vec<CloudPoint>,
+    /// Number of readings that are not ranges: no return, too close, invalid.
+    pub without_range: usize,
+    /// Number of ranges of elements for which the calibration has no direction.
+    pub without_direction: usize,
+    /// Number of elements for which the calibration has no direction.
+    pub unsolved_elements: usize,
+}
+
+/// The rotation from the base beam's direction to the exit direction: Rz(θ_b + θ_a)·Ry(−φ)·Rz(−θ_b).
 ///
-/// The 3-2 sequence of Eq. 9, written for a right-handed frame in which positive elevation points up.
+/// The 3-2 sequence of Eq. (9), written for a right-handed frame in which positive elevation points up.
 pub fn rotation(deflection: &Deflection, beam_azimuth: f64) -> Rotation3<f64> {
     Rotation3::from_axis_angle(&Vector3::z_axis(), beam_azimuth + deflection.azimuth)
         * Rotation3::from_axis_angle(&Vector3::y_axis(), -deflection.elevation)
         * Rotation3::from_axis_angle(&Vector3::z_axis(), -beam_azimuth)
 }
 
-/// Where a range of a deflected beam lies, in the sensor frame: PC = R·(P_0 − P_L1) + P_L1 — Eq. (9).
+/// The point measured by a range of a deflected beam, in the sensor frame: PC = R·(P_0 − P_L1) + P_L1 — Eq. (9).
 ///
-/// P_0 is the point at that range in the scan plane. A range short of the mirror stays in the plane: it is a
-/// reading of the structure.
+/// P_0 is the point at that range in the scan plane. A range shorter than the distance to the mirror stays in the
+/// plane: it is a reading of the structure.
 ///
 /// ```
 /// use catoptric_model::{cloud, Deflection};

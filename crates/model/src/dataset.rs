@@ -1,165 +1,31 @@
-//! A recorded experiment: the session and, for every pose of a board, its scans and tracked bodies.
+//! A recorded experiment: the session, and the scans and tracked bodies of every board pose.
 //!
 //! A [`Stretch`] is what the laboratory records, frame by frame; a [`PoseRecord`] is what a calibration needs of it.
 
 use crate::error::ModelError;
 use crate::frame::Pose;
+use crate::label::{PoseKind, PoseLabel};
 use crate::motion::Motion;
+use crate::readings::{BeamStatistics, Readings, Scans};
 use crate::session::Session;
 use crate::summary::Summary;
-use crate::tracking::Watched;
-use nalgebra::{Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use serde::{Deserialize, Serialize};
-
-/// What a stretch of scans was recorded for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum PoseKind {
-    /// Step 3: the structure before its mirrors were attached.
-    Bare,
-    /// Step 4: the known room, no board in it.
-    Room,
-    /// Steps 1 and 5: a board before beams that no mirror deflects.
-    Direct,
-    /// Steps 7–10: a board in the fan of a facet.
-    Facet,
-    /// The rig moves through the room while it scans: nothing a calibration is made from, something it is applied to.
-    Flight,
-}
-
-impl PoseLabel {
-    /// The note of a stretch of which nothing more is to be noted.
-    pub fn of(pose: usize, kind: PoseKind, scans: usize) -> Self {
-        Self {
-            pose,
-            kind,
-            scans,
-            board: None,
-            color: None,
-            facet: None,
-            beams: None,
-            test: None,
-            flight: None,
-        }
-    }
-}
-
-impl PoseKind {
-    /// Whether it says what the mirrors do: they are attached, and nothing moves.
-    pub fn is_evidence(self) -> bool {
-        match self {
-            Self::Room | Self::Direct | Self::Facet => true,
-            Self::Bare | Self::Flight => false,
-        }
-    }
-}
-
-/// What is tested of the bare sensor (step 1).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum TestKind {
-    /// Size of the spot over the distance: Figures 2 and 3, Table 1.
-    Spot,
-    /// Mean error and spread over the distance: Table 2.
-    Distance,
-    /// Error over the incidence: Figure 4, Table 3.
-    Angle,
-    /// Error and spread over color and distance: Table 4.
-    Color,
-}
-
-/// What was tested during a stretch.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TestNote {
-    /// What it was for.
-    pub kind: TestKind,
-    /// Number of the setting: stretches of one setting are trials of the same.
-    pub setting: usize,
-    /// Number of the trial, from 1.
-    pub trial: usize,
-    /// The spot as it was seen on the board.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub spot: Option<SpotNote>,
-}
-
-/// A spot on a board as seen through an infrared camera.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SpotNote {
-    /// Neighbouring beams that make it.
-    pub beams: usize,
-    /// Extent along the scan, in millimetres.
-    pub width_mm: f64,
-    /// Extent across the scan, in millimetres.
-    pub height_mm: f64,
-}
-
-/// What the experimenter noted about a stretch of scans: one message of `/session/pose`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PoseLabel {
-    /// Number of the pose, from 0.
-    pub pose: usize,
-    /// What it was recorded for.
-    pub kind: PoseKind,
-    /// Scans in the stretch.
-    pub scans: usize,
-    /// Board that was set up.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub board: Option<String>,
-    /// Color of that board.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub color: Option<String>,
-    /// Facet whose fan the board stands in.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub facet: Option<String>,
-    /// First and last beam that the board was set up for.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub beams: Option<[usize; 2]>,
-    /// What was tested of the bare sensor.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub test: Option<TestNote>,
-    /// Flight that was flown.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub flight: Option<String>,
-}
+use crate::tracking::{Track, Watched};
 
 /// Name of the rig as a motion-capture subject.
 pub const RIG_SUBJECT: &str = "rig";
 
-/// Whole nanoseconds of a time in seconds that is finite and not negative: the resolution of a recording.
+/// A finite, non-negative time in seconds as whole nanoseconds, the resolution of a recording.
 pub fn nanoseconds(seconds: f64) -> u64 {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        reason = "as is said"
+        reason = "the time is finite and not negative"
     )]
     let ns = (seconds * 1e9).round() as u64;
     ns
 }
 
-/// One motion-capture frame of one body, in the room frame.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TrackedFrame {
-    /// Time since the recording began, in seconds.
-    pub time_s: f64,
-    /// `room_from_body` as solved from the markers; `None` where too few were seen.
-    pub pose: Option<Pose>,
-    /// The markers in the order of the body's template, in metres; `None` where one was not seen.
-    pub markers: Vec<Option<Point3<f64>>>,
-}
-
-/// What motion capture recorded of one body.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Track {
-    /// Name of the body: [`RIG_SUBJECT`] or a board.
-    pub subject: String,
-    /// Its frames, in order of time.
-    pub frames: Vec<TrackedFrame>,
-}
-
-/// One stretch of scans as it was recorded, with nothing moving unless it is a flight.
+/// One stretch of scans as recorded; nothing moves, except in a flight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stretch {
     /// What the experimenter noted.
@@ -170,88 +36,67 @@ pub struct Stretch {
     pub scan_period_s: f64,
     /// Beams of a scan.
     pub beams: usize,
-    /// Readings in metres, scan after scan; −∞ too close, +∞ no return, NaN invalid (REP-117).
+    /// Readings in meters, scan after scan; −∞ too close, +∞ no return, NaN invalid (REP-117).
     pub ranges: Vec<f64>,
-    /// Every reading's echoes in metres, nearest first and in the order of `ranges`, where they were recorded too.
+    /// Echoes of every reading in meters, nearest first and in the order of `ranges`, if they were recorded.
     pub echoes: Option<Vec<Vec<f64>>>,
     /// The tracked bodies, the rig first.
     pub tracks: Vec<Track>,
 }
 
-/// Scans of a stretch in a row, with what motion capture saw from the first of them until the one after the last.
+/// Consecutive scans of a stretch, with the motion-capture frames from the first of them to the one after the last.
 ///
-/// The first excerpt of a stretch also has the frames before its first scan, the last those after its last. A stretch of
-/// any length can be recorded excerpt by excerpt.
+/// The first excerpt of a stretch also has the frames before its first scan, and the last those after its last. A
+/// stretch of any length can be recorded excerpt by excerpt.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Excerpt {
-    /// The scans and the frames. All else is that of the whole stretch: the label, and the time of its first scan.
+    /// The scans and frames. Everything else is that of the whole stretch: the label, and the time of its first scan.
     pub part: Stretch,
-    /// Number of the first of its scans in the whole stretch.
+    /// Index in the stretch of the first scan.
     pub first_scan: usize,
-    /// When and where each tracked body was solved for the first time in the whole stretch; `None` if it never was.
+    /// First solved pose of each tracked body in the whole stretch, with its time; `None` if it was never solved.
     pub first_seen: Vec<Option<(f64, Pose)>>,
 }
 
-/// One stretch of scans, and where motion capture saw rig and board.
+/// One stretch of scans, with the tracked poses of rig and board.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseRecord {
     /// What the experimenter noted.
     pub label: PoseLabel,
-    /// Rig as tracked, mean over the stretch; of a flight, as first seen.
+    /// Rig as tracked: mean over the stretch, or the first pose of a flight.
     pub room_from_rig: Pose,
-    /// Board as tracked, mean over the stretch; `None` where none was set up.
+    /// Board as tracked, mean over the stretch; `None` if none was set up.
     pub room_from_board: Option<Pose>,
-    /// Where the rig was during a flight; `None` where nothing moved.
+    /// Trajectory of the rig during a flight; `None` if nothing moved.
     pub motion: Option<Motion>,
-    /// The markers of rig and board over the stretch; none of a flight, nor where only poses were recorded.
+    /// The markers of rig and board over the stretch; empty for a flight, or if only poses were recorded.
     pub watched: Vec<Watched>,
-    /// Beams of a scan.
-    pub beams: usize,
-    /// Readings in metres, scan after scan; −∞ too close, +∞ no return, NaN invalid (REP-117).
-    pub ranges: Vec<f64>,
+    /// Readings of all beams, scan by scan.
+    pub readings: Readings,
 }
 
-/// A recorded experiment: what a calibration is made from.
+/// A recorded experiment: the input of a calibration.
+///
+/// Its size does not grow with the number of scans: readings stay in the recording, which is read again when a
+/// statistic needs them, unless the dataset was made in memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dataset {
     /// What the experimenter knows.
     pub session: Session,
     /// The stretches, in the order they were recorded.
     pub poses: Vec<PoseRecord>,
-}
-
-impl Track {
-    /// Mean of the solved poses; `None` if the body was never seen.
-    ///
-    /// Positions are averaged, and quaternions after bringing them to one sign: exact to second order in the spread,
-    /// which is far below a milliradian here.
-    pub fn mean_pose(&self) -> Option<Pose> {
-        let mut poses = self.frames.iter().filter_map(|f| f.pose);
-        let first = poses.next()?;
-        let (mut translation, mut rotation) = (first.translation.vector, first.rotation.into_inner());
-        let mut count = 1.0;
-        for pose in poses {
-            translation += pose.translation.vector;
-            let q = pose.rotation.into_inner();
-            rotation += if q.dot(&first.rotation) < 0.0 { -q } else { q };
-            count += 1.0;
-        }
-        let rotation: Quaternion<f64> = rotation / count;
-        Some(Pose::from_parts(
-            Translation3::from(Vector3::from(translation / count)),
-            UnitQuaternion::new_normalize(rotation),
-        ))
-    }
+    /// SHA-256 of the recording it was read from, in hexadecimal; `None` for a dataset made in memory.
+    pub id: Option<String>,
 }
 
 impl Stretch {
-    /// When and where each tracked body was solved for the first time.
+    /// First solved pose of each tracked body, with its time.
     pub fn first_seen(&self) -> Vec<Option<(f64, Pose)>> {
         let first = |track: &Track| track.frames.iter().find_map(|f| Some((f.time_s, f.pose?)));
         self.tracks.iter().map(first).collect()
     }
 
-    /// What a calibration needs of the stretch.
+    /// Extracts what a calibration needs of the stretch.
     ///
     /// # Errors
     /// [`ModelError::Inconsistent`] if motion capture never saw the rig.
@@ -263,30 +108,15 @@ impl Stretch {
                 .and_then(Track::mean_pose)
         };
         let motion = (self.label.kind == PoseKind::Flight).then(|| self.motion());
-        let room_from_rig = match &motion {
-            Some(motion) => motion.frames.first().map(|(_, pose)| *pose),
-            None => mean(RIG_SUBJECT),
-        };
-        let room_from_rig = room_from_rig.ok_or_else(|| {
-            ModelError::Inconsistent(format!("pose {}: the rig was never tracked", self.label.pose))
-        })?;
-        let room_from_board = self.label.board.as_deref().and_then(mean);
         let watched = match motion {
             Some(_) => Vec::new(),
             None => self.tracks.iter().filter_map(Watched::of).collect(),
         };
-        Ok(PoseRecord {
-            room_from_rig,
-            room_from_board,
-            motion,
-            watched,
-            beams: self.beams,
-            ranges: self.ranges,
-            label: self.label,
-        })
+        let readings = Readings::in_memory(self.beams, self.ranges);
+        PoseRecord::new(self.label, motion, mean, watched, readings)
     }
 
-    /// Where the rig was seen, frame by frame.
+    /// Poses of the rig, frame by frame.
     fn motion(&self) -> Motion {
         let rig = self.tracks.iter().filter(|t| t.subject == RIG_SUBJECT);
         let frames = rig.flat_map(|t| &t.frames);
@@ -299,34 +129,69 @@ impl Stretch {
 }
 
 impl PoseRecord {
-    /// The readings of one beam, scan after scan.
-    pub fn readings(&self, beam: usize) -> impl Iterator<Item = f64> + Clone + '_ {
-        self.ranges.iter().skip(beam).step_by(self.beams).copied()
+    /// Builds the record of a stretch; `mean` returns the mean pose of a body.
+    ///
+    /// # Errors
+    /// [`ModelError::Inconsistent`] if motion capture never saw the rig.
+    pub fn new(
+        label: PoseLabel,
+        motion: Option<Motion>,
+        mean: impl Fn(&str) -> Option<Pose>,
+        watched: Vec<Watched>,
+        readings: Readings,
+    ) -> Result<Self, ModelError> {
+        let room_from_rig = match &motion {
+            Some(motion) => motion.frames.first().map(|(_, pose)| *pose),
+            None => mean(RIG_SUBJECT),
+        };
+        let room_from_rig = room_from_rig.ok_or_else(|| {
+            ModelError::Inconsistent(format!("pose {}: the rig was never tracked", label.pose))
+        })?;
+        Ok(Self {
+            room_from_rig,
+            room_from_board: label.board.as_deref().and_then(mean),
+            motion,
+            watched,
+            readings,
+            label,
+        })
+    }
+
+    /// Beams of a scan.
+    pub fn beams(&self) -> usize {
+        self.readings.beams()
+    }
+
+    /// The scans in order.
+    ///
+    /// ```
+    /// use catoptric_model::{PoseRecord, Unreadable};
+    ///
+    /// fn longest(record: &PoseRecord) -> Result<f64, Unreadable> {
+    ///     let mut longest = 0.0_f64;
+    ///     for scan in record.scans() {
+    ///         longest = scan?.iter().filter(|r| r.is_finite()).fold(longest, |l, r| l.max(*r));
+    ///     }
+    ///     Ok(longest)
+    /// }
+    /// ```
+    pub fn scans(&self) -> Scans<'_> {
+        self.readings.scans()
     }
 
     /// Mean and spread of every beam.
     pub fn summarize(&self) -> Vec<Summary> {
-        // Scan after scan, as the readings lie in memory.
-        let mut summaries = vec![Summary::default(); self.beams];
-        for scan in self.ranges.chunks(self.beams.max(1)) {
-            for (s, r) in summaries.iter_mut().zip(scan) {
-                if r.is_finite() {
-                    s.add(*r);
-                } else {
-                    s.missing += 1;
-                }
-            }
-        }
-        summaries.into_iter().map(Summary::finished).collect()
+        let beams = self.readings.statistics().iter();
+        beams.map(BeamStatistics::summary).collect()
     }
 }
 
 impl Dataset {
-    /// Checks that the parts fit together.
+    /// Checks that the parts are consistent.
     ///
     /// # Errors
-    /// [`ModelError::Inconsistent`] names the first pose whose board is not in the session, that has no board where
-    /// it needs one, or whose number of readings is not scans × beams.
+    /// [`ModelError::Inconsistent`] names the first pose whose board is not in the session or is missing, or whose
+    /// number of readings is not scans × beams.
     pub fn check(&self) -> Result<(), ModelError> {
         let fail = |pose: &PoseRecord, what: String| {
             Err(ModelError::Inconsistent(format!(
@@ -335,21 +200,14 @@ impl Dataset {
             )))
         };
         for pose in &self.poses {
-            if pose.beams != self.session.scanner.beams {
-                return fail(
-                    pose,
-                    format!(
-                        "{} beams, the scanner has {}",
-                        pose.beams, self.session.scanner.beams
-                    ),
-                );
+            let (beams, found) = (pose.beams(), pose.readings.len());
+            let scanner = self.session.scanner.scan.beams();
+            if beams != scanner {
+                return fail(pose, format!("{beams} beams, the scanner has {scanner}"));
             }
-            let expected = pose.label.scans * pose.beams;
-            if pose.ranges.len() != expected {
-                return fail(
-                    pose,
-                    format!("{} readings, {expected} expected", pose.ranges.len()),
-                );
+            let expected = pose.label.scans * beams;
+            if found != expected {
+                return fail(pose, format!("{found} readings, {expected} expected"));
             }
             let needs_board = matches!(pose.label.kind, PoseKind::Direct | PoseKind::Facet);
             match &pose.label.board {
@@ -389,8 +247,7 @@ mod tests {
             room_from_board: None,
             motion: None,
             watched: Vec::new(),
-            beams: 2,
-            ranges: vec![1.0, f64::INFINITY, 2.0, f64::NAN, 3.0, 5.0],
+            readings: Readings::in_memory(2, vec![1.0, f64::INFINITY, 2.0, f64::NAN, 3.0, 5.0]),
         };
         let s = pose.summarize();
         assert_eq!(

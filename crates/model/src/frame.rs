@@ -1,4 +1,4 @@
-//! Frames and poses: how they are named, written to files, and turned about small angles.
+//! Frames and poses: their names, their form in files, interpolation, and small rotations.
 //!
 //! `room_from_sensor * sensor_from_board` is `room_from_board`: the inner names cancel.
 
@@ -8,11 +8,11 @@ use serde::{Deserialize, Serialize};
 /// A rigid transform named `a_from_b`: it takes coordinates in frame b to coordinates in frame a.
 pub type Pose = Isometry3<f64>;
 
-/// A pose as files write it: metres and a unit quaternion, scalar last (the order of ROS messages).
+/// A pose as stored in files: meters and a unit quaternion, scalar last (the order of ROS messages).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PoseData {
-    /// Origin of b in frame a, in metres.
+    /// Origin of b in frame a, in meters.
     pub translation_m: [f64; 3],
     /// Rotation from b to a as a unit quaternion (x, y, z, w).
     pub rotation_xyzw: [f64; 4],
@@ -29,7 +29,7 @@ impl From<&Pose> for PoseData {
 }
 
 impl From<&PoseData> for Pose {
-    /// The quaternion is normalised, since files round it.
+    /// The quaternion is normalized because files round it.
     fn from(data: &PoseData) -> Self {
         let [x, y, z, w] = data.rotation_xyzw;
         Isometry3::from_parts(
@@ -39,26 +39,26 @@ impl From<&PoseData> for Pose {
     }
 }
 
-/// The turn by yaw about z, then pitch about the new y, then roll about the new x (3-2-1), angles in radians.
+/// The rotation by yaw about z, then pitch about the new y, then roll about the new x (3-2-1), angles in radians.
 ///
 /// Positive pitch lowers the x axis.
 pub fn yaw_pitch_roll(yaw: f64, pitch: f64, roll: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_euler_angles(roll, pitch, yaw)
 }
 
-/// The attitude part of the way from one to another along the shorter arc, at a constant rate (slerp).
+/// Spherical linear interpolation (slerp) between two attitudes along the shorter arc.
 ///
-/// `share` is 0 at `from` and 1 at `to`, and may lie beyond. Equal attitudes give exactly that attitude; of two that
-/// are half a turn apart, either arc may be taken.
+/// `share` is 0 at `from`, 1 at `to`, and may be outside of [0, 1]. Equal attitudes give exactly that attitude; between
+/// attitudes half a turn apart, either arc may be taken.
 pub fn slerp(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>, share: f64) -> UnitQuaternion<f64> {
     Arc::new(from, to).at(share)
 }
 
-/// The way of [`slerp`] between two attitudes, for many shares of it.
+/// The interpolation of [`slerp`] between two attitudes, for repeated evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Arc {
     from: UnitQuaternion<f64>,
-    /// Axis and angle of the turn; none between equal attitudes.
+    /// Axis and angle of the rotation; `None` between equal attitudes.
     turn: Option<(Option<Unit<Vector3<f64>>>, f64)>,
 }
 
@@ -72,7 +72,7 @@ impl Arc {
         }
     }
 
-    /// The attitude at a share of the way.
+    /// The attitude at a share of the arc.
     pub fn at(&self, share: f64) -> UnitQuaternion<f64> {
         let Some((axis, angle)) = &self.turn else {
             return self.from;
@@ -86,9 +86,9 @@ impl Arc {
 
 /// Two unit vectors `(across, up)` that span the plane perpendicular to a direction.
 ///
-/// `across` is horizontal and points to growing azimuth, `up` to growing elevation; `(direction, across, up)` is
-/// right-handed. Direction errors are counted along them: (cos φ·δθ, δφ). Straight up and down, where azimuth
-/// means nothing, `across` is the y axis.
+/// `across` is horizontal and points to increasing azimuth, `up` to increasing elevation; `(direction, across, up)` is
+/// right-handed. Direction errors are expressed along them: (cos φ·δθ, δφ). For vertical directions, whose azimuth is
+/// undefined, `across` is the y axis.
 pub fn tangent_basis(direction: &Unit<Vector3<f64>>) -> (Unit<Vector3<f64>>, Unit<Vector3<f64>>) {
     let horizontal = libm::hypot(direction.x, direction.y);
     let across = if horizontal > 0.0 {

@@ -1,17 +1,17 @@
 //! The vocabulary of a 2D LiDAR that sees in 3D through mirrors.
 //!
-//! A beam leaves the scanner at azimuth θ_b in the plane z = 0, meets a mirror at distance d and goes on in
-//! direction v; the reading it brings home from a board with plane (c, n) is (Cooper, Raquet, Patton 2018, Eq. 6)
+//! A beam leaves the scanner at azimuth θ_b in the plane z = 0, meets a mirror at distance d and continues in
+//! direction v; its reading of a board with plane (c, n) is (Cooper, Raquet, Patton 2018, Eq. (6))
 //!
 //! ```text
 //! r = d + s,   s = n·(c − P_L1) / (n·v),   P_L1 = d·(cos θ_b, sin θ_b, 0)
 //! v = (cos φ·cos(θ_b + θ_a), cos φ·sin(θ_b + θ_a), sin φ)
 //! ```
 //!
-//! This crate says what both the simulator and the estimator may know: it draws nothing at random and reads no
-//! file. The modules stand in the order in which light travels.
+//! This crate holds what both the simulator and the estimator may know: it has no randomness and reads no files. The
+//! modules are listed in the order in which light travels.
 //!
-//! Units are metres and radians, numbers are `f64`. Frames are right-handed with z up: `room` (motion capture),
+//! Units are meters and radians, numbers are `f64`. Frames are right-handed with z up: `room` (motion capture),
 //! `rig` (marker body on the superstructure), `sensor` (laser base frame, scan plane z = 0), `board` (target,
 //! plane z = 0) and `facet` (mirror, plane z = 0, reflecting side +z). A pose is named `a_from_b`.
 //!
@@ -37,11 +37,18 @@ pub mod cloud;
 pub mod dataset;
 pub mod error;
 pub mod frame;
+pub mod label;
 pub mod mirror;
 pub mod motion;
+pub mod mount;
 pub mod paper;
+pub mod place;
 pub mod range;
+pub mod readings;
+pub mod scan;
+pub mod selection;
 pub mod session;
+pub mod stop;
 pub mod summary;
 pub mod tracking;
 
@@ -51,15 +58,17 @@ pub use bias::{AngleBias, AngleTable, BiasTerms, ColorBias, DistanceBias, RangeB
 pub use board::{BoardPlane, Rectangle};
 pub use calibration::{BeamEstimate, Calibration, Status};
 pub use characterization::Characterization;
-pub use dataset::{
-    Dataset, Excerpt, PoseKind, PoseLabel, PoseRecord, SpotNote, Stretch, TestKind, TestNote, Track,
-    TrackedFrame,
-};
+pub use cloud::{CloudFrame, CloudPoint, PointCloud};
+pub use dataset::{Dataset, Excerpt, PoseRecord, Stretch};
 pub use error::ModelError;
 pub use frame::{Pose, PoseData};
+pub use label::{PoseKind, PoseLabel, SpotNote, TestKind, TestNote};
 pub use mirror::MirrorPlane;
 pub use motion::Motion;
 pub use range::{CorrectedRange, RawRange};
+pub use readings::{BeamStatistics, Gathered, Readings, ScanSource, Scans, Unreadable};
+pub use scan::{ScanAngles, ScanDirection, ScanError, ScanGeometry};
 pub use session::Session;
-pub use summary::{Summary, Window};
-pub use tracking::Watched;
+pub use stop::{Stop, Stopped};
+pub use summary::{Moments, Summary, Window};
+pub use tracking::{Track, TrackedFrame, Watched};

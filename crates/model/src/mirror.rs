@@ -1,7 +1,7 @@
-//! A plane mirror: reflection, and the deflection it gives to a beam of the scan plane.
+//! Plane mirrors: reflection, and the deflection of a beam in the scan plane.
 //!
-//! One facet {m·x = h} turns u into v = u − 2(m·u)m at distance d = h/(m·u): three numbers for all its beams.
-//! A facet tilted by e turns the beam by 2e.
+//! A facet {m·x = h} turns u into v = u − 2(m·u)m at distance d = h/(m·u): three numbers describe all its beams.
+//! Tilting a facet by e turns the beam by 2e.
 
 use crate::beam::Deflection;
 use nalgebra::{Point3, Unit, Vector3};
@@ -11,7 +11,7 @@ use nalgebra::{Point3, Unit, Vector3};
 pub struct MirrorPlane {
     /// Unit normal m on the reflecting side.
     pub normal: Unit<Vector3<f64>>,
-    /// Signed distance h of the plane from the origin along m, in metres.
+    /// Signed distance h of the plane from the origin along m, in meters.
     pub offset: f64,
 }
 
@@ -20,7 +20,7 @@ pub fn reflect(u: &Unit<Vector3<f64>>, m: &Unit<Vector3<f64>>) -> Unit<Vector3<f
     Unit::new_unchecked(u.into_inner() - m.into_inner() * (2.0 * m.dot(u)))
 }
 
-/// Normal of the mirror that turns u into v, on its reflecting side; `None` where v = u.
+/// Normal of the mirror that reflects u into v, on its reflecting side; `None` if v = u.
 pub fn normal_between(u: &Unit<Vector3<f64>>, v: &Unit<Vector3<f64>>) -> Option<Unit<Vector3<f64>>> {
     Unit::try_new(v.into_inner() - u.into_inner(), f64::EPSILON)
 }
@@ -34,10 +34,10 @@ impl MirrorPlane {
         }
     }
 
-    /// What the mirror does to a beam that leaves the origin in direction `u` of the plane z = 0.
+    /// The deflection of a beam that leaves the origin in direction `u` of the plane z = 0.
     ///
-    /// `None` if the beam does not meet the reflecting face. The mirror is taken as unbounded; the polygon of a
-    /// real facet is the tracer's affair.
+    /// `None` if the beam does not hit the reflecting face. The mirror is treated as unbounded; clipping to the polygon
+    /// of a real facet is up to the tracer.
     pub fn deflect(&self, u: Unit<Vector3<f64>>) -> Option<Deflection> {
         let facing = self.normal.dot(&u);
         let distance = self.offset / facing;
@@ -45,7 +45,7 @@ impl MirrorPlane {
             .then(|| Deflection::from_exit(libm::atan2(u.y, u.x), &reflect(&u, &self.normal), distance))
     }
 
-    /// The point mirrored in the plane.
+    /// The mirror image of a point.
     pub fn mirror_point(&self, point: &Point3<f64>) -> Point3<f64> {
         point - self.normal.into_inner() * (2.0 * (self.normal.dot(&point.coords) - self.offset))
     }

@@ -1,37 +1,37 @@
-//! Where the rig was while it moved: what motion capture saw of it during a flight, and in between.
+//! The trajectory of the rig during a flight: motion-capture frames, and interpolation between them.
 
 use crate::frame::{self, Pose};
 use nalgebra::Translation3;
 
-/// The rig as it was tracked during a stretch of scans in which it moved.
+/// The rig as tracked during a stretch of scans in which it moved.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {
     /// Time at which the first scan began, in seconds since the recording began.
     pub start_s: f64,
     /// Time from the start of one scan to the start of the next, in seconds.
     pub scan_period_s: f64,
-    /// Times of the frames in which the rig was solved, in seconds since the recording began and in their order, and
+    /// Times of the frames in which the rig was solved, in seconds since the recording began, ascending, with
     /// `room_from_rig` in each.
     pub frames: Vec<(f64, Pose)>,
 }
 
 impl Motion {
-    /// Time at which a beam of a scan is read, in seconds since the recording began: start + k·T + i·step.
+    /// Time at which a beam of a scan is read, in seconds since the recording began: start + k·T + i·beam time.
     ///
     /// ```
     /// use catoptric_model::Motion;
     /// let motion = Motion { start_s: 2.0, scan_period_s: 0.025, frames: Vec::new() };
     /// assert!((motion.time_s(4, 72, 0.025 / 1440.0) - 2.10125).abs() < 1e-15 * 4.0);
     /// ```
-    pub fn time_s(&self, scan: usize, beam: usize, step_period_s: f64) -> f64 {
-        self.start_s + (scan as f64 * self.scan_period_s + beam as f64 * step_period_s)
+    pub fn time_s(&self, scan: usize, beam: usize, beam_time_s: f64) -> f64 {
+        self.start_s + (scan as f64 * self.scan_period_s + beam as f64 * beam_time_s)
     }
 
-    /// `room_from_rig` at a time; `None` if the rig was never solved.
+    /// `room_from_rig` at a given time; `None` if the rig was never solved.
     ///
     /// Between two frames the position is linear in time and the attitude turns at a constant rate along the shorter
-    /// arc. Before the first frame and after the last the motion goes on as between the two nearest: a scan ends up to
-    /// one frame later than the last frame of its stretch. The only frame of all holds for ever.
+    /// arc. Before the first frame and after the last, the motion between the two nearest frames is extrapolated: a
+    /// scan ends up to one frame after the last frame of its stretch. A single frame holds for all times.
     pub fn room_from_rig(&self, time_s: f64) -> Option<Pose> {
         let (last, before) = self.frames.split_last()?;
         if before.is_empty() {
@@ -58,7 +58,7 @@ mod tests {
     use crate::frame::yaw_pitch_roll;
     use nalgebra::Point3;
 
-    /// 2 m/s along x and 1.5 rad/s about z, which the rule between frames reproduces exactly.
+    /// 2 m/s along x and 1.5 rad/s about z, which the interpolation reproduces exactly.
     fn truth(time_s: f64) -> Pose {
         Pose::from_parts(
             Translation3::new(2.0 * time_s - 1.0, 0.5, 1.8),
@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn uniform_motion_is_itself_between_frames_and_beyond_them() {
+    fn uniform_motion_is_exact_between_frames_and_beyond_them() {
         // A frame is missing at 0.02 s.
         let motion = motion(&[0.0, 0.01, 0.03, 0.04]);
         for time in [-0.005, 0.0, 0.003, 0.01, 0.0211, 0.04, 0.0437] {
@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn one_frame_holds_and_none_is_none() {
+    fn one_frame_holds_for_all_times_and_no_frame_gives_no_pose() {
         assert_eq!(motion(&[0.01]).room_from_rig(7.0), Some(truth(0.01)));
         assert_eq!(motion(&[]).room_from_rig(0.0), None);
     }

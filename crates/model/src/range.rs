@@ -1,22 +1,22 @@
-//! The range equation of a deflected beam, and what a reading can be.
+//! The range equation of a deflected beam, and the codes of readings that are not ranges.
 
 use crate::beam::Deflection;
 use crate::board::BoardPlane;
 use serde::{Deserialize, Serialize};
 
-/// A range as the scanner reports it, biases included, in metres.
+/// A range as the scanner reports it, including biases, in meters.
 ///
-/// The paper writes r(x̂) before and after Eq. 3; here the two are different types.
+/// The paper writes r(x̂) before and after Eq. (3); here these are different types.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Serialize, Deserialize)]
 pub struct RawRange(pub f64);
 
-/// A range after Eq. 3, biases subtracted, in metres.
+/// A range after Eq. (3), with biases subtracted, in meters.
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd, Serialize, Deserialize)]
 pub struct CorrectedRange(pub f64);
 
-/// Range of a deflected beam on a plane, in metres: r = d + s — Cooper, Eq. (6).
+/// Range of a deflected beam to a plane, in meters: r = d + s — Cooper, Eq. (6).
 ///
-/// `None` if the outgoing ray does not meet the plane.
+/// `None` if the outgoing ray does not hit the plane.
 #[doc(alias = "r")]
 pub fn predict(deflection: &Deflection, beam_azimuth: f64, board: &BoardPlane) -> Option<f64> {
     let s = board.distance_along(
@@ -26,11 +26,11 @@ pub fn predict(deflection: &Deflection, beam_azimuth: f64, board: &BoardPlane) -
     Some(deflection.distance + s)
 }
 
-/// How ROS writes a reading that is no range (REP-117): too close is −∞, no return is +∞, invalid is NaN.
+/// The ROS codes of a reading that is not a range (REP-117): too close is −∞, no return is +∞, invalid is NaN.
 pub const TOO_CLOSE: f64 = f64::NEG_INFINITY;
 /// No object, too far, or too dark.
 pub const NO_RETURN: f64 = f64::INFINITY;
-/// The scanner says the reading is not to be used.
+/// The scanner marks the reading as unusable.
 pub const INVALID: f64 = f64::NAN;
 
 #[cfg(test)]

@@ -1,19 +1,20 @@
-//! What the experimenter knows: everything a calibration may use besides the recorded readings.
+//! The experimenter's knowledge: everything a calibration may use besides the recorded readings.
 //!
-//! This is `session.toml`. It holds the nominal design, not the structure as built; the noise and bias the
-//! experimenter believes in, not the ones the sensor has. The truth is never here.
+//! This is `session.toml`. It holds the nominal design, not the structure as built, and the assumed noise and biases,
+//! not the actual ones. The truth is never here.
 
 use crate::bias::{DistanceBias, RangeBias};
 use crate::board::{BoardPlane, Rectangle};
 use crate::characterization::Characterization;
 use crate::frame::PoseData;
+use crate::scan::{ScanAngles, ScanDirection, ScanError, ScanGeometry};
 use nalgebra::{Point3, Unit, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Version of `session.toml`.
-pub const SCHEMA_VERSION: u32 = 1;
+pub const SCHEMA_VERSION: u32 = 2;
 
-/// Everything known before the first reading is looked at.
+/// Everything known before the first reading is analyzed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Session {
@@ -23,14 +24,14 @@ pub struct Session {
     pub name: String,
     /// The scanner's data sheet.
     pub scanner: ScannerSheet,
-    /// Where the drawing puts the sensor in the rig body.
+    /// Nominal pose of the sensor in the rig.
     pub nominal_rig_from_sensor: PoseData,
-    /// How far the sensor may be from where the drawing puts it.
+    /// Tolerance of that pose.
     pub mount_tolerance: MountTolerance,
-    /// The room the experiment stands in; `None` where there are no walls that were surveyed.
+    /// The room of the experiment; `None` if no walls were surveyed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub room: Option<RoomSurvey>,
-    /// What is believed about the errors.
+    /// The assumed errors.
     pub believed: Beliefs,
     /// Step 3: the bare structure, measured before the mirrors were attached.
     pub bare_structure: BareStructure,
@@ -44,34 +45,50 @@ pub struct Session {
     pub boards: Vec<BoardSheet>,
 }
 
-/// What the scanner's data sheet says.
+/// The scanner's data sheet.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(try_from = "FlatSheet", into = "FlatSheet")]
 pub struct ScannerSheet {
     /// Name of the preset.
     pub preset: String,
-    /// Beams of a scan; beam i points to (i − (beams − 1)/2)·step.
-    pub beams: usize,
-    /// Azimuth between neighbouring beams, in degrees.
-    pub step_deg: f64,
-    /// Scans per second.
-    pub scan_rate_hz: f64,
-    /// Shortest range, in metres.
+    /// Scan geometry.
+    pub scan: ScanGeometry,
+    /// Shortest range, in meters.
     pub range_min_m: f64,
-    /// Longest range, in metres.
+    /// Longest range, in meters.
     pub range_max_m: f64,
     /// Full 1/e² divergence of a beam along the longer axis of its spot, in milliradians.
     pub divergence_full_mrad: f64,
 }
 
-/// How far the optical frame may stand from its nominal place, 1σ of each axis; 0 for a place that is known, in the rig as
-/// tracked.
+/// The same as stored in `session.toml`. Entries missing in version 1 default to what all scanners had then: beams
+/// placed symmetrically about the x axis, counter-clockwise, spread evenly over the turn.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FlatSheet {
+    preset: String,
+    beams: usize,
+    step_deg: f64,
+    #[serde(default)]
+    first_deg: Option<f64>,
+    #[serde(default)]
+    direction: ScanDirection,
+    scan_rate_hz: f64,
+    #[serde(default)]
+    beam_time_us: Option<f64>,
+    range_min_m: f64,
+    range_max_m: f64,
+    divergence_full_mrad: f64,
+}
+
+/// Tolerance of the optical frame's nominal pose, 1σ for each axis; 0 if the pose in the rig is known
+/// exactly.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MountTolerance {
-    /// Turn about x, y and z, in degrees.
+    /// Rotation about x, y and z, in degrees.
     pub rotation_sd_deg: [f64; 3],
-    /// Shift along x, y and z, in millimetres.
+    /// Shift along x, y and z, in millimeters.
     pub translation_sd_mm: [f64; 3],
 }
 
@@ -79,47 +96,47 @@ pub struct MountTolerance {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RoomSurvey {
-    /// Corner with the smallest coordinates, in metres.
+    /// Corner with the smallest coordinates, in meters.
     pub min_m: [f64; 3],
-    /// Corner with the largest coordinates, in metres.
+    /// Corner with the largest coordinates, in meters.
     pub max_m: [f64; 3],
     /// Color of walls, floor and ceiling.
     pub color: String,
 }
 
-/// What the experimenter believes about the errors, from step 1 and from data sheets. Standard deviations are 1σ.
+/// The assumed errors, from step 1 and from data sheets. Standard deviations are 1σ.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Beliefs {
-    /// White noise of one reading, in millimetres.
+    /// White noise of one reading, in millimeters.
     pub range_noise_sd_mm: f64,
-    /// Drift constant of one pose, in millimetres.
+    /// Drift, constant over one pose, in millimeters.
     pub drift_sd_mm: f64,
-    /// Constant of one beam in one pose, in millimetres: what more readings do not average out.
+    /// Error of one beam, constant over one pose, in millimeters: not reduced by averaging readings.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub element_sd_mm: f64,
-    /// Constant error of one marker coordinate, in millimetres.
+    /// Error of one marker coordinate, constant over time, in millimeters.
     pub marker_sd_mm: f64,
-    /// The biases of step 1, as they were characterized.
+    /// The biases as characterized in step 1.
     pub bias: RangeBias,
-    /// Uncertainty of E_r at each node of its table, in millimetres.
+    /// Uncertainty of E_r at each node of its table, in millimeters.
     pub distance_bias_sd_mm: f64,
-    /// Uncertainty of A_a, in millimetres, with B_a + A_a (the error at normal incidence) held.
+    /// Uncertainty of A_a, in millimeters, with B_a + A_a (the error at normal incidence) held fixed.
     pub angle_gain_sd_mm: f64,
-    /// Uncertainty of E_c, in millimetres.
+    /// Uncertainty of E_c, in millimeters.
     pub color_bias_sd_mm: f64,
 }
 
-/// What is not believed in keeps out of files.
+/// Zero uncertainties are omitted from files.
 fn is_zero(sd: &f64) -> bool {
     *sd == 0.0
 }
 
 impl Beliefs {
-    /// What is believed once the bare sensor has been characterized.
+    /// The assumed errors after the bare sensor has been characterized.
     ///
-    /// The bias is the characterization's; each of its uncertainties is the root mean square over the numbers that have
-    /// it. Noise is that of the color the distance was tested in. What was not observed keeps what was believed before.
+    /// The bias is the characterization's; each uncertainty is the root mean square over the parameters it covers.
+    /// Noise is that of the color in which the distance was tested. Unobserved values keep their prior.
     #[must_use]
     pub fn after(&self, found: &Characterization) -> Self {
         let mut believed = Self {
@@ -134,7 +151,7 @@ impl Beliefs {
         if found.parameters.iter().any(|p| p.symbol == "E_r") {
             believed.distance_bias_sd_mm = found.typical_sd("E_r");
         } else {
-            // B_a holds the constant: a table of one node carries how well that is known.
+            // B_a holds the constant: a table of one node carries its uncertainty.
             believed.bias.distance = DistanceBias {
                 range_m: vec![1.0],
                 error_mm: vec![0.0],
@@ -154,31 +171,31 @@ impl Beliefs {
     }
 }
 
-/// Step 3: ranges to the structure before the mirrors were glued on.
+/// Step 3: ranges to the structure before the mirrors were attached.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BareStructure {
-    /// Thickness of the mirrors, in millimetres, along their normals.
+    /// Thickness of the mirrors along their normals, in millimeters.
     pub mirror_thickness_mm: f64,
-    /// Uncertainty of a bare distance, in millimetres.
+    /// Uncertainty of a bare distance, in millimeters.
     pub distance_sd_mm: f64,
-    /// Whether the scanner itself ranged them, in one recording: then they share its drift there, and what is not known of
-    /// the believed biases by which they are corrected. Both are part of the uncertainty.
+    /// Whether the scanner itself measured them, in one recording: then they share its drift there and the uncertainty
+    /// of the assumed biases that correct them. Both are part of the uncertainty.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub scanned: bool,
     /// First beam of `distance_m`.
     pub first_beam: usize,
-    /// Mean bias-corrected range of each beam to the bare structure, in metres; 0 where there is none.
+    /// Mean bias-corrected range of each beam to the bare structure, in meters; 0 if there is none.
     pub distance_m: Vec<f64>,
 }
 
-/// A labelled marker.
+/// A labeled marker.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Marker {
     /// Label.
     pub name: String,
-    /// Place in its body's frame, in millimetres.
+    /// Position in its body's frame, in millimeters.
     pub position_mm: [f64; 3],
 }
 
@@ -188,9 +205,9 @@ pub struct Marker {
 pub struct NominalFacet {
     /// Name.
     pub name: String,
-    /// Corners in the nominal sensor frame, in millimetres, counter-clockwise seen from the reflecting side.
+    /// Corners in the nominal sensor frame, in millimeters, counter-clockwise seen from the reflecting side.
     pub corners_mm: Vec<[f64; 3]>,
-    /// First and last beam that the drawing sends to this facet.
+    /// First and last beam that hit this facet, according to the drawing.
     pub beams: [usize; 2],
 }
 
@@ -200,9 +217,9 @@ pub struct NominalFacet {
 pub struct BoardSheet {
     /// Name, which is also the motion-capture subject.
     pub name: String,
-    /// Extent along the board's x axis, in millimetres.
+    /// Extent along the board's x axis, in millimeters.
     pub width_mm: f64,
-    /// Extent along the board's y axis, in millimetres.
+    /// Extent along the board's y axis, in millimeters.
     pub height_mm: f64,
     /// Color.
     pub color: String,
@@ -210,22 +227,53 @@ pub struct BoardSheet {
     pub markers: Vec<Marker>,
 }
 
-impl ScannerSheet {
-    /// Time between two beams of a scan, in seconds: the scanner turns once from one scan to the next.
-    pub fn step_period_s(&self) -> f64 {
-        self.step_deg / 360.0 / self.scan_rate_hz
+impl TryFrom<FlatSheet> for ScannerSheet {
+    type Error = ScanError;
+
+    fn try_from(flat: FlatSheet) -> Result<Self, ScanError> {
+        let centered = ScanAngles::centered(flat.step_deg, flat.beams);
+        let angles = ScanAngles {
+            first_deg: flat.first_deg.unwrap_or(centered.first_deg),
+            direction: flat.direction,
+            ..centered
+        };
+        Ok(Self {
+            preset: flat.preset,
+            scan: ScanGeometry::new(angles, flat.scan_rate_hz, flat.beam_time_us)?,
+            range_min_m: flat.range_min_m,
+            range_max_m: flat.range_max_m,
+            divergence_full_mrad: flat.divergence_full_mrad,
+        })
+    }
+}
+
+impl From<ScannerSheet> for FlatSheet {
+    fn from(sheet: ScannerSheet) -> Self {
+        let angles = *sheet.scan.angles();
+        Self {
+            preset: sheet.preset,
+            beams: angles.beams,
+            step_deg: angles.step_deg,
+            first_deg: Some(angles.first_deg),
+            direction: angles.direction,
+            scan_rate_hz: sheet.scan.scan_rate_hz(),
+            beam_time_us: Some(sheet.scan.beam_time_s() * 1e6),
+            range_min_m: sheet.range_min_m,
+            range_max_m: sheet.range_max_m,
+            divergence_full_mrad: sheet.divergence_full_mrad,
+        }
     }
 }
 
 impl Marker {
-    /// Place in its body's frame, in metres.
+    /// Position in its body's frame, in meters.
     pub fn position(&self) -> Point3<f64> {
         Point3::from(Vector3::from(self.position_mm) * 1e-3)
     }
 }
 
 impl NominalFacet {
-    /// Corners in the nominal sensor frame, in metres.
+    /// Corners in the nominal sensor frame, in meters.
     pub fn corners(&self) -> Vec<Point3<f64>> {
         self.corners_mm
             .iter()
@@ -233,24 +281,24 @@ impl NominalFacet {
             .collect()
     }
 
-    /// Normal on the reflecting side and centre of the corners; `None` for fewer than three corners or a line.
+    /// Normal on the reflecting side and center of the corners; `None` for fewer than three corners or a line.
     pub fn plane(&self) -> Option<BoardPlane> {
         let corners = self.corners();
-        // Newell's sum: exact for a plane polygon, the best plane's normal for one that is nearly so.
+        // Newell's sum: exact for a plane polygon, and the best-fit normal for a nearly plane one.
         let mut normal = Vector3::zeros();
         for (a, b) in corners.iter().zip(corners.iter().cycle().skip(1)) {
             normal += a.coords.cross(&b.coords);
         }
-        let centre = corners.iter().map(|c| c.coords).sum::<Vector3<f64>>() / corners.len() as f64;
+        let center = corners.iter().map(|c| c.coords).sum::<Vector3<f64>>() / corners.len() as f64;
         Some(BoardPlane::new(
-            Point3::from(centre),
+            Point3::from(center),
             Unit::try_new(normal, f64::MIN_POSITIVE)?,
         ))
     }
 }
 
 impl BoardSheet {
-    /// The board's outline, in metres.
+    /// The board's outline, in meters.
     pub fn outline(&self) -> Rectangle {
         Rectangle {
             width: self.width_mm * 1e-3,
@@ -260,7 +308,7 @@ impl BoardSheet {
 }
 
 impl RoomSurvey {
-    /// Distance along a ray from inside the room to its shell, and the normal met; `None` from outside.
+    /// Distance along a ray from inside the room to its walls, and the normal there; `None` from outside.
     pub fn cast(&self, origin: &Point3<f64>, direction: &Unit<Vector3<f64>>) -> Option<(f64, BoardPlane)> {
         let mut nearest: Option<(f64, BoardPlane)> = None;
         for axis in 0..3 {
@@ -282,7 +330,7 @@ impl RoomSurvey {
 }
 
 impl BareStructure {
-    /// Bare distance of a beam, in metres; `None` where the structure was not met.
+    /// Bare distance of a beam, in meters; `None` if the structure was not hit.
     pub fn distance(&self, beam: usize) -> Option<f64> {
         let d = *self.distance_m.get(beam.checked_sub(self.first_beam)?)?;
         (d > 0.0).then_some(d)

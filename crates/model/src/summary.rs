@@ -1,44 +1,55 @@
-//! Statistics of one beam's readings over a stretch, with or without those that are of something else.
+//! Statistics of one beam's readings over a stretch, with or without outliers.
 
-/// Standard deviations around the median that belong to the main body.
+/// Half-width of the main body around the median, in standard deviations.
 const WINDOW_SIGMAS: f64 = 5.0;
 
-/// Half of the window at least, in metres: readings come in whole millimetres.
+/// Minimum half-width of the window, in meters: readings are whole millimeters.
 const LEAST_WINDOW: f64 = 2e-3;
 
-/// Standard deviation of a normal variable over the median of its |x|.
+/// Ratio of the standard deviation of a normal variable to the median of its |x|.
 const NORMAL_OVER_MEDIAN: f64 = 1.482_6;
 
-/// Part of a beam's ranges that its main body needs at least.
+/// Minimum fraction of a beam's ranges in its main body.
 const MAJORITY: f64 = 0.6;
 
 /// Statistics of one beam over a stretch.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Summary {
-    /// Readings that are ranges.
+    /// Number of readings that are ranges.
     pub count: usize,
-    /// Readings that are not.
+    /// Number of readings that are not.
     pub missing: usize,
-    /// Ranges that are left out of the rest, since they are plainly of something else.
+    /// Number of ranges excluded from the statistics as clear outliers.
     pub outliers: usize,
-    /// Mean of the ranges, in metres; 0 without any.
+    /// Mean of the ranges, in meters; 0 without any.
     pub mean: f64,
-    /// Sample standard deviation, in metres; 0 for fewer than two.
+    /// Sample standard deviation, in meters; 0 for fewer than two.
     pub sd: f64,
 }
 
-/// The limits of the main body of some ranges, in metres.
+/// Count, mean and sum of squares of ranges that are added one at a time.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Moments {
+    /// Number of ranges added.
+    pub count: usize,
+    /// Their mean, in meters; 0 without any.
+    pub mean: f64,
+    /// The sum of their squared deviations from it, in m².
+    pub squares: f64,
+}
+
+/// The limits of the main body of a set of ranges, in meters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
-    /// The least range that belongs to it.
+    /// Smallest range in it.
     pub low: f64,
-    /// The largest.
+    /// Largest range in it.
     pub high: f64,
 }
 
 impl Window {
-    /// Five standard deviations, by the median deviation or as believed, around the median of the readings that are
-    /// ranges; `None` if none is.
+    /// Five standard deviations, from the median deviation or as assumed, around the median of the readings that are
+    /// ranges; `None` if there are no ranges.
     pub fn around(readings: impl Iterator<Item = f64>, noise_sd: f64) -> Option<Self> {
         let mut ranges: Vec<f64> = readings.filter(|r| r.is_finite()).collect();
         let middle = median(&mut ranges)?;
@@ -53,39 +64,45 @@ impl Window {
         })
     }
 
-    /// Half the width of a window for noise of a standard deviation, in metres.
+    /// Half-width of the window for noise of a given standard deviation, in meters.
     pub fn half_width(noise_sd: f64) -> f64 {
         LEAST_WINDOW + WINDOW_SIGMAS * noise_sd
     }
 
-    /// Whether a range belongs to it.
+    /// Whether a range is within the limits.
     pub fn holds(&self, range: f64) -> bool {
         (self.low..=self.high).contains(&range)
     }
 }
 
-impl Summary {
-    /// Takes a range in, by Welford's recurrence, in which `sd` holds the sum of squares until [`Summary::finished`]: the
-    /// naive sum loses the noise under the range.
+impl Moments {
+    /// Adds a range by Welford's recurrence: the naive sum of squares would lose the noise to rounding.
     pub fn add(&mut self, range: f64) {
         self.count += 1;
         let step = range - self.mean;
         self.mean += step / self.count as f64;
-        self.sd += step * (range - self.mean);
+        self.squares += step * (range - self.mean);
     }
 
-    /// The summary of all ranges that were taken in.
-    pub fn finished(mut self) -> Self {
-        self.sd = if self.count > 1 {
-            (self.sd / (self.count - 1) as f64).sqrt()
+    /// The summary of the ranges added.
+    pub fn summary(&self) -> Summary {
+        let sd = if self.count > 1 {
+            (self.squares / (self.count - 1) as f64).sqrt()
         } else {
             0.0
         };
-        self
+        Summary {
+            count: self.count,
+            mean: self.mean,
+            sd,
+            ..Summary::default()
+        }
     }
+}
 
-    /// Statistics of the main body of readings, all other ranges counted as outliers; `None` where no range is, or no
-    /// majority of them is together.
+impl Summary {
+    /// Statistics of the main body of readings; all other ranges count as outliers. `None` if there are no ranges, or
+    /// if no majority of them is close together.
     ///
     /// ```
     /// use catoptric_model::Summary;
@@ -97,18 +114,22 @@ impl Summary {
     /// ```
     pub fn of_main_body(readings: impl Iterator<Item = f64> + Clone, noise_sd: f64) -> Option<Self> {
         let window = Window::around(readings.clone(), noise_sd)?;
-        let mut found = Self::default();
+        let (mut body, mut missing, mut outliers) = (Moments::default(), 0, 0);
         for r in readings {
             if !r.is_finite() {
-                found.missing += 1;
+                missing += 1;
             } else if window.holds(r) {
-                found.add(r);
+                body.add(r);
             } else {
-                found.outliers += 1;
+                outliers += 1;
             }
         }
-        let all = (found.count + found.outliers) as f64;
-        (found.count as f64 >= MAJORITY * all).then(|| found.finished())
+        let all = (body.count + outliers) as f64;
+        (body.count as f64 >= MAJORITY * all).then(|| Self {
+            missing,
+            outliers,
+            ..body.summary()
+        })
     }
 }
 

@@ -1,12 +1,13 @@
-//! Logarithm, exponential and cosine of `libm`, many at a time, to the last bit.
+//! Logarithm, exponential and cosine of many numbers at once, bit for bit as in `libm`.
 //!
-//! The operations are those of `libm` in their order, with choices in place of its branches: the compiler makes vectors of
-//! loops over them. Each says which arguments it is for, and which are rare and left to `libm` itself.
+//! The operations are those of `libm` in the same order, with selections instead of its branches, so that the compiler
+//! vectorizes loops over them. Each function states which arguments it accepts, and which of them are rare and left to
+//! `libm` itself.
 
-/// Numbers that are worked on together.
+/// Number of values that are processed together.
 pub(crate) const LANES: usize = 8;
 
-/// `libm::exp` of a number that is not positive, and whether it is one of those from −746 to −700, which are left to `libm`.
+/// `libm::exp` of a number that is not positive, and whether the number is from −746 to −700, which is left to `libm`.
 #[inline(always)]
 pub(crate) fn exponential(x: f64) -> (f64, bool) {
     const LN2_HI: f64 = 6.931_471_803_691_238e-1;
@@ -19,9 +20,9 @@ pub(crate) fn exponential(x: f64) -> (f64, bool) {
         -1.653_390_220_546_525_2e-6,
         4.138_136_797_057_238_5e-8,
     ];
-    /// To which adding rounds a number to a whole one.
+    /// Adding this rounds a number to an integer.
     const ROUND: f64 = 6_755_399_441_055_744.0;
-    /// High words of ½·ln 2 and of 3/2·ln 2, and the one below which the result is 1 + x.
+    /// High words of ½·ln 2 and 3/2·ln 2, and of the number below which the result is 1 + x.
     const HALF: u64 = 0x3fd6_2e42;
     const THREE_HALVES: u64 = 0x3ff0_a2b2;
     const TINY: u64 = 0x3e30_0000;
@@ -30,7 +31,7 @@ pub(crate) fn exponential(x: f64) -> (f64, bool) {
     let size = -x;
     let beyond = |high: u64| size >= f64::from_bits(high << 32);
     let kept = if x < RARE_BELOW { RARE_BELOW } else { x };
-    // Cut towards zero, as a conversion to a whole number is.
+    // Truncated toward zero, like a conversion to an integer.
     let scaled = INVERSE_LN2 * kept - 0.5;
     let nearest = (scaled + ROUND) - ROUND;
     let cut = if nearest < scaled { nearest + 1.0 } else { nearest };
@@ -79,14 +80,15 @@ pub(crate) fn logarithm(x: f64) -> f64 {
     s * (half_square + r) + exponent * LN2_LO - half_square + f + exponent * LN2_HI
 }
 
-/// A whole number below 2⁵² as a floating-point number.
+/// An integer below 2⁵² as a floating-point number.
 #[inline(always)]
 fn small(number: u64) -> f64 {
     const UNIT: u64 = 0x4330_0000 << 32;
     f64::from_bits(number | UNIT) - 4_503_599_627_370_496.0
 }
 
-/// `libm::cos` of a number from 0 to 2π, and whether it is so near a multiple of π/2 that `libm` takes another way.
+/// `libm::cos` of a number from 0 to 2π, and whether it is so close to a multiple of π/2 that `libm` uses another
+/// method.
 #[inline(always)]
 pub(crate) fn cosine(x: f64) -> (f64, bool) {
     const PIO2_1: f64 = 1.570_796_326_734_125_6;
@@ -150,7 +152,7 @@ mod tests {
     fn exponentials_are_those_of_libm() {
         let mut arguments: Vec<f64> = (0..2_000_000).map(|i| -f64::from(i) * 4.1e-4).collect();
         arguments.extend((0..200_000).map(|i| -f64::from(i) * 1e-5));
-        // Around the places where it changes its way, bit by bit.
+        // Consecutive floating-point numbers around those where the method changes.
         for place in [
             0x3fd6_2e42_u64,
             0x3fd6_2e43,

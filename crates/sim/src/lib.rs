@@ -1,36 +1,22 @@
 //! The virtual laboratory: a 2D LiDAR with mirrors, target boards and motion capture, simulated ray by ray.
+//!
+//! The modules are listed here in the order in which a scene becomes data: what a person writes ([`scene`], [`check`]),
+//! surfaces ([`build`]), paths of light ([`light`]), the resulting readings ([`receive`]), the experiment
+//! ([`laboratory`]). Each uses the ones before it, and none that comes later.
 
-pub mod cast;
+pub mod build;
 pub mod check;
-pub mod color;
-pub mod detect;
-pub mod echo;
-pub mod error;
-pub mod footprint;
-pub mod glass;
+mod error;
 pub mod laboratory;
 mod lanes;
-pub mod layout;
-pub mod mesh;
-pub mod mocap;
+pub mod light;
 pub mod noise;
-pub mod optics;
-pub mod pattern;
-pub mod phase;
-pub mod placement;
-pub mod power;
-pub mod reading;
-pub mod scanner;
+pub mod receive;
 pub mod scene;
-pub mod spot;
-pub mod stage;
-pub mod structure;
 pub mod trace;
-pub mod trajectory;
-pub mod truth;
 
+pub use catoptric_cast::Mesh;
 pub use error::SimError;
 pub use laboratory::Laboratory;
-pub use mesh::{Mesh, Meshes};
-pub use scene::Scene;
-pub use truth::Truth;
+pub use laboratory::truth::{self, Truth};
+pub use scene::{Meshes, Scene};

@@ -1,21 +1,21 @@
-//! Any rays through a scene: the ways they go, vertex by vertex, in the room frame.
+//! Traces any rays through a scene: their paths, vertex by vertex, in the room frame.
 //!
-//! The structure around the scanner, if there is one, stands where it is as built under the scene's own seed; boards,
-//! which are in another place for every pose, are not there.
+//! The structure around the scanner, if there is one, is as built with the scene's own seed; boards, which have another
+//! pose in every stretch, are left out.
 
-use crate::color;
+use crate::build::color;
+use crate::build::room::room_from_rig;
+use crate::build::stage::Stage;
+use crate::build::structure::Structure;
 use crate::error::SimError;
-use crate::footprint::Ray;
 use crate::laboratory::wall_targets;
-use crate::optics::{Bounce, Course, End, Mirrors, Setting};
-use crate::placement;
+use crate::light::optics::{Bounce, Course, End, Mirrors, Setting};
 use crate::scene::Scene;
-use crate::stage::Stage;
-use crate::structure::Structure;
+use catoptric_cast::Ray;
 use catoptric_model::Pose;
 use nalgebra::{Point3, Unit, Vector3};
 
-/// What a scene holds for rays to meet.
+/// What a scene contains for rays to hit.
 pub struct Scenery {
     scene: Scene,
     /// Rays are cast in the sensor frame, or in the room's own if there is no sensor.
@@ -24,23 +24,23 @@ pub struct Scenery {
     stage: Stage,
 }
 
-/// Scenery with an index over it.
+/// A scenery with an index over it.
 pub struct Tracer<'a> {
     setting: Setting<'a>,
     room_from_frame: Option<Pose>,
     max_bounces: usize,
 }
 
-/// Where a ray meets a surface.
+/// Where a ray hits a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vertex {
     /// Index of the surface in [`Tracer::surfaces`].
     pub surface: usize,
-    /// The place, in the room frame.
+    /// The point, in the room frame.
     pub point: Point3<f64>,
-    /// Where the ray goes from here; `None` where it ends.
+    /// Direction in which the ray continues; `None` where it ends.
     pub direction: Option<Unit<Vector3<f64>>>,
-    /// Optical path from the ray's origin to here, in metres.
+    /// Optical path length from the ray's origin to here, in meters.
     pub path: f64,
 }
 
@@ -51,7 +51,7 @@ pub enum Fate {
     Hit,
     /// In the open, after its last vertex.
     Escaped,
-    /// Between mirrors after the last bounce allowed, or in the rim of a mirror's glass.
+    /// Between mirrors after the last bounce that is allowed, or in the rim of a mirror's glass.
     Trapped,
 }
 
@@ -59,13 +59,13 @@ impl Scenery {
     /// The scenery of a scene.
     ///
     /// # Errors
-    /// A mirror or surface without a shape, a mesh that nobody has read.
+    /// A mirror or surface without a shape; a mesh that has not been read.
     pub fn new(scene: &Scene) -> Result<Self, SimError> {
         let (structure, room_from_frame) = if scene.has_no_laboratory() {
             (Structure::empty(), None)
         } else {
             let structure = Structure::as_built(scene, scene.seed)?;
-            let pose = placement::room_from_rig(&scene.room) * structure.rig_from_sensor;
+            let pose = room_from_rig(&scene.room) * structure.rig_from_sensor;
             (structure, Some(pose))
         };
         let frame_from_room = room_from_frame.map_or_else(Pose::identity, |p| p.inverse());
@@ -77,10 +77,10 @@ impl Scenery {
         })
     }
 
-    /// The room with what stands in it, without the rig.
+    /// The room and everything fixed in it, without the rig.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// As for [`new`](Self::new).
     pub fn room(scene: &Scene) -> Result<Self, SimError> {
         Ok(Self {
             stage: Stage::new(scene, &Pose::identity())?,
@@ -90,7 +90,7 @@ impl Scenery {
         })
     }
 
-    /// Builds the index; a ray may meet `max_bounces` mirrors in a row.
+    /// Builds the index; a ray may hit at most `max_bounces` mirrors in succession.
     ///
     /// # Errors
     /// An unknown color.
@@ -118,12 +118,12 @@ impl Scenery {
 }
 
 impl Tracer<'_> {
-    /// Names of the surfaces; a vertex has the index of one.
+    /// Names of the surfaces, by the index that a vertex gives.
     pub fn surfaces(&self) -> Vec<&str> {
         self.setting.names()
     }
 
-    /// Follows a ray given in the room frame and appends the vertices of its way.
+    /// Follows a ray given in the room frame and appends the vertices of its path.
     ///
     /// A mirror behind glass has three: where the ray enters, the silver, and where it leaves.
     pub fn follow(&self, ray: &Ray, vertices: &mut Vec<Vertex>) -> Fate {

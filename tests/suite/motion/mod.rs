@@ -1,29 +1,30 @@
-//! Flights: the sensor moves while it scans, and every beam is cast from where it is at its own time.
+//! Flights: the sensor moves while it scans, and every beam is cast from the pose at its own time.
 //!
-//! Proven against closed forms and mirror images that know nothing of the tracer's frames: the range of each step's own
-//! time, with walls, mirrors and meshes; that a rig which hovers reads what one at rest does, to the bit; that the way
-//! through waypoints is smooth; that apply undoes the motion. Not proven is that a real rig's motion between two frames of
-//! motion capture is as smooth as these.
+//! Proven with closed forms and mirror images that are independent of the tracer's frames: each range is that of its
+//! step's own time, with walls, mirrors and meshes; a rig that hovers reads bit for bit what a rig at rest reads; the
+//! trajectory through waypoints is smooth; apply undoes the motion. Not proven is that the motion of a real rig between
+//! two motion-capture frames is as smooth as these.
 
 mod recorded;
-mod way;
+mod trajectory;
 
 use crate::common::{folder_with, run, stderr, stdout};
 use crate::scenes::{BARE, PROTOTYPE, TWO_MIRROR, scene, without_errors};
-use catoptric::apply::{CloudFrame, apply};
 use catoptric::calib::{self, Method, Options};
-use catoptric::io;
-use catoptric::io::scene::load;
+use catoptric::files;
+use catoptric::files::scene::load;
 use catoptric::model::calibration::{self, MountEstimate};
 use catoptric::model::frame::yaw_pitch_roll;
 use catoptric::model::{BeamEstimate, Calibration, Dataset, Pose, PoseData, PoseKind, Status, beam};
+use catoptric::sim::build::Trajectory;
 use catoptric::sim::laboratory::Returns;
-use catoptric::sim::optics::Role;
-use catoptric::sim::reading::Return;
+use catoptric::sim::light::Role;
+use catoptric::sim::receive::Return;
 use catoptric::sim::scene::{Attitude, ErrorModel, Flight, Waypoint};
-use catoptric::sim::trajectory::Trajectory;
 use catoptric::sim::truth::BeamClass;
 use catoptric::sim::{Laboratory, Scene};
+use catoptric::{CloudFrame, apply};
+use catoptric_fixtures::ust20lx;
 use nalgebra::{Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
@@ -60,7 +61,7 @@ fn flight_number(laboratory: &Laboratory) -> usize {
     laboratory.stretches() - 1
 }
 
-/// What every beam of every scan of the only flight meets.
+/// What every beam of every scan of the only flight hits.
 fn flown(laboratory: &Laboratory) -> Vec<Returns> {
     let number = flight_number(laboratory);
     let sight = laboratory.sight(number).unwrap();
@@ -95,7 +96,7 @@ fn walls(size_m: [f64; 3]) -> Vec<(Vector3<f64>, f64)> {
     ]
 }
 
-/// Planes of the room in the frame of a sensor at a place with an attitude.
+/// Planes of the room in the frame of a sensor at a position with an attitude.
 fn seen(
     planes: &[(Vector3<f64>, f64)],
     place: &Vector3<f64>,
@@ -107,7 +108,7 @@ fn seen(
         .collect()
 }
 
-/// Planes behind a mirror m·x = c, as the mirror shows them.
+/// Planes behind a mirror m·x = c, as seen in the mirror.
 fn mirrored(planes: &[(Vector3<f64>, f64)], (m, c): (&Vector3<f64>, f64)) -> Vec<(Vector3<f64>, f64)> {
     let planes = planes.iter();
     planes
@@ -115,7 +116,7 @@ fn mirrored(planes: &[(Vector3<f64>, f64)], (m, c): (&Vector3<f64>, f64)) -> Vec
         .collect()
 }
 
-/// Where a ray from the origin leaves a convex body.
+/// Distance at which a ray from the origin leaves a convex body.
 fn leaves(planes: &[(Vector3<f64>, f64)], direction: &Vector3<f64>) -> f64 {
     let ahead = planes.iter().filter(|(n, _)| n.dot(direction) > 0.0);
     ahead
@@ -123,14 +124,14 @@ fn leaves(planes: &[(Vector3<f64>, f64)], direction: &Vector3<f64>) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Compares every beam of every scan with the box of [`BARE`] seen from a closed form of the sensor's way.
-fn compare_with_room(laboratory: &Laboratory, way: impl Fn(f64) -> (Vector3<f64>, Matrix3<f64>)) {
+/// Compares every beam of every scan with the box of [`BARE`], given the sensor's trajectory in closed form.
+fn compare_with_room(laboratory: &Laboratory, trajectory: impl Fn(f64) -> (Vector3<f64>, Matrix3<f64>)) {
     let room = walls(laboratory.scene().room.size_m);
     let mut compared = 0;
     for (scan, returns) in flown(laboratory).iter().enumerate() {
         for (b, found) in returns.iter().enumerate() {
-            let (place, attitude) = way(time(scan, b));
-            let direction = beam::direction(beam::azimuth(b)).into_inner();
+            let (place, attitude) = trajectory(time(scan, b));
+            let direction = beam::direction(ust20lx::azimuth(b)).into_inner();
             let expected = leaves(&seen(&room, &place, &attitude), &direction);
             let found = found.as_ref().expect("the room is white and near");
             assert_eq!(found.role, Role::Wall);
@@ -142,10 +143,10 @@ fn compare_with_room(laboratory: &Laboratory, way: impl Fn(f64) -> (Vector3<f64>
             compared += 1;
         }
     }
-    assert!(compared >= 8 * beam::COUNT, "{compared}");
+    assert!(compared >= 8 * ust20lx::COUNT, "{compared}");
 }
 
-/// [`BARE`] with one thin ray for a beam, flying.
+/// [`BARE`] in flight, with one thin ray per beam.
 fn bare_flight(attitude: Attitude, waypoint: Vec<Waypoint>) -> Laboratory {
     let mut scene = scene(BARE);
     scene.scanner.sub_rays = 1;
@@ -170,7 +171,7 @@ fn past_oblique_walls_every_range_is_that_of_its_own_time() {
 }
 
 #[test]
-fn a_pure_turn_at_a_constant_rate_reads_its_closed_form() {
+fn a_pure_rotation_at_a_constant_rate_reads_its_closed_form() {
     let place = [0.7, -1.1, 1.2];
     for attitude in [Attitude::Slerp, Attitude::Squad] {
         // 300°/s about the vertical, at intervals of different lengths.
@@ -187,15 +188,15 @@ fn a_pure_turn_at_a_constant_rate_reads_its_closed_form() {
 }
 
 #[test]
-fn the_scene_past_a_wall_gives_what_its_first_comment_says() {
+fn the_scene_past_a_wall_gives_the_results_stated_in_its_first_comment() {
     let scene = load(&file("flight-past-a-wall"), &[]).unwrap();
     let laboratory = Laboratory::new(&scene, scene.seed).unwrap();
-    // Nothing but the flight: no structure to measure, no room to know.
+    // Only the flight: no structure to measure, no known room.
     assert_eq!((laboratory.stretches(), laboratory.scans()), (1, 40));
     let mut near = 0;
     for (scan, returns) in flown(&laboratory).iter().enumerate() {
         for (b, found) in returns.iter().enumerate() {
-            let (sin, cos) = libm::sincos(beam::azimuth(b));
+            let (sin, cos) = libm::sincos(ust20lx::azimuth(b));
             let ahead = (6.0 - 2.0 * time(scan, b)) / cos;
             let ranges = [1.5 / sin, ahead];
             let expected = ranges
@@ -220,7 +221,7 @@ fn the_scene_past_a_wall_gives_what_its_first_comment_says() {
 }
 
 #[test]
-fn the_scene_through_a_duct_gives_what_its_first_comment_says() {
+fn the_scene_through_a_duct_gives_the_results_stated_in_its_first_comment() {
     let scene = load(&file("flight-through-a-duct"), &[]).unwrap();
     let laboratory = Laboratory::new(&scene, scene.seed).unwrap();
     let mut near = 0;
@@ -228,7 +229,7 @@ fn the_scene_through_a_duct_gives_what_its_first_comment_says() {
         for (b, found) in returns.iter().enumerate() {
             let t = time(scan, b);
             let (x, roll) = (3.0 + t, (90.0 * t).to_radians());
-            let (sin, cos) = libm::sincos(beam::azimuth(b));
+            let (sin, cos) = libm::sincos(ust20lx::azimuth(b));
             let v = Vector3::new(cos, sin * libm::cos(roll), sin * libm::sin(roll));
             let side = |k: u32| {
                 let (sin, cos) = libm::sincos(f64::from(60 * k).to_radians());
@@ -252,8 +253,8 @@ fn the_scene_through_a_duct_gives_what_its_first_comment_says() {
     assert!(near > 24 * 900, "{near}");
 }
 
-/// A scene with everything around and before the sensor: mirrors with glass that scatter a little themselves, posts, and
-/// in the room mirrors, a box and a cylinder. All echoes are told, since a mirror's own comes first.
+/// A scene with everything around and in front of the sensor: glass mirrors that scatter a little, posts, and in the room
+/// mirrors, a box and a cylinder. All echoes are reported, since the mirror's own echo comes first.
 fn crowded() -> Scene {
     let mut scene = scene(PROTOTYPE);
     scene.superstructure.mirror.glass = Some(catoptric::sim::scene::Glass {
@@ -283,7 +284,7 @@ fn crowded() -> Scene {
 }
 
 #[test]
-fn a_rig_that_hovers_reads_what_one_at_rest_does_to_the_bit() {
+fn a_hovering_rig_reads_bit_for_bit_what_one_at_rest_does() {
     let mut scene = crowded();
     let [position, yaw] = [scene.room.rig_position_m, [scene.room.rig_yaw_deg, 0.0, 0.0]];
     for attitude in [Attitude::Slerp, Attitude::Squad] {
@@ -298,7 +299,7 @@ fn a_rig_that_hovers_reads_what_one_at_rest_does_to_the_bit() {
         let scans = flown(&laboratory);
         assert_eq!(scans.len(), 4);
         assert!(scans.iter().all(|returns| *returns == rest));
-        // What is compared holds structure, its mirrors, mirrors of the room behind them, walls and objects.
+        // The comparison covers the structure, its mirrors, room mirrors seen by them, walls and objects.
         let met = |role: Role| rest.iter().flatten().filter(|r| r.role == role).count();
         assert!(met(Role::Wall) > 100 && met(Role::Object) > 20 && met(Role::Structure) > 20);
         let own = scene.superstructure.facet.len();
@@ -315,26 +316,26 @@ fn a_rig_that_hovers_reads_what_one_at_rest_does_to_the_bit() {
     let room = laboratory.stretch(1).unwrap().ranges;
     let flight = laboratory.stretch(flight_number(&laboratory)).unwrap().ranges;
     let bits = |ranges: &[f64]| ranges.iter().map(|r| r.to_bits()).collect::<Vec<_>>();
-    for scan in flight.chunks(beam::COUNT) {
-        assert_eq!(bits(scan), bits(&room[..beam::COUNT]));
+    for scan in flight.chunks(ust20lx::COUNT) {
+        assert_eq!(bits(scan), bits(&room[..ust20lx::COUNT]));
     }
 }
 
-/// The two-mirror layout, as built, moving and turning about the vertical; the way of the rig in closed form.
+/// The two-mirror layout, as built, moving and rotating about the vertical; the trajectory of the rig in closed form.
 fn moving_mirrors() -> (Scene, impl Fn(f64) -> (Vector3<f64>, f64)) {
     let mut scene = without_errors(scene(TWO_MIRROR));
     let (start, velocity) = (Vector3::new(-0.9, -0.6, 1.7), Vector3::new(1.7, 1.0, 0.2));
     let (yaw, rate) = (-20.0, 120.0);
     let at = |t: f64| waypoint(t, (start + velocity * t).into(), [yaw + rate * t, 0.0, 0.0]);
     scene.flight = vec![flight(Attitude::Slerp, vec![at(0.0), at(0.11), at(0.2)])];
-    let way = move |t: f64| (start + velocity * t, (yaw + rate * t).to_radians());
-    (scene, way)
+    let trajectory = move |t: f64| (start + velocity * t, (yaw + rate * t).to_radians());
+    (scene, trajectory)
 }
 
-/// Compares beams that go by given mirrors with the walls as those mirrors show them; how many there are.
+/// Compares beams via given mirrors with the mirror images of the walls; returns their number.
 fn compare_with_images(
     laboratory: &Laboratory,
-    way: impl Fn(f64) -> (Vector3<f64>, f64),
+    trajectory: impl Fn(f64) -> (Vector3<f64>, f64),
     room: &[(Vector3<f64>, f64)],
     in_room: Option<(Vector3<f64>, f64)>,
 ) -> usize {
@@ -354,7 +355,7 @@ fn compare_with_images(
             if rest != expected_way {
                 continue;
             }
-            let (place, yaw) = way(time(scan, b));
+            let (place, yaw) = trajectory(time(scan, b));
             let rig = matrix(yaw, 0.0, 0.0);
             let place = place + rig * mount.translation.vector;
             let attitude = rig * turn;
@@ -365,7 +366,7 @@ fn compare_with_images(
             }
             let facet = &truth.facets[*first];
             let planes = mirrored(&planes, (&Vector3::from(facet.normal), facet.offset_m));
-            let direction = beam::direction(beam::azimuth(b)).into_inner();
+            let direction = beam::direction(ust20lx::azimuth(b)).into_inner();
             let expected = leaves(&planes, &direction);
             assert!(
                 (found.range() - expected).abs() < 1e-12,
@@ -379,17 +380,17 @@ fn compare_with_images(
 }
 
 #[test]
-fn mirrors_move_along() {
-    let (scene, way) = moving_mirrors();
+fn mirrors_move_with_the_rig() {
+    let (scene, trajectory) = moving_mirrors();
     let laboratory = Laboratory::new(&scene, 3).unwrap();
-    let compared = compare_with_images(&laboratory, way, &walls(scene.room.size_m), None);
+    let compared = compare_with_images(&laboratory, trajectory, &walls(scene.room.size_m), None);
     assert!(compared > 8 * 200, "{compared}");
 }
 
 #[test]
-fn a_moving_mirror_and_one_that_stands_still_take_turns() {
-    let (mut scene, way) = moving_mirrors();
-    // All over the floor, tilted by some degrees, and clear of it.
+fn a_moving_and_a_fixed_mirror_reflect_alternately() {
+    let (mut scene, trajectory) = moving_mirrors();
+    // All over the floor, tilted by a few degrees, and not touching it.
     let mirror = "{ name = \"floor\", position_m = [0, 0, 0.5], yaw_deg = 25, pitch_deg = 6, roll_deg = -4,
                     shape.rectangle = { width_m = 3.0, height_m = 2.6 } }";
     scene.room.mirror = toml::from_str::<catoptric::sim::scene::Room>(&format!("mirror = [{mirror}]"))
@@ -398,7 +399,7 @@ fn a_moving_mirror_and_one_that_stands_still_take_turns() {
     let normal = matrix(25.0_f64.to_radians(), 6.0_f64.to_radians(), -4.0_f64.to_radians()) * Vector3::z();
     let plane = (normal, 0.5 * normal.z);
     let laboratory = Laboratory::new(&scene, 3).unwrap();
-    let compared = compare_with_images(&laboratory, way, &walls(scene.room.size_m), Some(plane));
+    let compared = compare_with_images(&laboratory, trajectory, &walls(scene.room.size_m), Some(plane));
     assert!(compared > 400, "{compared}");
 }
 
@@ -480,7 +481,7 @@ proptest! {
         let there = flown(&Laboratory::new(&other, 2).unwrap());
         let (mut compared, mut torn) = (0, 0);
         for (a, b) in here.iter().flatten().zip(there.iter().flatten()) {
-            // A ray that grazes an edge may fall to either side.
+            // A ray that grazes an edge may hit either side.
             match (a, b) {
                 (Some(a), Some(b)) if (a.role, &a.facets) == (b.role, &b.facets) && (a.range() - b.range()).abs() < 1e-9 => compared += 1,
                 (None, None) => {}

@@ -1,6 +1,7 @@
-//! Flights as they are recorded, told by the truth, refused, and put into the room by `apply`.
+//! Flights as recorded, listed in the truth, refused, and lifted into the room by `apply`.
 
 use super::*;
+use catoptric_fixtures::ust20lx;
 
 #[test]
 fn threads_and_order_change_nothing() {
@@ -35,7 +36,7 @@ fn threads_and_order_change_nothing() {
         assert_eq!(again.0.tracks, stretch.tracks);
         assert_eq!(again.1, scans);
     }
-    // A scan alone is the scan in turn, and no two are alike.
+    // A scan recorded alone equals the scan in sequence, and all scans differ.
     let laboratory = Laboratory::new(&scene, 11).unwrap();
     let sight = laboratory.sight(flight_number(&laboratory)).unwrap();
     assert_eq!(sight.returns(4), scans[4]);
@@ -43,8 +44,8 @@ fn threads_and_order_change_nothing() {
 }
 
 #[test]
-fn truth_and_motion_capture_tell_where_the_rig_was() {
-    let (scene, way) = moving_mirrors();
+fn truth_and_motion_capture_report_where_the_rig_was() {
+    let (scene, trajectory) = moving_mirrors();
     let laboratory = Laboratory::new(&scene, 3).unwrap();
     let number = flight_number(&laboratory);
     let truth = laboratory.truth().unwrap();
@@ -57,7 +58,7 @@ fn truth_and_motion_capture_tell_where_the_rig_was() {
             .all(|p| p.room_from_sensor.is_empty())
     );
     let rig = |t: f64| {
-        let (place, yaw) = way(t);
+        let (place, yaw) = trajectory(t);
         Pose::from_parts(Translation3::from(place), yaw_pitch_roll(yaw, 0.0, 0.0))
     };
     let off = |a: &Pose, b: &Pose| {
@@ -66,7 +67,7 @@ fn truth_and_motion_capture_tell_where_the_rig_was() {
     for (scan, pose) in flown.room_from_sensor.iter().enumerate() {
         assert!(off(&Pose::from(pose), &(rig(time(scan, 0)) * mount)) < 1e-12);
     }
-    // Frames every 10 ms from the start of the flight on, exact with the ideal profile.
+    // Frames every 10 ms from the start of the flight, exact with the ideal profile.
     let stretch = laboratory.stretch(number).unwrap();
     let frames = &stretch.tracks[0].frames;
     assert_eq!(frames.len(), 20);
@@ -78,14 +79,16 @@ fn truth_and_motion_capture_tell_where_the_rig_was() {
     assert_eq!(motion.frames.len(), 20);
 }
 
-/// A calibration that knows a scanner without mirrors and where it sits.
+/// A calibration for a scanner without mirrors, with its mounting.
 fn undeflected(rig_from_sensor: Pose) -> Calibration {
     let mount = PoseData::from(&rig_from_sensor);
     Calibration {
         schema_version: calibration::SCHEMA_VERSION,
         method: "known".to_owned(),
         frame: "sensor".to_owned(),
-        beams: (0..beam::COUNT)
+        scanner: None,
+        dataset: None,
+        beams: (0..ust20lx::COUNT)
             .map(|b| BeamEstimate::without_angles(b, Status::Direct, None))
             .collect(),
         facets: Vec::new(),
@@ -114,7 +117,7 @@ fn dataset_of_flight(laboratory: &Laboratory) -> Dataset {
 
 #[test]
 fn apply_puts_every_reading_of_a_flight_onto_the_walls() {
-    // Uniform motion, so that the rule between two frames of motion capture is the truth itself.
+    // Uniform motion, so that interpolation between motion-capture frames is exact.
     let at = |t: f64| {
         waypoint(
             t,
@@ -134,13 +137,13 @@ fn apply_puts_every_reading_of_a_flight_onto_the_walls() {
             CloudFrame::Room,
         )
         .unwrap();
-        assert_eq!(cloud.points.len(), 8 * beam::COUNT);
+        assert_eq!(cloud.points.len(), 8 * ust20lx::COUNT);
         let off = cloud.points.iter().map(|p| off_planes(&room, &p.position));
         off.fold(0.0, f64::max)
     };
-    // The last steps lie beyond the last frame.
+    // The last steps are after the last frame.
     assert!(worst(&dataset) < 1e-12, "{}", worst(&dataset));
-    // Were the rig where it was first seen, points would be off by decimetres.
+    // If the rig had stayed at its first pose, points would be off by decimeters.
     let mut frozen = dataset.clone();
     frozen.poses[number].motion = None;
     assert!(worst(&frozen) > 0.1, "{}", worst(&frozen));
@@ -165,13 +168,13 @@ fn calibrations_are_not_made_from_flights() {
     assert_eq!(a, b);
     assert!(a.beams.iter().filter(|b| b.status == Status::Solved).count() > 200);
     let score = |d: &Dataset| {
-        let score = catoptric::score::score(d, &a, None);
+        let score = catoptric::score::score(d, &a, None).expect("in memory");
         serde_json::to_value(&score).unwrap()
     };
     assert_eq!(score(&without), score(&with));
 }
 
-/// Distance of a point from the nearest surface of the scene `flight`, in metres.
+/// Distance of a point from the nearest surface of the scene `flight`, in meters.
 fn off_furniture(scene: &Scene, p: &Point3<f64>) -> f64 {
     use catoptric::sim::scene::SurfaceShape;
     let mut off = off_planes(&walls(scene.room.size_m), p);
@@ -192,7 +195,7 @@ fn off_furniture(scene: &Scene, p: &Point3<f64>) -> f64 {
                 let along = q.z.abs() - 0.5 * shape.height_m;
                 (libm::hypot(radial.max(0.0), along.max(0.0)) + radial.max(along).min(0.0)).abs()
             }
-            // The tent: four slopes from a square of 1.2 m to a point at 0.9 m, on the floor.
+            // The tent: four slopes from a square of 1.2 m on the floor to a point at 0.9 m.
             SurfaceShape::Mesh(_) => {
                 let slope = libm::hypot(0.6, 0.9);
                 let side = q.x.abs().max(q.y.abs());
@@ -229,14 +232,14 @@ fn a_calibrated_rig_maps_a_furnished_room_in_flight() {
         quantile(99)
     );
     assert!(off.len() > 100_000, "{}", off.len());
-    // Range noise of 4.5 mm, and E_a, which apply cannot take off, of up to some centimetres at grazing incidence.
+    // Range noise of 4.5 mm, and E_a, which apply cannot subtract, of up to some centimeters at grazing incidence.
     assert!(
         quantile(50) < 10.0 && quantile(90) < 40.0,
         "{} {}",
         quantile(50),
         quantile(90)
     );
-    // Furniture is there: points on none of the walls.
+    // Furniture is present: points on none of the walls.
     let room = walls(scene.room.size_m);
     let inside = cloud
         .points
@@ -246,7 +249,7 @@ fn a_calibrated_rig_maps_a_furnished_room_in_flight() {
 }
 
 #[test]
-fn a_flight_is_recorded_applied_and_told_by_the_program() {
+fn a_flight_is_recorded_applied_and_reported_by_the_program() {
     let folder = tempfile::tempdir().unwrap();
     let scene = file("flight");
     let scene = scene.to_str().unwrap();
@@ -271,12 +274,12 @@ fn a_flight_is_recorded_applied_and_told_by_the_program() {
     }
     let output = run(folder.path(), &arguments);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    let dataset = io::read_dataset(&folder.path().join("set")).unwrap();
+    let dataset = files::read_dataset(&folder.path().join("set")).unwrap();
     let flown = dataset.poses.last().unwrap();
     assert_eq!((flown.label.kind, flown.label.scans), (PoseKind::Flight, 5));
     assert_eq!(flown.label.flight.as_deref(), Some("over the furniture"));
     let motion = flown.motion.as_ref().unwrap();
-    // 125 ms at 100 Hz, fewer only for frames in which a marker too many dropped out.
+    // 125 ms at 100 Hz, minus frames with too many dropped markers.
     assert!(
         motion.frames.len() >= 11 && motion.frames.len() <= 12,
         "{}",
@@ -346,7 +349,7 @@ fn a_flight_is_recorded_applied_and_told_by_the_program() {
 }
 
 #[test]
-fn flights_that_cannot_be_are_refused_where_they_stand() {
+fn impossible_flights_are_refused_with_their_location() {
     let base = format!("{BARE}\n[[flight]]\nname = \"f\"\n");
     let two = "waypoint = [\n  { time_s = 1, position_m = [0, 0, 1] },\n  { time_s = 2, position_m = [1, 0, 1] },\n]\n";
     let cases = [
@@ -369,7 +372,7 @@ fn flights_that_cannot_be_are_refused_where_they_stand() {
         (
             two.replace("[1, 0, 1] }", "[1, 0, 1], yaw_deg = 180 }"),
             "flight[0].waypoint[1]",
-            "which way round",
+            "the direction of the turn is ambiguous",
         ),
         (
             two.replace("[1, 0, 1]", "[7, 0, 1]"),
@@ -396,7 +399,7 @@ fn flights_that_cannot_be_are_refused_where_they_stand() {
         assert!(said.contains(key) && said.contains(needed), "{text}\n{said}");
         assert!(said.contains("scene.toml:"), "{said}");
     }
-    // Markers are needed to know where it was.
+    // Markers are needed to track the rig.
     let text = format!("{base}{two}")
         .replace("[superstructure]", "[superstructure]\n#")
         .replace("\"b\"", "\"a\"");

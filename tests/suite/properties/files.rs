@@ -1,15 +1,15 @@
-//! What is written is read back the same, bit by bit where the format has all bits.
+//! Files round-trip: data are read back as written, bit for bit where the format stores all bits.
 
 use super::cases;
 use crate::scenes::layouts;
-use catoptric::io::{mesh, npy, rays, scene};
-use catoptric::model::{BeamEstimate, Calibration, Status};
+use catoptric::files::{mesh, npy, rays, scene};
+use catoptric::model::{BeamEstimate, Calibration, ScanAngles, Status};
 use catoptric::sim::Mesh;
 use nalgebra::Point3;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-/// Any finite number: subnormal, huge and −0 as well.
+/// Any finite number, including subnormal, huge and −0.
 fn any_number() -> impl Strategy<Value = f64> {
     prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL | prop::num::f64::ZERO | prop::num::f64::NEGATIVE
 }
@@ -22,7 +22,7 @@ proptest! {
     #![proptest_config(cases(100))]
 
     #[test]
-    fn scenes_survive_toml(scene in layouts(), seed: u32) {
+    fn scenes_round_trip_through_toml(scene in layouts(), seed: u32) {
         let mut scene = scene;
         scene.seed = u64::from(seed);
         let text = scene::to_toml(&scene).expect("it is a scene");
@@ -32,7 +32,7 @@ proptest! {
     }
 
     #[test]
-    fn calibrations_survive_json(
+    fn calibrations_round_trip_through_json(
         beams in vec((0..1081_usize, 0..6_usize, any_number(), any_number(), [any_number(), any_number()]), 0..20),
         name in ".{0,12}",
     ) {
@@ -47,6 +47,8 @@ proptest! {
             schema_version: 1,
             method: name.clone(),
             frame: "sensor".to_owned(),
+            scanner: Some(ScanAngles::centered(0.352, 682)),
+            dataset: Some(name.clone()),
             beams: beams.collect(),
             facets: Vec::new(),
             rig_from_sensor: None,
@@ -54,7 +56,7 @@ proptest! {
             warnings: Vec::new(),
             assessment: None,
         };
-        let text = serde_json::to_string(&calibration).expect("all is finite");
+        let text = serde_json::to_string(&calibration).expect("all values are finite");
         let back: Calibration = serde_json::from_str(&text).expect("our own");
         let numbers = |c: &Calibration| -> Vec<f64> {
             let of_beam = |b: &BeamEstimate| [b.azimuth_rad, b.elevation_rad, b.covariance_rad2.map(|c| c[0][1])];
@@ -65,7 +67,7 @@ proptest! {
     }
 
     #[test]
-    fn meshes_survive_ply(vertices in vec([any_number(), any_number(), any_number()], 3..30), picks in vec([0..1000_usize, 0..1000, 0..1000], 1..30)) {
+    fn meshes_round_trip_through_ply(vertices in vec([any_number(), any_number(), any_number()], 3..30), picks in vec([0..1000_usize, 0..1000, 0..1000], 1..30)) {
         let index = |i: usize| u32::try_from(i % vertices.len()).expect("few");
         let triangles = picks.iter().map(|t| t.map(index)).collect();
         let mesh = Mesh::new(vertices.iter().copied().map(Point3::from).collect(), triangles).expect("finite");

@@ -1,11 +1,11 @@
-//! Reflections, deflections, and the ways of rays under motions and in any order of the surfaces.
+//! Reflections, deflections, and ray paths under motions and in any order of the surfaces.
 
 use super::{cases, direction, vector};
 use crate::scenes::scene;
+use catoptric::cast::Ray;
 use catoptric::model::frame::yaw_pitch_roll;
 use catoptric::model::{BoardPlane, Deflection, MirrorPlane, Pose, PoseData, beam, cloud, mirror, range};
 use catoptric::sim::Scene;
-use catoptric::sim::footprint::Ray;
 use catoptric::sim::scene::{PlanePolygon, PlaneShape, RoomBox, RoomMirror, RoomSurface, SurfaceShape};
 use catoptric::sim::trace::{Fate, Scenery, Vertex};
 use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -34,13 +34,13 @@ proptest! {
         let once = mirror::reflect(&u, &m);
         let twice = mirror::reflect(&once, &m);
         prop_assert!((twice.into_inner() - u.into_inner()).norm() < 2e-15);
-        // Equal angles, and what lies in the plane of the mirror is kept.
+        // Equal angles, and the component in the plane of the mirror is preserved.
         prop_assert!((once.dot(&m) + u.dot(&m)).abs() < 1e-15);
         prop_assert!((once.cross(&m) - u.cross(&m)).norm() < 1e-15);
     }
 
     #[test]
-    fn a_mirror_turned_by_e_turns_the_ray_by_2_e(u in direction(), m in direction(), e in 1e-6..0.5_f64) {
+    fn rotating_a_mirror_by_e_rotates_the_ray_by_2_e(u in direction(), m in direction(), e in 1e-6..0.5_f64) {
         prop_assume!(u.cross(&m).norm() > 0.1);
         let axis = Unit::new_normalize(u.cross(&m));
         let turned = UnitQuaternion::from_axis_angle(&axis, e) * m;
@@ -56,7 +56,7 @@ proptest! {
         let at = Point3::from(u.into_inner() * to_mirror);
         let end = at + mirror::reflect(&u, &plane.normal).into_inner() * s;
         let image = plane.mirror_point(&end);
-        // The image is straight ahead, as far as the folded path is long; 20 m have 4e-15 m of rounding each.
+        // The image is straight ahead, at the length of the folded path; 20 m have 4e-15 m of rounding each.
         prop_assert!((image - u.into_inner() * (to_mirror + s)).coords.norm() < 5e-14);
         prop_assert!((plane.mirror_point(&image) - end).norm() < 5e-14);
     }
@@ -77,9 +77,9 @@ proptest! {
         prop_assume!(board.normal.dot(&exit).abs() > 0.2);
         let Some(r) = range::predict(&deflection, azimuth, &board) else { return Ok(()) };
         let point = cloud::lift(&deflection, azimuth, r);
-        // A tilt to 0.2 and paths to 35 m make rounding a few times 1e-14.
+        // A tilt of up to 0.2 and paths of up to 35 m make rounding errors a few times 1e-14.
         prop_assert!(board.normal.dot(&(point - board.point)).abs() < 5e-14);
-        // Folded open the point is on the beam, at its range.
+        // Unfolded, the point is on the beam, at its range.
         prop_assert!((plane.mirror_point(&point) - u.into_inner() * r).coords.norm() < 5e-14);
     }
 
@@ -103,7 +103,7 @@ proptest! {
     }
 }
 
-/// A square at a place, seen along its normal, as corners.
+/// A square at a position, facing along its normal, as corners.
 fn square(center: Vector3<f64>, normal: &Unit<Vector3<f64>>, half: f64) -> Vec<[f64; 3]> {
     let across = Unit::new_normalize(normal.cross(&Vector3::new(0.3, -0.5, 0.8)));
     let (x, y) = (across.into_inner() * half, normal.cross(&across) * half);
@@ -130,7 +130,7 @@ fn place() -> impl Strategy<Value = Place> {
 }
 
 impl Place {
-    /// The scene after a motion, its parts in an order that begins at a number.
+    /// The scene after a motion, with its parts in an order that starts at a given number.
     fn scene(&self, motion: &Pose, first: usize) -> Scene {
         let mut scene: Scene = scene("schema_version = 1\nname = \"place\"\n");
         let moved = |corners: Vec<[f64; 3]>| PlanePolygon {
@@ -189,8 +189,8 @@ impl Place {
     }
 }
 
-/// The vertices of a ray's way, with the names of the surfaces.
-fn way(scene: &Scene, ray: &Ray) -> (Vec<(String, Vertex)>, Fate) {
+/// The vertices of a ray's path, with the names of the surfaces.
+fn path(scene: &Scene, ray: &Ray) -> (Vec<(String, Vertex)>, Fate) {
     let scenery = Scenery::new(scene).expect("it has shapes");
     let tracer = scenery.tracer(20).expect("colors are built in");
     let names = tracer.surfaces();
@@ -209,16 +209,16 @@ proptest! {
     #![proptest_config(cases(300))]
 
     #[test]
-    fn ways_move_with_the_scene(place in place(), motion in pose(), from in vector(), to in direction()) {
+    fn paths_move_with_the_scene(place in place(), motion in pose(), from in vector(), to in direction()) {
         let ray = Ray { origin: Point3::from(from * 0.4 + Vector3::repeat(0.35)), direction: to };
         let moved = Ray { origin: motion * ray.origin, direction: motion * ray.direction };
-        let (before, fate) = way(&place.scene(&Pose::identity(), 0), &ray);
-        let (after, fate_after) = way(&place.scene(&motion, 0), &moved);
+        let (before, fate) = path(&place.scene(&Pose::identity(), 0), &ray);
+        let (after, fate_after) = path(&place.scene(&motion, 0), &moved);
         prop_assert_eq!(fate, fate_after);
         prop_assert_eq!(before.len(), after.len());
         for ((name, v), (other, w)) in before.iter().zip(&after) {
             prop_assert_eq!(name, other);
-            // Coordinates of up to 10 m are rounded to 2e-15 m at every step, and a bounce doubles what an angle is off.
+            // Coordinates of up to 10 m are rounded to 2e-15 m at every step, and a bounce doubles an angular error.
             prop_assert!((motion * v.point - w.point).norm() < 1e-13, "{} against {}", v.point, w.point);
             prop_assert!((v.path - w.path).abs() < 1e-13);
         }
@@ -227,11 +227,11 @@ proptest! {
     #[test]
     fn the_order_of_surfaces_changes_no_bit(place in place(), first in 1..30_usize, from in vector(), to in direction()) {
         let ray = Ray { origin: Point3::from(from * 0.4 + Vector3::repeat(0.35)), direction: to };
-        let (before, fate) = way(&place.scene(&Pose::identity(), 0), &ray);
-        let (after, fate_after) = way(&place.scene(&Pose::identity(), first), &ray);
+        let (before, fate) = path(&place.scene(&Pose::identity(), 0), &ray);
+        let (after, fate_after) = path(&place.scene(&Pose::identity(), first), &ray);
         prop_assert_eq!(fate, fate_after);
-        let plain = |way: Vec<(String, Vertex)>| -> Vec<_> {
-            way.into_iter().map(|(name, v)| (name, v.point, v.direction, v.path)).collect()
+        let plain = |path: Vec<(String, Vertex)>| -> Vec<_> {
+            path.into_iter().map(|(name, v)| (name, v.point, v.direction, v.path)).collect()
         };
         prop_assert_eq!(plain(before), plain(after));
     }
@@ -239,7 +239,7 @@ proptest! {
 
 #[test]
 fn the_random_places_have_chains_in_them() {
-    // What the two properties above are about is not empty.
+    // The two properties above are not vacuous.
     use proptest::strategy::ValueTree;
     use proptest::test_runner::TestRunner;
     let mut runner = TestRunner::new(cases(1));
@@ -253,7 +253,7 @@ fn the_random_places_have_chains_in_them() {
             origin: Point3::from(drawn.1 * 0.4 + Vector3::repeat(0.35)),
             direction: drawn.2,
         };
-        let (met, _) = way(&drawn.0.scene(&Pose::identity(), 0), &ray);
+        let (met, _) = path(&drawn.0.scene(&Pose::identity(), 0), &ray);
         lengths[met.len().min(3)] += 1;
     }
     assert!(

@@ -1,12 +1,12 @@
-//! Footprints, Eq. 1, glass, error tables, and the keyed draws.
+//! Footprints, Eq. (1), glass, error tables, and the keyed draws.
 
 use super::{cases, direction, vector};
 use catoptric::model::beam;
 use catoptric::model::bias::{interpolate, interpolation_weights};
-use catoptric::sim::footprint::{self, ENERGY_INSIDE, SubRay, sub_rays};
-use catoptric::sim::glass;
+use catoptric::sim::light::footprint::{self, ENERGY_INSIDE, SubRay, sub_rays};
+use catoptric::sim::light::glass;
+use catoptric::sim::light::power::{Illumination, received};
 use catoptric::sim::noise::{Draws, Purpose};
-use catoptric::sim::power::{Illumination, received};
 use catoptric::sim::scene::{BeamShape, Glass, Light};
 use nalgebra::Unit;
 use proptest::collection::vec;
@@ -17,12 +17,12 @@ proptest! {
     #![proptest_config(cases(300))]
 
     #[test]
-    fn a_bundle_of_any_count_has_the_beams_energy_and_moments(count in 1..5000_usize) {
+    fn sub_rays_of_any_count_have_the_energy_and_moments_of_the_beam(count in 1..5000_usize) {
         let rays = sub_rays(count);
         prop_assert_eq!(rays.len(), count);
         let sum = |f: &dyn Fn(&SubRay) -> f64| rays.iter().map(|r| r.weight * f(r)).sum::<f64>();
         prop_assert!(rays.iter().all(|r| r.weight > 0.0));
-        // Thousands of numbers are summed.
+        // The tolerance allows for summing thousands of numbers.
         prop_assert!((sum(&|_| 1.0) - 1.0).abs() < 1e-12);
         prop_assert!(sum(&|r| r.wide).abs() < 1e-12 && sum(&|r| r.narrow).abs() < 1e-12);
         if count >= 7 {
@@ -37,7 +37,7 @@ proptest! {
     }
 
     #[test]
-    fn a_sub_ray_on_the_contour_is_half_the_full_angle_off(
+    fn a_sub_ray_on_the_contour_is_off_axis_by_half_the_full_angle(
         wide_full_mrad in 0.1..50.0_f64, narrow_full_mrad in 0.1..50.0_f64, azimuth in -2.35..2.35_f64, turns: bool,
     ) {
         let shape = BeamShape {
@@ -48,7 +48,7 @@ proptest! {
             let angle = beam::angle_between(&edge.direction, &beam::direction(azimuth));
             prop_assert!((angle - 0.5e-3 * full).abs() < 1e-15);
         }
-        // The spot turns with the azimuth and keeps its shape.
+        // The spot rotates with the azimuth and keeps its shape.
         let at = |azimuth: f64| footprint::ray(&shape, azimuth, &SubRay { wide: 1.0, narrow: 0.0, weight: 1.0 });
         let rise = at(azimuth).direction.z / libm::tan(0.5e-3 * wide_full_mrad) * (1.0
             + libm::tan(0.5e-3 * wide_full_mrad) * libm::tan(0.5e-3 * wide_full_mrad)).sqrt();
@@ -78,7 +78,7 @@ proptest! {
         prop_assert!(near(ratio(&wider, on), k * k));
         let hazy = Light { air_transmission: 0.5, ..light.clone() };
         prop_assert!(near(ratio(&hazy, on), 0.25));
-        // Parts of a spot add up.
+        // Parts of a spot are additive.
         let part = |share: f64| ratio(&light, Illumination { share: 0.7 * share, ..on });
         prop_assert!((part(share) + part(1.0 - share) - 1.0).abs() < 2e-15);
     }
@@ -97,11 +97,11 @@ proptest! {
         prop_assert!((found.path - 2.0 * index * t / libm::cos(inside)).abs() < 1e-13 * found.path / libm::cos(inside));
         let walk = across.into_inner() * (2.0 * t * libm::tan(inside));
         prop_assert!((found.walk - walk).norm() < 1e-13 * (t + found.walk.norm()) / libm::cos(inside));
-        // Down to the silver, and half of the way along.
+        // To the silvering, and half of the path along the plate.
         prop_assert!((found.to_silver - (walk * 0.5 - m.into_inner() * t)).norm() < 1e-13 * (t + walk.norm()) / libm::cos(inside));
         prop_assert!((0.0..=1.0).contains(&found.fresnel));
         if index > 1.01 && incidence < FRAC_PI_2 - 0.1 {
-            // Fresnel's two polarizations in angles; head on their limit.
+            // Fresnel's equations for the two polarizations in angles; at normal incidence their limit.
             let (s, d) = (incidence + inside, incidence - inside);
             let square = |x: f64| x * x;
             let expected = if incidence < 1e-3 {
@@ -136,7 +136,7 @@ proptest! {
         }
         prop_assert_eq!(interpolate(&nodes, &values, first - 1.0), values[0]);
         prop_assert_eq!(interpolate(&nodes, &values, last + 1.0), values[values.len() - 1]);
-        // A line is interpolated exactly; steps of a hundredth cost two digits.
+        // A straight line is interpolated exactly; steps of a hundredth cost two digits.
         let line: Vec<f64> = nodes.iter().map(|n| slope * n).collect();
         prop_assert!((interpolate(&nodes, &line, x) - slope * x.clamp(first, last)).abs() < 1e-14);
     }

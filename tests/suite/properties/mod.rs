@@ -1,7 +1,7 @@
-//! What must hold for any input: properties of every closed form, on random cases that are the same on every run.
+//! Properties that must hold for any input: every closed form on random cases that are the same in every run.
 //!
-//! Each tolerance is a small multiple of the rounding of 64-bit floats in the numbers that it is about, unless the test
-//! says otherwise. A property does not prove a value: the values are proven where the closed forms are tested one by one.
+//! Each tolerance is a small multiple of the rounding of 64-bit floats at the magnitudes involved, unless the test says
+//! otherwise. A property does not prove a value: values are proven where the closed forms are tested individually.
 
 mod files;
 mod geometry;
@@ -12,7 +12,7 @@ mod waveform;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-/// Random cases, the same on every run: a failure is a change of ours.
+/// Random cases, the same in every run: a failure is due to a change of the code.
 fn cases(cases: u32) -> ProptestConfig {
     ProptestConfig {
         cases,
@@ -32,7 +32,7 @@ fn vector() -> impl Strategy<Value = nalgebra::Vector3<f64>> {
     [unit(), unit(), unit()].prop_map(nalgebra::Vector3::from)
 }
 
-/// A direction: not even over the sphere, but every one can come.
+/// A direction: not uniform on the sphere, but every direction is possible.
 fn direction() -> impl Strategy<Value = nalgebra::Unit<nalgebra::Vector3<f64>>> {
     vector().prop_filter_map("a vector of no length", |v| nalgebra::Unit::try_new(v, 0.1))
 }

@@ -1,13 +1,13 @@
-//! What detectors make of any pulses, ranging by phase, and what is reported.
+//! Detectors on any pulses, ranging by phase, and reported readings.
 
 use super::cases;
 use crate::scenes::{BARE, scene};
 use catoptric::model::BiasTerms;
-use catoptric::sim::detect::{self, Pulse};
-use catoptric::sim::echo::{Echo, Receiver};
-use catoptric::sim::optics::Role;
-use catoptric::sim::phase;
-use catoptric::sim::reading::{Chance, Return, Sensor};
+use catoptric::sim::light::Role;
+use catoptric::sim::receive::detect::{self, Pulse};
+use catoptric::sim::receive::echo::{Echo, Receiver};
+use catoptric::sim::receive::phase;
+use catoptric::sim::receive::{RandomEffects, Return, Sensor};
 use catoptric::sim::scene::{Detector, ErrorModel};
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -46,7 +46,7 @@ fn places(echoes: &[Echo]) -> Vec<f64> {
     echoes.iter().map(|e| e.place).collect()
 }
 
-/// Largest difference; infinite if there are not as many.
+/// Largest difference; infinite if the counts differ.
 fn apart(a: &[f64], b: &[f64]) -> f64 {
     if a.len() != b.len() {
         return f64::INFINITY;
@@ -64,7 +64,7 @@ proptest! {
             let before = receiver.echoes(&pulses, 1.0);
             let after = receiver.echoes(&moved(&pulses, shift, 1.0), 1.0);
             let expected: Vec<f64> = places(&before).iter().map(|p| p + shift).collect();
-            // A place is bisected until 1e-14 m; 28 m are rounded to 4e-15 m each time.
+            // A range is bisected to 1e-14 m; 28 m are rounded to 4e-15 m each time.
             prop_assert!(apart(&places(&after), &expected) < 1e-12, "{:?}", detector);
         }
         let edge = |pulses: &[Pulse]| detect::leading_edge(pulses, sd, 1.0).map(|e| e.crossing);
@@ -75,7 +75,7 @@ proptest! {
     }
 
     #[test]
-    fn only_a_fixed_threshold_knows_how_bright_it_is(pulses in pulses(), sd in 0.05..0.5_f64, gain in 1.0..100.0_f64) {
+    fn only_a_fixed_threshold_depends_on_brightness(pulses in pulses(), sd in 0.05..0.5_f64, gain in 1.0..100.0_f64) {
         for detector in [Detector::ConstantFraction, Detector::Peak, Detector::Centroid] {
             let receiver = receiver(detector, sd);
             let before = receiver.echoes(&pulses, 0.1);
@@ -85,7 +85,7 @@ proptest! {
     }
 
     #[test]
-    fn one_pulse_is_read_as_its_closed_form(range in 0.5..30.0_f64, power in 1.001..1e6_f64, sd in 0.02..0.5_f64, fraction in 0.05..0.95_f64) {
+    fn one_pulse_is_read_as_in_its_closed_form(range in 0.5..30.0_f64, power in 1.001..1e6_f64, sd in 0.02..0.5_f64, fraction in 0.05..0.95_f64) {
         let pulse = [Pulse { range, power }];
         let walk = sd * (2.0 * libm::log(power)).sqrt();
         let edge = detect::leading_edge(&pulse, sd, 1.0).expect("it is bright enough");
@@ -107,11 +107,11 @@ proptest! {
     }
 
     #[test]
-    fn two_equal_pulses_are_told_apart_as_their_width_says(sd in 0.05..0.5_f64, power in 1.5..200.0_f64, widths in 0.1..6.0_f64) {
+    fn two_equal_pulses_are_separated_depending_on_their_width(sd in 0.05..0.5_f64, power in 1.5..200.0_f64, widths in 0.1..6.0_f64) {
         let distance = widths * sd;
         let pair = [Pulse { range: 2.0, power }, Pulse { range: 2.0 + distance, power }];
-        // Half-way between the two the waveform is 2A·exp(−d²/8σ²); from a separation of 2.4σ on its tops are where the
-        // pulses are to within 0.1σ, and a full width at half maximum is 2.355σ.
+        // Halfway between the two the waveform is 2A·exp(−d²/8σ²); from a separation of 2.4σ on, its peaks are those
+        // of the pulses to within 0.1σ, and a full width at half maximum is 2.355σ.
         let valley = 2.0 * power * libm::exp(-widths * widths / 8.0);
         prop_assume!(!(2.3..2.6).contains(&widths));
         for detector in DETECTORS {
@@ -120,7 +120,7 @@ proptest! {
                 Detector::ConstantFraction => valley / (0.5 * power),
                 Detector::Peak | Detector::Centroid => 0.0,
             };
-            // A top is a little higher than A by the other pulse's tail: not decided within 15 %.
+            // A peak is slightly higher than A due to the tail of the other pulse: not decided within 15 %.
             if (0.85..1.15).contains(&below) {
                 continue;
             }
@@ -129,7 +129,7 @@ proptest! {
             prop_assert_eq!(found.len(), expected, "{:?} at {} widths: {:?}", detector, widths, found);
             let middle = 2.0 + 0.5 * distance;
             if expected == 2 && matches!(detector, Detector::Peak | Detector::Centroid) {
-                // Alike but for their order.
+                // Identical except for their order.
                 prop_assert!((found[0].place + found[1].place - 2.0 * middle).abs() < 1e-12);
             } else if expected == 1 && detector == Detector::Centroid {
                 prop_assert!((found[0].place - middle).abs() < 1e-12);
@@ -146,7 +146,7 @@ proptest! {
         prop_assert!(phase::wrap(range, ambiguity).abs() <= 0.5 * ambiguity * (1.0 + 1e-15));
         let sum = |pulses: &[Pulse]| phase::sum(pulses, ambiguity).expect("there is light");
         prop_assert_eq!(sum(&pulses[..1]).range, phase::fold(range, ambiguity));
-        // The sum of the phasors, from the range 0 on.
+        // The sum of the phasors, from range 0 on.
         let wave = std::f64::consts::TAU / ambiguity;
         let (x, y) = pulses.iter().fold((0.0, 0.0), |(x, y), p| {
             (x + p.power * libm::cos(wave * p.range), y + p.power * libm::sin(wave * p.range))
@@ -154,7 +154,7 @@ proptest! {
         let found = sum(&pulses);
         let length = libm::hypot(x, y);
         prop_assert!((found.amplitude - length).abs() < 1e-12);
-        // Where the phasors nearly cancel their direction is worth as little as their length.
+        // Where the phasors nearly cancel, the accuracy of their phase decreases with their length.
         let worth = 1e-13 * (1.0 + pulses.iter().map(|p| p.power).sum::<f64>() / length);
         let expected = libm::atan2(y, x) / wave;
         prop_assert!(phase::wrap(found.range - expected, ambiguity).abs() < ambiguity * worth);
@@ -165,7 +165,7 @@ proptest! {
     }
 
     #[test]
-    fn a_reading_is_the_nearest_step_or_a_code(
+    fn a_reading_is_the_nearest_multiple_of_the_resolution_or_a_code(
         range in 0.0..25.0_f64, step_mm in 0.1..20.0_f64, noise_sd in 0.0..0.02_f64, noise in -4.0..4.0_f64,
         offsets in [-0.01..0.01_f64, -0.01..0.01, -0.01..0.01, -0.01..0.01], dropout in 0.0..1.0_f64,
     ) {
@@ -190,7 +190,7 @@ proptest! {
             others: Vec::new(),
         };
         let [drift, warm_up, correlated, interference] = offsets;
-        let chance = Chance {
+        let effects = RandomEffects {
             drift,
             element: 0.0,
             warm_up,
@@ -200,7 +200,7 @@ proptest! {
             dropout,
             detection: [0.5; 8],
         };
-        let reading = sensor.read(Some(&found), &chance);
+        let reading = sensor.read(Some(&found), &effects);
         let exact = range + offsets.iter().sum::<f64>() + noise_sd * noise;
         let step = step_mm * 1e-3;
         if dropout < 0.1 {
@@ -211,15 +211,15 @@ proptest! {
             let steps = reading / step;
             prop_assert!((steps - steps.round()).abs() < 1e-12);
         } else {
-            // Only what rounds beyond a limit is a code, and the right one.
+            // Only a value that rounds beyond a limit is a code, and the correct one.
             let beyond = if reading > 0.0 { exact + 0.5 * step > 20.0 } else { exact - 0.5 * step < 0.021 };
             prop_assert!(beyond, "{} for {}", reading, exact);
         }
         // One echo or no echo: both outputs say the same.
-        let all = sensor.read_all(Some(&found), &chance);
+        let all = sensor.read_all(Some(&found), &effects);
         prop_assert_eq!(all.first().copied().unwrap_or(f64::NAN).to_bits(), reading.to_bits());
-        // Nothing by chance makes a range of what is none.
-        prop_assert_eq!(sensor.read(None, &chance), f64::INFINITY);
-        prop_assert!(sensor.read_all(None, &chance).is_empty());
+        // No random effect turns an invalid reading into a range.
+        prop_assert_eq!(sensor.read(None, &effects), f64::INFINITY);
+        prop_assert!(sensor.read_all(None, &effects).is_empty());
     }
 }

@@ -1,10 +1,10 @@
-//! The closed path of detection against the general one: the same bits.
+//! The closed-form detection compared with the general one: the same bits.
 //!
-//! The general path is written out here as it is defined: steps of a quarter of σ, each interval halved until it is
-//! nothing, every exponential by `libm`. It knows nothing of roots found otherwise.
+//! The general algorithm is implemented here by its definition: steps of a quarter of σ, each interval bisected to the
+//! end, every exponential by `libm`. It is independent of other root finders.
 
 use super::cases;
-use catoptric::sim::detect::{self, Edge, Pulse, walk};
+use catoptric::sim::receive::detect::{self, Edge, Pulse, walk};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -34,7 +34,7 @@ fn halve(mut no: f64, mut yes: f64, holds: impl Fn(f64) -> bool) -> f64 {
     }
 }
 
-/// The leading edge as it is defined.
+/// The leading edge by its definition.
 fn defined(pulses: &[Pulse], sd: f64, threshold: f64) -> Option<Edge> {
     let total: f64 = pulses.iter().map(|p| p.power).sum();
     if total < threshold || pulses.is_empty() {
@@ -81,8 +81,8 @@ fn same(pulses: &[Pulse], sd: f64, threshold: f64) -> Result<(), TestCaseError> 
     Ok(())
 }
 
-/// Light of one place: so many sub-rays, over a part of σ.
-fn bundle(spread: f64) -> impl Strategy<Value = Vec<Pulse>> {
+/// Light of one place: some sub-rays, spread over a fraction of σ.
+fn sub_rays(spread: f64) -> impl Strategy<Value = Vec<Pulse>> {
     let sub_ray = (0.0..1.0_f64, 0.5..1.5_f64);
     (0.1..60.0_f64, vec(sub_ray, 1..40)).prop_map(move |(range, sub_rays)| {
         let pulse = |(place, power)| Pulse {
@@ -96,23 +96,23 @@ fn bundle(spread: f64) -> impl Strategy<Value = Vec<Pulse>> {
 proptest! {
     #![proptest_config(cases(3000))]
 
-    /// One plane: from all sub-rays at one range to a third of σ, from bright to just not seen.
+    /// One plane: all sub-rays within a range of zero to a third of σ, from bright to barely not detected.
     #[test]
-    fn the_common_beam_has_every_bit(pulses in bundle(0.08), share in 1e-5..1.02_f64) {
+    fn the_common_beam_is_bit_identical(pulses in sub_rays(0.08), share in 1e-5..1.02_f64) {
         let total: f64 = pulses.iter().map(|p| p.power).sum();
         same(&pulses, 0.25, total * share)?;
     }
 
     #[test]
-    fn sub_rays_at_one_range_have_every_bit(pulses in bundle(0.0), share in 1e-5..1.02_f64) {
+    fn sub_rays_at_one_range_are_bit_identical(pulses in sub_rays(0.0), share in 1e-5..1.02_f64) {
         let total: f64 = pulses.iter().map(|p| p.power).sum();
         same(&pulses, 0.25, total * share)?;
     }
 
-    /// Two places, near and far from each other, each with its own brightness.
+    /// Two places, near and far from each other, with different brightness.
     #[test]
-    fn mixed_beams_have_every_bit(
-        near in bundle(0.05), far in bundle(0.3), apart in 0.0..3.0_f64, gain in 0.01..100.0_f64, level in 0.001..50.0_f64
+    fn mixed_beams_are_bit_identical(
+        near in sub_rays(0.05), far in sub_rays(0.3), apart in 0.0..3.0_f64, gain in 0.01..100.0_f64, level in 0.001..50.0_f64
     ) {
         let base = near[0].range - far[0].range + apart;
         let moved = far.iter().map(|p| Pulse { range: p.range + base, power: p.power * gain });
@@ -120,9 +120,9 @@ proptest! {
         same(&pulses, 0.25, level)?;
     }
 
-    /// Nothing is common to these.
+    /// Pulses with nothing in common.
     #[test]
-    fn any_pulses_have_every_bit(
+    fn any_pulses_are_bit_identical(
         pulses in vec((0.05..200.0_f64, 1e-3..1e3_f64), 0..12), sd in 0.01..2.0_f64, level in 1e-3..1e3_f64
     ) {
         let pulses: Vec<Pulse> = pulses.into_iter().map(|(range, power)| Pulse { range, power }).collect();

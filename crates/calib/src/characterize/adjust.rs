@@ -2,30 +2,30 @@
 
 use super::design::Design;
 use crate::error::CalibError;
-use crate::mount_data::{DirectBoard, Selector};
-use crate::pose::{motion_between, moved};
+use crate::mount::mount_data::{DirectBoard, Selector};
+use crate::mount::pose::{motion_between, moved};
 use catoptric_model::calibration::MountEstimate;
 use catoptric_model::characterization::Fit;
 use catoptric_model::{Pose, PoseData, Session};
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 
-/// A step of the mounting shorter than this, in metres and radians alike, ends the iteration.
+/// A step of the mounting shorter than this, in meters and in radians, ends the iteration.
 const STEP_TOLERANCE: f64 = 1e-12;
 
-/// Steps, at most: the problem is nearly linear.
+/// Maximum number of steps: the problem is nearly linear.
 const MAX_STEPS: usize = 30;
 
-/// A pivot of the scaled normal matrix below this is a combination that the boards leave open.
-const LEAST_PIVOT: f64 = 1e-10;
+/// Pivot of the scaled normal matrix below which the boards leave a combination open.
+const MIN_PIVOT: f64 = 1e-10;
 
-/// What is known of the mounting before a board is looked at.
+/// What is known of the mounting before any board is read.
 pub(super) struct Prior {
     nominal: Pose,
-    /// 1σ of each motion, three shifts and three turns; 0 where it is known exactly.
+    /// 1σ of each motion, three shifts and three rotations; 0 for one that is known exactly.
     sd: Vector6<f64>,
 }
 
-/// Mounting and biases as they came out.
+/// The estimated mounting and biases.
 pub(super) struct Adjustment {
     pub(super) rig_from_sensor: Pose,
     /// In the order of the design's terms.
@@ -36,7 +36,7 @@ pub(super) struct Adjustment {
 }
 
 impl Prior {
-    /// The drawing's tolerance, and how well motion capture knows the rig.
+    /// The drawing's tolerance, and the uncertainty of the rig in motion capture.
     pub(super) fn of(session: &Session) -> Self {
         let markers: Vec<Vector3<f64>> = session.rig_markers.iter().map(|m| m.position().coords).collect();
         let count = markers.len().max(1) as f64;
@@ -48,7 +48,7 @@ impl Prior {
             if motion < 3 {
                 libm::hypot(tolerance.translation_sd_mm[axis] * 1e-3, marker / count.sqrt())
             } else {
-                // A turn about an axis moves the markers by their distance from it.
+                // A rotation about an axis moves the markers by their distance from it.
                 let lever = |m: &Vector3<f64>| (m - center).norm_squared() - (m - center)[axis].powi(2);
                 let levers = markers.iter().map(lever).sum::<f64>();
                 let tracked = if levers > 0.0 { marker / levers.sqrt() } else { 0.0 };
@@ -63,7 +63,7 @@ impl Prior {
 }
 
 impl Adjustment {
-    /// The mounting as files hold it.
+    /// The mounting in the form of the files.
     pub(super) fn mount(&self) -> MountEstimate {
         let data = PoseData::from(&self.rig_from_sensor);
         let c = &self.mount_covariance;
@@ -77,7 +77,7 @@ impl Adjustment {
     }
 }
 
-/// Adjusts the mounting, from `start` on, and the numbers of a design to chosen readings.
+/// Adjusts the mounting, from `start` on, and the numbers of a design to selected readings.
 ///
 /// # Errors
 /// [`CalibError::Characterization`] without readings, or if they leave a combination of the numbers open.
@@ -108,7 +108,7 @@ pub(super) fn adjust(
                 continue;
             };
             let rows = block.sightings.len();
-            // Columns: the free motions, the terms, and what is left without any bias.
+            // Columns: the free motions, the terms, and the residuals without any bias.
             let mut system = DMatrix::zeros(rows, width + 1);
             for (column, motion) in free.iter().enumerate() {
                 system.set_column(column, &block.jacobian.column(*motion));
@@ -137,8 +137,8 @@ pub(super) fn adjust(
         let scaled = DMatrix::from_diagonal(&scale) * &normal * DMatrix::from_diagonal(&scale);
         let factor = scaled
             .cholesky()
-            .filter(|c| c.l_dirty().diagonal().iter().all(|p| p * p > LEAST_PIVOT))
-            .ok_or_else(|| fail("the boards do not tell the distance, angle and color errors apart"))?;
+            .filter(|c| c.l_dirty().diagonal().iter().all(|p| p * p > MIN_PIVOT))
+            .ok_or_else(|| fail("the boards do not separate the distance, angle and color errors"))?;
         let covariance = DMatrix::from_diagonal(&scale) * factor.inverse() * DMatrix::from_diagonal(&scale);
         let solution = &covariance * &right;
         let mut motion = Vector6::zeros();

@@ -1,7 +1,7 @@
-//! Does the cosine law of Eq. 4 describe the angle test? A table of incidences on top of the law tells.
+//! Does the cosine law of Eq. (4) describe the angle test? Answered by a table of incidences added to the law.
 //!
-//! With the law held, E_a gets a free value at every incidence that was tested. If the law is right, χ² falls by as much
-//! as χ² with (incidences − 2) degrees of freedom does by chance.
+//! With the law held fixed, E_a gets a free value at every incidence that was tested. If the law is right, the decrease
+//! of χ² is distributed as χ² with (incidences − 2) degrees of freedom.
 
 use super::adjust::Adjustment;
 use super::design::{Design, Term, grouped, mean};
@@ -9,16 +9,16 @@ use crate::error::CalibError;
 use catoptric_model::TestKind;
 use catoptric_model::characterization::{Fit, MisfitRow, StretchRow};
 
-/// Incidences nearer to each other than this are one node of the table, in degrees.
+/// Incidences closer to each other than this are one node of the table, in degrees.
 const SAME_INCIDENCE: f64 = 4.0;
 
-/// What the law leaves.
+/// Misfit of the law.
 pub(super) struct Misfit {
     pub(super) rows: Vec<MisfitRow>,
     pub(super) fit: Fit,
 }
 
-/// The misfits of the law; none without three incidences and a law.
+/// The misfits of the law; empty without three incidences and a law.
 pub(super) fn tabulate(
     design: &Design,
     law: &Adjustment,
@@ -64,8 +64,8 @@ pub(super) fn tabulate(
     }))
 }
 
-/// Incidences of the angle test, whichever way the boards were turned, each with its number of stretches; those that
-/// are nearly face on count as 0.
+/// Incidences of the angle test, whatever the direction of the tilt, each with its number of stretches; those that are
+/// nearly face-on count as 0.
 fn incidences(stretches: &[StretchRow]) -> Vec<(f64, usize)> {
     let tested = stretches.iter().filter(|s| s.test == Some(TestKind::Angle));
     let all = tested.map(|s| s.incidence_deg.abs()).collect();

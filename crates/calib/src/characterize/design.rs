@@ -1,4 +1,4 @@
-//! Which numbers of Eqs. 3 to 5 the boards tell, and how each of them changes a range.
+//! Which numbers of Eqs. (3)–(5) the boards determine, and how each of them changes a range.
 
 use catoptric_model::bias::interpolation_weights;
 use catoptric_model::characterization::{NotObserved, StretchRow};
@@ -6,16 +6,16 @@ use catoptric_model::{AngleBias, ColorBias, DistanceBias, RangeBias, Session, Te
 use nalgebra::{DVector, RowDVector};
 use std::collections::BTreeMap;
 
-/// Distances nearer to each other than this are one node of E_r, in metres.
+/// Distances closer to each other than this are one node of E_r, in meters.
 const SAME_DISTANCE: f64 = 0.01;
 
-/// Least spread of cos θ_N over all boards that tells A_a: boards within 11° of normal incidence do not.
-const LEAST_COSINE_SPREAD: f64 = 0.02;
+/// Minimum spread of cos θ_N over all boards that determines A_a: boards within 11° of normal incidence do not.
+const MIN_COSINE_SPREAD: f64 = 0.02;
 
-/// Least spread of a color's distances, in parts of the largest, that tells A_c.
-const LEAST_DISTANCE_SPREAD: f64 = 0.2;
+/// Minimum spread of a color's distances, relative to the largest, that determines A_c.
+const MIN_DISTANCE_SPREAD: f64 = 0.2;
 
-/// How much nearer and farther than its center a board is read by the fan across it.
+/// Factor by which the fan reads a board closer and farther than its center.
 const FAN_ROOM: f64 = 1.25;
 
 /// A number to be fitted.
@@ -27,7 +27,7 @@ pub(super) enum Term {
     AngleGain,
     /// B_a.
     AngleOffset,
-    /// E_a less a law held fixed, at a node of incidences.
+    /// E_a minus a law held fixed, at a node of incidences.
     AngleNode(usize),
     /// A_c of a color.
     ColorSlope(usize),
@@ -55,12 +55,12 @@ impl Term {
     }
 }
 
-/// The numbers to be fitted, in millimetres and metres.
+/// The numbers to be fitted, in millimeters and meters.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Design {
     /// Distances of E_r; the first terms are its values there.
     pub(super) nodes: Vec<f64>,
-    /// Incidences of the table that stands on `held`, in degrees.
+    /// Incidences of the table that is added to `held`, in degrees.
     pub(super) incidences: Vec<f64>,
     /// A law of E_a that is not fitted.
     pub(super) held: AngleBias,
@@ -71,7 +71,7 @@ pub(super) struct Design {
 }
 
 impl Design {
-    /// What the boards of these rows tell.
+    /// The numbers that the boards of these rows determine.
     pub(super) fn of(rows: &[StretchRow], session: &Session) -> Self {
         let nodes = distance_nodes(rows);
         let mut design = Self {
@@ -87,7 +87,7 @@ impl Design {
             design.omit(
                 "E_r",
                 None,
-                "no test of the distance was recorded: the constant is in B_a or B_c, and what changes with the distance is taken for \
+                "no test of the distance was recorded: the constant is in B_a or B_c, and an error that changes with the distance is taken for \
                  something else",
             );
         }
@@ -105,7 +105,7 @@ impl Design {
     }
 
     fn add_angle(&mut self, rows: &[StretchRow], session: &Session, referred: bool) {
-        // A board is read by a fan: its own half width widens the incidences that are met.
+        // A board is read by a fan: its half width widens the range of incidences.
         let cosines = rows.iter().flat_map(|r| {
             let width = session.board(&r.board).map_or(0.0, |b| b.width_mm * 1e-3);
             let fan = libm::atan2(0.5 * width, r.distance_m);
@@ -115,13 +115,13 @@ impl Design {
         let (low, high) = cosines.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), c| {
             (l.min(c), h.max(c))
         });
-        if high - low >= LEAST_COSINE_SPREAD {
+        if high - low >= MIN_COSINE_SPREAD {
             self.terms.push(Term::AngleGain);
         } else {
             self.omit(
                 "A_a",
                 None,
-                "all boards are met at nearly one incidence; turn one by 30° or more",
+                "all boards are read at nearly the same incidence; turn one by 30° or more",
             );
         }
         if self.nodes.is_empty() && referred {
@@ -139,7 +139,7 @@ impl Design {
             self.colors.push(color.to_owned());
             let near = distances.iter().copied().fold(f64::INFINITY, f64::min);
             let far = distances.iter().copied().fold(0.0, f64::max);
-            if far - near >= LEAST_DISTANCE_SPREAD * far {
+            if far - near >= MIN_DISTANCE_SPREAD * far {
                 self.terms.push(Term::ColorSlope(index));
             } else {
                 self.omit("A_c", Some(color), "the color was seen at one distance only");
@@ -160,7 +160,7 @@ impl Design {
         }
     }
 
-    /// Change of a range, in metres, by one unit of each term.
+    /// Change of a range, in meters, per unit of each term.
     pub(super) fn row(&self, distance: f64, cos_incidence: f64, color: &str) -> RowDVector<f64> {
         let weight = |nodes: &[f64], at: f64, node: usize| -> f64 {
             let weights = interpolation_weights(nodes, at);
@@ -180,7 +180,7 @@ impl Design {
         RowDVector::from_iterator(self.terms.len(), self.terms.iter().map(|t| 1e-3 * value(t)))
     }
 
-    /// The biases with these values of the terms; a table of incidences is left to whoever asked for it.
+    /// The biases at these values of the terms; a table of incidences is left to the caller.
     pub(super) fn bias(&self, values: &DVector<f64>) -> RangeBias {
         let mut bias = RangeBias {
             distance: DistanceBias {
@@ -215,8 +215,8 @@ impl Design {
     }
 }
 
-/// The color that E_c is counted from: that of the test of the distance, else of the test of the angle or of boards
-/// without a note. None if colors are all that was tested.
+/// The reference color of E_c: that of the distance test, else of the angle test or of boards without a note. `None` if
+/// only colors were tested.
 fn reference_color(rows: &[StretchRow]) -> Option<String> {
     let of = |kinds: &[Option<TestKind>]| {
         rows.iter()
@@ -228,8 +228,8 @@ fn reference_color(rows: &[StretchRow]) -> Option<String> {
 
 /// Mean distances of the settings at which the distance was tested, in the reference color.
 ///
-/// Boards none of which was set up for a test stand at all distances and incidences, and what changes with the one must
-/// not be taken for what changes with the other: E_r is then a line over the distances at which they were read.
+/// If no board was set up for a test, boards are at all distances and incidences, and the effects of the two must not
+/// be confused: E_r is then a line over the distances at which they were read.
 fn distance_nodes(rows: &[StretchRow]) -> Vec<f64> {
     let reference = reference_color(rows);
     if rows.iter().all(|r| r.test.is_none()) {
@@ -239,7 +239,7 @@ fn distance_nodes(rows: &[StretchRow]) -> Vec<f64> {
             distances().fold(0.0, f64::max) * FAN_ROOM,
         );
         let spread = far / FAN_ROOM - near * FAN_ROOM;
-        return if spread >= LEAST_DISTANCE_SPREAD * far {
+        return if spread >= MIN_DISTANCE_SPREAD * far {
             vec![near, far]
         } else {
             Vec::new()
@@ -254,7 +254,7 @@ fn distance_nodes(rows: &[StretchRow]) -> Vec<f64> {
     groups.iter().map(|g| mean(g)).collect()
 }
 
-/// Numbers in order, those together that are nearer to the least of them than `within` says.
+/// Sorts numbers into groups, each within `within` of its smallest number.
 pub(super) fn grouped(mut numbers: Vec<f64>, within: impl Fn(f64) -> f64) -> Vec<Vec<f64>> {
     numbers.sort_by(f64::total_cmp);
     let mut groups: Vec<Vec<f64>> = Vec::new();
@@ -271,7 +271,7 @@ pub(super) fn mean(numbers: &[f64]) -> f64 {
     numbers.iter().sum::<f64>() / numbers.len() as f64
 }
 
-/// What passes for one distance: trials are set up anew each time, so it grows with the distance a little.
+/// Tolerance of one distance: trials are set up anew each time, so it grows slightly with the distance.
 fn same_distance(distance: f64) -> f64 {
     SAME_DISTANCE + 0.02 * distance
 }

@@ -1,4 +1,4 @@
-//! Step 1: what the bare sensor's ranges are off by, from boards before beams that nothing deflects.
+//! Step 1: the range errors of the bare sensor, from boards in front of beams that nothing deflects.
 //!
 //! Every mean of a beam over a tracked board is one equation, and all of them are solved together by generalized least
 //! squares,
@@ -7,13 +7,13 @@
 //! z − s(mounting) = E_r(s) + E_a(θ_N) + E_c(s) + drift + board + noise,
 //! ```
 //!
-//! for the mounting of the sensor (with the drawing's tolerance as prior) and the numbers of Eqs. 3 to 5. The errors that
-//! the readings of one board share, its drift and its markers', are in the weights; what comes out with a standard
-//! deviation is off by as much. What the boards cannot tell apart is not solved for, and said.
+//! for the mounting of the sensor (with the drawing's tolerance as prior) and the numbers of Eqs. (3)–(5). The errors
+//! that the readings of one board share, its drift and its markers', enter the weights; the stated standard deviations
+//! are therefore honest. What the boards cannot separate is not solved for, and is reported.
 //!
-//! Two numbers that no data tell apart are settled by convention: with a test of the distance, or without any test at all,
-//! E_r holds the error at normal incidence and B_a = −A_a; with a test of the angle alone, E_r is 0 and B_a is free. E_c is
-//! counted from the color in which the distance was tested.
+//! Two numbers that no data can separate are settled by convention: with a test of the distance, or without any test at
+//! all, E_r holds the error at normal incidence and B_a = −A_a; with a test of the angle alone, E_r is 0 and B_a is
+//! free. E_c is relative to the color in which the distance was tested.
 
 mod adjust;
 mod angle;
@@ -22,11 +22,11 @@ mod noise;
 mod rows;
 mod spot;
 
-use crate::calibrate::check_session;
 use crate::error::CalibError;
-use crate::locate;
-use crate::mount_data::{DirectBoard, Selection, Selector};
-use crate::pose;
+use crate::mount::mount_data::{DirectBoard, Selection, Selector};
+use crate::mount::pose;
+use crate::prepare::check_session;
+use crate::readings::locate;
 use adjust::{Adjustment, Prior, adjust};
 use catoptric_model::characterization::{
     Characterization, Fit, Law, Parameter, SCHEMA_VERSION, Scatter, StretchRow,
@@ -36,19 +36,19 @@ use design::{Design, Term};
 use nalgebra::{DMatrix, Matrix2, Vector2};
 use std::collections::BTreeMap;
 
-/// Bias, in metres, that no reading of a board is taken to exceed; beyond, it is of something else.
+/// Largest bias that a reading of a board may have, in meters; beyond it, the reading is of another surface.
 const LARGEST_BIAS: f64 = 0.5;
 
-/// Rounds of choosing beams and adjusting, at most.
+/// Maximum number of rounds of selecting beams and adjusting.
 const MAX_ROUNDS: usize = 12;
 
 /// Characterizes the sensor of a recorded experiment.
 ///
-/// Boards with a note on the test they belong to make the tables; boards that were set up to find the mounting take
-/// part in the fit.
+/// Boards with a note on the test they belong to make the tables; boards that were set up to find the mounting also
+/// enter the fit.
 ///
 /// # Errors
-/// [`CalibError`] if the dataset's parts do not fit together or no board was read by a beam that nothing deflects.
+/// [`CalibError`] if the parts of the dataset are inconsistent or no board was read by a beam that nothing deflects.
 ///
 /// ```
 /// use catoptric_calib::{CalibError, characterize};
@@ -63,7 +63,7 @@ pub fn characterize(dataset: &Dataset) -> Result<Characterization, CalibError> {
     dataset.check()?;
     let session = &dataset.session;
     check_session(session)?;
-    let summaries = locate::summaries(dataset);
+    let summaries = locate::summaries(dataset)?;
     let none = RangeBias::default();
     let selector = Selector::new(dataset, &summaries).with_bias(&none, LARGEST_BIAS);
     let prior = Prior::of(session);
@@ -143,7 +143,7 @@ fn parameters(design: &Design, law: &Adjustment) -> Vec<Parameter> {
     .collect()
 }
 
-/// The line through E_r at its distances, weighted by their whole covariance: Eq. 5 as the paper fits it.
+/// The line through E_r at its distances, weighted by their full covariance: Eq. (5) as the paper fits it.
 fn distance_line(design: &Design, law: &Adjustment) -> Option<Law> {
     let n = design.nodes.len();
     if n < 3 {
@@ -176,7 +176,7 @@ fn distance_line(design: &Design, law: &Adjustment) -> Option<Law> {
     })
 }
 
-/// Pooled scatter of what the fit leaves of the trials of one setting.
+/// Pooled scatter of the residuals of the trials of one setting.
 fn trial_scatter(rows: &[StretchRow], bias: &RangeBias) -> Option<Scatter> {
     let mut settings: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
     for row in rows {

@@ -1,13 +1,13 @@
 //! White noise by color and distance: Table 4, and the spread in Table 2.
 
-use crate::mount_data::{DirectBoard, Selector};
+use crate::mount::mount_data::{DirectBoard, Selector};
 use catoptric_model::characterization::NoiseRow;
 use catoptric_model::{Dataset, Pose, Summary, TestKind};
 
-/// Cosine of the largest incidence at which a reading counts as one of a face-on board.
+/// Cosine of the largest incidence at which a board counts as face-on.
 const FACE_ON: f64 = 0.95;
 
-/// Largest difference from a board's own distance, in parts of it, at which a reading counts as one at that distance.
+/// Largest difference from a board's own distance, relative to it, at which a reading counts as one at that distance.
 const SAME_DISTANCE: f64 = 0.03;
 
 /// Readings of one setting.
@@ -20,7 +20,7 @@ struct Pool {
     distances: f64,
 }
 
-/// Pooled over trials and over the beams that meet a board face on, setting by setting.
+/// Noise pooled over trials and over the beams that hit a board face-on, one setting at a time.
 pub(super) fn table(
     dataset: &Dataset,
     summaries: &[Vec<Summary>],

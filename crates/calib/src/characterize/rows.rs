@@ -1,12 +1,12 @@
-//! One line for every stretch: what the beam nearest to the board's center read of it.
+//! One row for every stretch: the reading of the beam nearest to the board's center.
 
-use crate::mount_data::{DirectBoard, Selector};
-use crate::observations::{BoardInSensor, azimuth};
+use crate::mount::mount_data::{DirectBoard, Selector};
+use crate::readings::observations::{BoardInSensor, azimuth};
 use catoptric_model::characterization::StretchRow;
 use catoptric_model::frame::tangent_basis;
 use catoptric_model::{Dataset, Pose, Summary, beam};
 
-/// The rows of chosen boards, in the order of recording.
+/// The rows of selected boards, in the order of recording.
 pub(super) fn of(
     dataset: &Dataset,
     summaries: &[Vec<Summary>],
@@ -27,9 +27,9 @@ pub(super) fn of(
         let (index, beam) = beams.min_by(|a, b| off_center(a.1).total_cmp(&off_center(b.1)))?;
         let sighting = block.sightings[index];
         let u = beam::direction(azimuth(&dataset.session, beam));
-        // The normal on the sensor's side, and whether it is turned to greater azimuths.
-        let towards = seen.plane.normal.into_inner() * -seen.plane.normal.dot(&u).signum();
-        let side = if towards.dot(&tangent_basis(&u).0) < 0.0 {
+        // The normal on the sensor's side, and whether it is turned toward larger azimuths.
+        let toward = seen.plane.normal.into_inner() * -seen.plane.normal.dot(&u).signum();
+        let side = if toward.dot(&tangent_basis(&u).0) < 0.0 {
             -1.0
         } else {
             1.0

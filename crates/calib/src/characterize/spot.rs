@@ -1,10 +1,10 @@
-//! Table 1: spots as they were noted, and lines through them.
+//! Table 1: spot extents as noted, and lines fitted to them.
 
-use crate::observations::BoardInSensor;
+use crate::readings::observations::BoardInSensor;
 use catoptric_model::characterization::{SpotLaw, SpotRow};
 use catoptric_model::{Dataset, Pose};
 
-/// The spots that were noted, with the distance of the board as tracked.
+/// The noted spots, with the tracked distance of the board.
 pub(super) fn rows(dataset: &Dataset, rig_from_sensor: &Pose) -> Vec<SpotRow> {
     let row = |record: &catoptric_model::PoseRecord| {
         let spot = record.label.test?.spot?;

@@ -1,54 +1,57 @@
-//! What the solution says of each element, each facet, the mounting and the biases, with covariances.
+//! Results of the joint solution for each element, each facet, the mounting and the biases, with covariances.
 //!
-//! Given the other parameters x, an element's departure is normal about L(y − A·x) with L = τ²(I + τ²HᵀH)⁻¹Hᵀ. With C the
-//! covariance of x, that of the direction is (G − LA)·C·(G − LA)ᵀ + τ²(I + τ²HᵀH)⁻¹.
+//! Given the other parameters x, an element's deviation is normal about L(y − A·x) with L = τ²(I + τ²HᵀH)⁻¹Hᵀ. With C
+//! the covariance of x, that of the direction is (G − LA)·C·(G − LA)ᵀ + τ²(I + τ²HᵀH)⁻¹.
 
-use super::linear::{Boards, Linear};
-use super::problem::{Element, FACET_PARAMETERS, Group, Joint};
-use crate::least_squares::{GroupJacobian, Information, Solution, State};
-use crate::pose;
+use super::group::{Element, FACET_PARAMETERS, Group};
+use super::linear::Linear;
+use super::placed::Boards;
+use super::problem::Joint;
+use crate::lsq::{GroupJacobian, Information, Solution, State};
+use crate::mount::pose;
 use catoptric_model::calibration::{FacetEstimate, MountEstimate};
 use catoptric_model::{Deflection, PoseData, RangeBias, frame};
-use nalgebra::{DMatrix, DVector, Dyn, Matrix2, Matrix6, OMatrix, U6, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix2, Vector6};
 use std::collections::BTreeSet;
 
-/// Part of a residual's variance that must be left for it to say anything.
-const LEAST_LEFT: f64 = 1e-6;
+/// Fraction of a residual's variance that the estimate must leave for the residual to count as evidence.
+const MIN_LEFT: f64 = 1e-6;
 
-/// An element's direction as the joint solution has it.
+/// One element in the joint solution.
 pub(super) struct Answer {
     pub(super) beam: usize,
     pub(super) facet: usize,
     pub(super) deflection: Deflection,
-    /// Covariance along (azimuth, elevation) of the tangent plane (cos φ·δθ, δφ), in rad²; `None` where it is open.
+    /// Covariance along (azimuth, elevation) of the tangent plane (cos φ·δθ, δφ), in rad²; `None` if the direction is
+    /// open.
     pub(super) covariance: Option<Matrix2<f64>>,
     pub(super) readings: usize,
-    /// Root mean square residual, in metres.
+    /// Root-mean-square residual, in meters.
     pub(super) rms: f64,
-    /// What it read of each board.
+    /// Its readings of each board.
     pub(super) seen: Vec<Seen>,
 }
 
-/// A board as an element read it.
+/// An element's reading of one board.
 pub(super) struct Seen {
-    /// The board, by its group and its index there, and the number of its pose.
+    /// Index of the board's group, index of the board in the group, and number of its pose.
     pub(super) group: usize,
     pub(super) board: usize,
     pub(super) number: usize,
-    /// Standard deviation by what no other reading shares, in metres.
+    /// Standard deviation of the error that no other reading shares, in meters.
     pub(super) sd: f64,
-    /// Residual over that, after the departure.
+    /// Residual in units of `sd`, after the deviation is subtracted.
     pub(super) residual: f64,
-    /// Variance, over that squared, of what the estimate fits to it: how much of it the estimate has taken up. `None` where
-    /// the direction is open.
+    /// Variance of the fitted value in units of `sd`²: the fraction of the reading that the estimate has absorbed.
+    /// `None` if the direction is open.
     pub(super) fitted: Option<f64>,
 }
 
 impl Seen {
-    /// The residual over its own standard deviation, which is smaller by what the estimate has taken up.
+    /// Residual over its own standard deviation, which is below 1 because the estimate has absorbed part of the error.
     pub(super) fn studentized(&self) -> f64 {
         let left = 1.0 - self.fitted.unwrap_or(1.0);
-        if left > LEAST_LEFT {
+        if left > MIN_LEFT {
             self.residual / left.sqrt()
         } else {
             0.0
@@ -56,13 +59,14 @@ impl Seen {
     }
 }
 
-/// Covariances of one element: direction along the tangent basis, and what is fitted to its sights.
+/// Covariances of one element: of its direction along the tangent basis, and of the values fitted to its sights.
 struct Spread {
     direction: Matrix2<f64>,
     fitted: Vec<f64>,
 }
 
-/// A deflected element, with its group and its facet there, and derivatives of its predicted ranges.
+/// A deflected element with the indices of its group and of its facet there, and the derivatives of its predicted
+/// ranges.
 pub(super) struct Linearized<'g> {
     pub(super) group: usize,
     pub(super) facet: usize,
@@ -71,19 +75,19 @@ pub(super) struct Linearized<'g> {
     pub(super) by: GroupJacobian,
 }
 
-/// What an element's direction along its tangent basis, and what is fitted to its sights, depend on.
+/// Dependence of an element's direction (along its tangent basis) and of its fitted sights on the parameters.
 pub(super) struct Dependence {
-    /// Covariance of the departure where all else is known.
+    /// Covariance of the deviation when everything else is known.
     inner: Matrix2<f64>,
-    /// From the departure's two axes to the tangent basis.
+    /// Rotation from the two axes of the deviation to the tangent basis.
     turn: Matrix2<f64>,
-    /// Derivatives with respect to w and to the group's own parameters: two rows for the direction, one for each sight.
+    /// Derivatives with respect to w and to the group's own parameters: two rows for the direction, one per sight.
     pub(super) shared: DMatrix<f64>,
     pub(super) own: DMatrix<f64>,
 }
 
 impl Joint<'_> {
-    /// Where the own parameters of a group begin among all.
+    /// Index of a group's first own parameter among all parameters.
     pub(super) fn offset(&self, group: usize) -> usize {
         self.shared_dimension()
             + self.groups[..group]
@@ -92,7 +96,7 @@ impl Joint<'_> {
                 .sum::<usize>()
     }
 
-    /// Every deflected element at a state, linearized, with its group and its facet.
+    /// Every deflected element, linearized at a state.
     pub(super) fn linearized<'g>(&'g self, state: &'g State) -> impl Iterator<Item = Linearized<'g>> + 'g {
         self.groups.iter().enumerate().flat_map(move |(number, group)| {
             let own = state.own(number);
@@ -112,7 +116,7 @@ impl Joint<'_> {
         })
     }
 
-    /// Derivatives of one element's predicted ranges, over the standard deviations.
+    /// Derivatives of one element's predicted ranges, divided by their standard deviations.
     pub(super) fn derivatives(
         &self,
         group: &Group,
@@ -136,7 +140,7 @@ impl Joint<'_> {
                 let (element, linear) = (at.element, &at.linear);
                 let group = &self.groups[at.group];
                 let rest = linear.rest();
-                let in_metres = rest.iter().zip(&element.sights).map(|(r, s)| (r * s.sd).powi(2));
+                let in_meters = rest.iter().zip(&element.sights).map(|(r, s)| (r * s.sd).powi(2));
                 let count = element.sights.len().max(1) as f64;
                 let spread = self.spread(&solution.information, &at);
                 let seen = element.sights.iter().enumerate().map(|(i, sight)| Seen {
@@ -151,7 +155,7 @@ impl Joint<'_> {
                     beam: element.beam,
                     facet: group.facets[at.facet].facet,
                     deflection: Deflection::from_exit(element.azimuth, &linear.v, linear.fan.distance),
-                    rms: (in_metres.sum::<f64>() / count).sqrt(),
+                    rms: (in_meters.sum::<f64>() / count).sqrt(),
                     seen: seen.collect(),
                     readings: element.sights.iter().map(|s| s.count).sum(),
                     covariance: spread.map(|s| s.direction),
@@ -176,21 +180,21 @@ impl Joint<'_> {
             .collect()
     }
 
-    /// `None` where the direction is open.
+    /// `None` if the direction is open.
     fn spread(&self, information: &Information, at: &Linearized) -> Option<Spread> {
         let linear = &at.linear;
         let by = self.dependence(at.facet, linear, &at.by)?;
         let rows = linear.y.len();
         let c = information.covariance_within(at.group, &by.shared, &by.own)?;
         let direction = c.fixed_view::<2, 2>(0, 0) + by.turn * by.inner * by.turn.transpose();
-        let departing = &linear.h * by.inner * linear.h.transpose();
+        let deviating = &linear.h * by.inner * linear.h.transpose();
         Some(Spread {
             direction: (direction + direction.transpose()) * 0.5,
-            fitted: (0..rows).map(|i| c[(2 + i, 2 + i)] + departing[(i, i)]).collect(),
+            fitted: (0..rows).map(|i| c[(2 + i, 2 + i)] + deviating[(i, i)]).collect(),
         })
     }
 
-    /// How an element's direction and its fitted sights depend on the parameters.
+    /// Dependence of an element's direction and fitted sights on the parameters.
     pub(super) fn dependence(&self, facet: usize, linear: &Linear, by: &GroupJacobian) -> Option<Dependence> {
         let (across, up) = frame::tangent_basis(&linear.v);
         let tangent = [across, up];
@@ -220,7 +224,7 @@ impl Joint<'_> {
         })
     }
 
-    /// A combination of the shared parameters and of a group's own as one of all parameters.
+    /// Embeds a combination of the shared parameters and of one group's own in the vector of all parameters.
     pub(super) fn among_all(
         &self,
         dimension: usize,
@@ -234,7 +238,7 @@ impl Joint<'_> {
         all
     }
 
-    /// The facets' planes; one that the boards leave open has no covariance and is left out, as are those in `bent`.
+    /// Planes of the facets, without those in `bent` and those that the boards leave open, which have no covariance.
     pub(super) fn facets(
         &self,
         solution: &Solution,
@@ -291,34 +295,9 @@ impl Joint<'_> {
         })
     }
 
-    /// The biases as the boards have corrected them.
+    /// The biases as corrected by the boards.
     pub(super) fn corrected_bias(&self, solution: &Solution) -> Option<RangeBias> {
         let w = solution.state.shared.numbers(0)?;
         Some(self.common.applied(&w.as_slice()[self.first_common..]))
     }
-}
-
-/// Motion matrix of a mounting that is known as its uncertainty says: independent errors first, then the common ones.
-pub(super) fn motion_of(
-    independent: &Matrix6<f64>,
-    common: &OMatrix<f64, U6, Dyn>,
-    count: usize,
-) -> OMatrix<f64, U6, Dyn> {
-    let eigen = independent.symmetric_eigen();
-    let root = eigen.eigenvectors * Matrix6::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0).sqrt()));
-    let mut motion = OMatrix::<f64, U6, Dyn>::zeros(6 + count);
-    motion.columns_mut(0, 6).copy_from(&root);
-    if common.ncols() == count {
-        motion.columns_mut(6, count).copy_from(common);
-    }
-    motion
-}
-
-/// Mean of w for a prior at another mounting: what of it is a motion over its standard deviation.
-pub(super) fn prior_mean(motion: &Vector6<f64>, sd: &Vector6<f64>, count: usize) -> DVector<f64> {
-    let mut mean = DVector::zeros(6 + count);
-    for i in 0..6 {
-        mean[i] = motion[i] / sd[i];
-    }
-    mean
 }

@@ -1,13 +1,14 @@
-//! What the residuals say of the beliefs: global test, variance components, correlations, planeness.
+//! Tests the beliefs by the residuals: global test, variance components, correlations, flatness of the facets.
 //!
-//! A kind of error with prior u ~ N(0, 1) and posterior covariance C has, by restricted maximum likelihood,
-//! (σ̂/σ)² = Σû²/Σ(1 − C_uu): a parameter that the readings determine counts whole, one that they do not counts nothing.
+//! A kind of error with prior u ~ N(0, 1) and posterior covariance C has, by restricted maximum likelihood, (σ̂/σ)² =
+//! Σû²/Σ(1 − C_uu): a parameter that the readings determine counts fully, one that they do not determine counts zero.
 //! The standard deviation of σ̂ is σ̂/√(2Σ(1 − C_uu)).
 
 use super::answer::Answer;
 use super::fit::Fit;
-use super::problem::{BOARD_ERRORS, FACET_PARAMETERS, Joint};
-use crate::least_squares::Solution;
+use super::group::{BOARD_ERRORS, FACET_PARAMETERS};
+use super::problem::Joint;
+use crate::lsq::Solution;
 use catoptric_model::Assessment;
 use catoptric_model::Session;
 use catoptric_model::assessment::{
@@ -16,14 +17,14 @@ use catoptric_model::assessment::{
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// Chance below which beliefs are called wrong.
+/// Significance level below which beliefs are called wrong.
 const DOUBTFUL: f64 = 1e-3;
 
-/// Numbers of one kind of error that the readings must determine before its size is given.
-const LEAST_DETERMINED: f64 = 0.5;
+/// Effective number of parameters of one kind that the readings must determine before a size is reported.
+const MIN_DETERMINED: f64 = 0.5;
 
-/// Chance that χ² is at least as large.
-pub(super) fn chance(chi_squared: f64, freedom: f64) -> f64 {
+/// Probability of a χ² at least as large.
+pub(super) fn upper_tail(chi_squared: f64, freedom: f64) -> f64 {
     ChiSquared::new(freedom).map_or(1.0, |d| d.sf(chi_squared.max(0.0)))
 }
 
@@ -35,15 +36,17 @@ impl Joint<'_> {
         let global_test = ChiSquaredTest {
             chi_squared: solution.sum_of_squares,
             degrees_of_freedom: freedom,
-            p_value: chance(solution.sum_of_squares, freedom as f64),
+            p_value: upper_tail(solution.sum_of_squares, freedom as f64),
         };
         let planeness = Planeness {
             figure_deg: self.flatness.figure.to_degrees(),
             departure_deg: self.flatness.tau.to_degrees(),
-            statistic: fit.departure_statistic,
-            // Both sizes lie on the edge of what they can be: half of the time the ratio is 0 for each.
-            p_value: if fit.departure_statistic > 0.0 {
-                0.5 * chance(fit.departure_statistic, 1.0) + 0.25 * chance(fit.departure_statistic, 2.0)
+            statistic: fit.deviation_statistic,
+            // Both sizes are at the boundary of their domain under the hypothesis: each is estimated as 0 half of the
+            // time.
+            p_value: if fit.deviation_statistic > 0.0 {
+                0.5 * upper_tail(fit.deviation_statistic, 1.0)
+                    + 0.25 * upper_tail(fit.deviation_statistic, 2.0)
             } else {
                 1.0
             },
@@ -78,8 +81,8 @@ impl Joint<'_> {
                 determined += 1.0 - c[(0, 0)].min(1.0);
             }
         }
-        let found = (determined > LEAST_DETERMINED && believed > 0.0)
-            .then(|| believed * (squares / determined).sqrt());
+        let found =
+            (determined > MIN_DETERMINED && believed > 0.0).then(|| believed * (squares / determined).sqrt());
         VarianceComponent {
             name: name.to_owned(),
             believed_mm: believed,
@@ -110,13 +113,13 @@ impl Joint<'_> {
             }
         }
         let believed = &session.believed;
-        // Noise: what is left of each element's readings, by the numbers that it and its share of the rest have taken up.
+        // Noise: residual sum of squares of the means, over their number minus what the estimate has absorbed of them.
         let seen = || answers.iter().flat_map(|a| &a.seen);
         let squares: f64 = seen().map(|s| s.residual * s.residual).sum();
         let means = seen().count();
         let taken: f64 = seen().filter_map(|s| s.fitted).sum();
         let left = means as f64 - taken;
-        let noise = (left > LEAST_DETERMINED).then(|| believed.range_noise_sd_mm * (squares / left).sqrt());
+        let noise = (left > MIN_DETERMINED).then(|| believed.range_noise_sd_mm * (squares / left).sqrt());
         vec![
             VarianceComponent {
                 name: "noise of a reading".to_owned(),
@@ -133,7 +136,7 @@ impl Joint<'_> {
         let Some(w) = solution.state.shared.numbers(0) else {
             return (Vec::new(), Vec::new());
         };
-        // Motions of the mounting in degrees and millimetres about the drawn one, then the biases.
+        // Motions of the mounting about the drawn one, in millimeters and degrees, then the biases.
         let axes = ["x", "y", "z"];
         let mut names: Vec<(String, f64)> = Vec::new();
         for (axis, name) in axes.iter().enumerate() {
@@ -146,12 +149,12 @@ impl Joint<'_> {
         }
         names.extend(self.common.named());
         debug_assert_eq!(names.len(), w.len());
-        // A number believed to be known exactly is not estimated.
-        let told: Vec<usize> = (0..w.len()).filter(|i| names[*i].1 > 1e-6).collect();
-        let Some(c) = solution.information.covariance_among(&told) else {
+        // A parameter believed to be known exactly is not estimated.
+        let estimated: Vec<usize> = (0..w.len()).filter(|i| names[*i].1 > 1e-6).collect();
+        let Some(c) = solution.information.covariance_among(&estimated) else {
             return (Vec::new(), Vec::new());
         };
-        let parameters = told
+        let parameters = estimated
             .iter()
             .enumerate()
             .map(|(place, i)| SharedParameter {
@@ -229,22 +232,22 @@ fn verdict(a: &Assessment) -> String {
         1.0
     };
     let mut words = if test.degrees_of_freedom == 0 {
-        "nothing is left over to test the beliefs with".to_owned()
+        "no degrees of freedom are left to test the beliefs".to_owned()
     } else if test.p_value < DOUBTFUL {
         format!(
-            "residuals are {ratio:.2} times what the errors believed in explain: something acts that nobody believes in, and \
+            "residuals are {ratio:.2} times what the believed errors explain: there is an error that the beliefs omit, and \
              the covariances are too small"
         )
     } else if test.p_value > 1.0 - DOUBTFUL {
         format!(
-            "residuals are {ratio:.2} times what the errors believed in make them: the beliefs are too pessimistic"
+            "residuals are {ratio:.2} times what the believed errors predict: the beliefs are too pessimistic"
         )
     } else {
-        "residuals are as large as the errors believed in make them".to_owned()
+        "residuals are as large as the believed errors predict".to_owned()
     };
     if a.planeness.p_value < DOUBTFUL {
         words += &format!(
-            "; the mirrors are not plane: their normals wander by {:.3}° along the fan, single beams by {:.3}°",
+            "; the mirrors are not flat: their normals vary by {:.3}° along the fan, single beams by another {:.3}°",
             a.planeness.figure_deg, a.planeness.departure_deg
         );
     }
@@ -253,7 +256,7 @@ fn verdict(a: &Assessment) -> String {
             && (found - component.believed_mm).abs() > 4.0 * sd
         {
             words += &format!(
-                "; {} is {found:.2} mm, {:.2} mm was believed",
+                "; {} is {found:.2} mm; the session states {:.2} mm",
                 component.name, component.believed_mm
             );
         }

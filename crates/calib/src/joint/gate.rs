@@ -1,17 +1,17 @@
-//! Elements whose readings are not those of a beam of their facet on their boards.
+//! Finds elements whose readings are not those of a beam of their facet on their boards.
 
 use super::linear::Linear;
 use super::problem::Joint;
-use crate::least_squares::State;
+use crate::lsq::State;
 
-/// χ² of an element's rows beyond which it is not what its facet and boards say: standard deviations of χ² above its mean.
+/// Gate on χ² of an element's rows, in standard deviations of χ² above its mean.
 const GATE_SIGMAS: f64 = 7.0;
 
-/// Share of elements beyond the gate above which it is the model that is wrong, not the elements.
+/// Share of elements beyond the gate above which the model is at fault, not the elements.
 const LARGEST_SHARE: f64 = 0.2;
 
 impl Joint<'_> {
-    /// The beams of those elements; none where they are so many that the model is wrong.
+    /// Beams of these elements; empty if they are so many that the model is at fault.
     pub(super) fn strange(&self, state: &State) -> Vec<usize> {
         let (mut strange, mut all) = (Vec::new(), 0);
         for (number, group) in self.groups.iter().enumerate() {
@@ -36,12 +36,12 @@ impl Joint<'_> {
 
     fn is_strange(&self, linear: &Linear) -> bool {
         let tau = self.flatness.tau;
-        let departure = if tau > 0.0 {
+        let deviation = if tau > 0.0 {
             linear.delta.norm_squared() / (tau * tau)
         } else {
             0.0
         };
-        let chi_squared = linear.rest().norm_squared() + departure;
+        let chi_squared = linear.rest().norm_squared() + deviation;
         let freedom = linear.y.len() as f64;
         chi_squared > freedom + GATE_SIGMAS * (2.0 * freedom).sqrt() + GATE_SIGMAS * GATE_SIGMAS
     }

@@ -1,22 +1,23 @@
-//! Cross-validation: boards are left out, a fifth of each facet's at a time, and what elements read of them is compared
-//! with what the rest predicts.
+//! Cross-validation: leaves out a fifth of each facet's boards at a time and compares their readings with the
+//! prediction from the rest.
 //!
-//! A reading that weighs a million times less than it should is left out, while its prediction and the variance of that,
-//! by everything that is estimated and by the board's own errors, come out of the same algebra as all others.
+//! A reading is left out by giving it a millionth of its weight. Its prediction and the variance of the prediction,
+//! with everything estimated and the board's own errors included, then come out of the same algebra as all others.
 
-use super::problem::{Group, Joint};
-use crate::least_squares::{self, ProblemError, State};
+use super::group::Group;
+use super::problem::Joint;
+use crate::lsq::{self, ProblemError, State};
 use catoptric_model::assessment::HeldOut;
 
-/// Parts that the boards of a facet are left out in.
+/// Number of parts into which the boards of a facet are divided.
 const FOLDS: usize = 5;
 
-/// By how much a reading that is left out is more uncertain than it is believed to be.
+/// Factor on the standard deviation of a reading that is left out.
 const LEFT_OUT: f64 = 1e6;
 
 impl Joint<'_> {
-    /// What every board's readings differ from their prediction by a calibration that has not seen them; `None` where there
-    /// are too few boards to leave any out.
+    /// Differences of every board's readings from the prediction of a calibration without them; `None` if there are too
+    /// few boards to leave any out.
     pub(super) fn cross_validated(&self, from: &State) -> Result<Option<HeldOut>, ProblemError> {
         let (mut boards, mut means) = (0, 0_usize);
         let (mut sum, mut squares, mut expected) = (0.0, 0.0, 0.0);
@@ -31,9 +32,10 @@ impl Joint<'_> {
                     sight.sd *= LEFT_OUT;
                 }
             }
-            let solution = rest.solve(from.clone(), &least_squares::Options::default())?;
+            let solution = rest.solve(from.clone(), &lsq::Options::default())?;
             for answer in rest.answers(&solution) {
-                // Without boards of its own an element's direction is that of its facet; without a covariance it is open.
+                // Without boards of its own an element's direction is that of its facet; without a covariance it is
+                // open.
                 for sight in answer
                     .seen
                     .iter()

@@ -1,21 +1,25 @@
-//! The least covariance that any estimate can have, given what is believed: the limit of one experiment.
+//! The minimum covariance of any estimate under the given beliefs: the limit of one experiment.
 //!
-//! The joint problem linearized at the true directions, with facets as far from plane as they truly are. Its parameters have
-//! priors, so this is the Bayesian (van Trees) form of the Cramér–Rao bound; for an element by itself see
+//! The joint problem is linearized at the true directions, with facets as far from flat as they truly are. Its
+//! parameters have priors, so this is the Bayesian (van Trees) form of the Cramér–Rao bound. For one element alone see
 //! [`crate::covariance::Budget::bound`].
 
-use super::problem::{FIGURE, FIGURE_ORDERS, FIGURE_RMS, Flatness, orders};
-use super::{Assigned, along, begin, components, direct_group, group, mounting_as_drawn};
-use crate::calibrate::{believable, plane_between, prepare};
+use super::assemble::{Assigned, along, begin, components, direct_group, group, mounting_as_drawn};
+use super::fan::{FIGURE_RMS, Flatness, orders};
+use super::group::{FIGURE, FIGURE_ORDERS};
+use crate::element::choose;
+use crate::element::facet_plane::plane_between;
 use crate::error::CalibError;
-use crate::least_squares;
-use crate::observations::azimuth;
-use crate::options::{Method, Options};
+use crate::judge::levers::libm_cos;
+use crate::lsq;
+use crate::options::Options;
+use crate::prepare::{believable, prepare};
+use crate::readings::observations::azimuth;
 use catoptric_model::{Dataset, Deflection, MirrorPlane, frame};
 use nalgebra::{DMatrix, DVector, Matrix2, Unit, Vector3};
 use std::collections::BTreeMap;
 
-/// A beam's true direction, and the name of its facet.
+/// A beam's true direction and the name of its facet.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrueDirection {
     /// The beam.
@@ -26,8 +30,8 @@ pub struct TrueDirection {
     pub deflection: Deflection,
 }
 
-/// Covariance of (θ_a, φ), in rad², below which no estimate of each of these beams can get from this dataset's boards;
-/// `None` where they leave a direction open.
+/// Lower bound of the covariance of (θ_a, φ) of each of these beams, in rad², for any estimate from this dataset's
+/// boards; `None` if the boards leave a direction open.
 ///
 /// Of the readings only their number and spread are used.
 ///
@@ -41,7 +45,7 @@ pub fn limit(
     let dataset = dataset.as_ref();
     let prepared = prepare(dataset)?;
     let options = Options::default();
-    let work = prepared.workspace(dataset, Method::Joint, &options);
+    let work = prepared.workspace(dataset, &options);
     let session = &dataset.session;
     let mut planes = prepared.drawn.clone();
     let mut flat = Vec::new();
@@ -56,11 +60,11 @@ pub fn limit(
         planes[index] = mean;
         let places = of_facet
             .iter()
-            .map(|t| along(facet.beams, t.beam))
+            .map(|t| along(&session.scanner.scan, facet.beams, t.beam))
             .collect::<Vec<_>>();
         flat.push(flatness(&mean, &built, &places));
         for t in of_facet {
-            if let Some(poses) = work.boards_at(t.beam, facet, &mean, &t.deflection)
+            if let Some(poses) = choose::boards_at(&work, t.beam, facet, &mean, &t.deflection)
                 && !poses.is_empty()
             {
                 assigned.push(Assigned {
@@ -92,24 +96,23 @@ pub fn limit(
         figure: of_all(|f| f.figure),
         tau: of_all(|f| f.tau),
     };
-    let linear = least_squares::linearize(&joint.with_priors(&joint), &state).map_err(|problem| {
-        CalibError::Foreign {
+    let linear =
+        lsq::linearize(&joint.with_priors(&joint), &state).map_err(|problem| CalibError::Foreign {
             name: "limit".to_owned(),
             what: problem.to_string(),
-        }
-    })?;
+        })?;
     Ok(joint
         .covariances(&state, &linear.information)
         .into_iter()
         .map(|(beam, elevation, tangent)| {
-            let cos = crate::solve::libm_cos(elevation);
+            let cos = libm_cos(elevation);
             let scale = Matrix2::new(1.0 / cos, 0.0, 0.0, 1.0);
             (beam, tangent.map(|c| scale * c * scale))
         })
         .collect())
 }
 
-/// The plane that most planes agree on.
+/// Mean plane of several.
 fn mean(planes: &[MirrorPlane]) -> Option<MirrorPlane> {
     let normal: Vector3<f64> = planes.iter().map(|p| p.normal.into_inner()).sum();
     Some(MirrorPlane {
@@ -118,7 +121,7 @@ fn mean(planes: &[MirrorPlane]) -> Option<MirrorPlane> {
     })
 }
 
-/// How far normals are from their mean: along a polynomial, and from that.
+/// Deviation of normals from their mean: along a polynomial, and from that polynomial.
 fn flatness(mean: &MirrorPlane, planes: &[MirrorPlane], places: &[f64]) -> Flatness {
     let (a, b) = frame::tangent_basis(&mean.normal);
     let tilts = |axis: &Unit<Vector3<f64>>| {
@@ -142,7 +145,7 @@ fn flatness(mean: &MirrorPlane, planes: &[MirrorPlane], places: &[f64]) -> Flatn
         figure += fitted.norm_squared() / count;
         rest += (tilt - fitted).norm_squared() / count;
     }
-    // Along each of two axes; a mirror turns a beam twice as far as itself.
+    // Along each of two axes; a mirror turns a beam by twice its own tilt.
     Flatness {
         figure: (0.5 * figure).sqrt() / FIGURE_RMS,
         tau: 2.0 * (0.5 * rest).sqrt(),

@@ -1,75 +1,49 @@
-//! One element at a point: what it should read of its boards, how far it departs from its facet, and how that changes.
+//! One element linearized at a point: its predicted readings, its deviation from its facet, and their derivatives.
 
-use super::problem::{BOARD_ERRORS, Element, FACET_PARAMETERS, FIGURE_ORDERS, Fan, Group, Joint};
-use crate::covariance::PlaneFit;
-use crate::jacobian;
-use crate::least_squares::{GroupJacobian, Point};
-use catoptric_model::bias::ColoredBias;
-use catoptric_model::{BoardPlane, frame};
-use nalgebra::{DVector, Dyn, Matrix2, Matrix3, OMatrix, Point3, U2, U6, Unit, Vector2, Vector3};
+use super::fan::Fan;
+use super::group::{BOARD_ERRORS, Element, FACET_PARAMETERS, FIGURE_ORDERS, Group};
+use super::placed::{Boards, Placed};
+use super::problem::Joint;
+use crate::lsq::{GroupJacobian, Point};
+use crate::readings::jacobian;
+use catoptric_model::frame;
+use nalgebra::{DVector, Dyn, Matrix2, OMatrix, Point3, U2, Unit, Vector2, Vector3};
 
-/// Step of (range, cosine) over which a bias is differentiated: tables are linear over centimeters and degrees.
-const BIAS_STEP: f64 = 1e-4;
-
-/// Rounds in which a beam's own departure settles, and the change that ends them, in radians.
-const DEPARTURE_ROUNDS: usize = 8;
+/// Maximum number of iterations for a beam's own deviation, and the change that ends them, in radians.
+const DEVIATION_ROUNDS: usize = 8;
 const SETTLED: f64 = 1e-14;
-
-/// Boards of a group in the sensor frame, and how w moves the sensor.
-pub(super) struct Boards<'j> {
-    pub(super) placed: Vec<Placed<'j>>,
-    pub(super) motion: OMatrix<f64, U6, Dyn>,
-}
-
-/// A board in the sensor frame with its errors.
-pub(super) struct Placed<'j> {
-    pub(super) plane: BoardPlane,
-    pub(super) fit: PlaneFit,
-    /// Height error of each of three unit errors, by (1, x, y).
-    pub(super) errors: Matrix3<f64>,
-    /// Drift, in metres.
-    pub(super) drift: f64,
-    pub(super) paint: Paint<'j>,
-}
-
-/// The believed biases on one color.
-pub(super) struct Paint<'j> {
-    bias: ColoredBias<'j>,
-    /// Where the color stands among the common errors.
-    place: Option<usize>,
-}
 
 /// An element linearized: prediction errors, and derivatives of the predicted range.
 pub(super) struct Linear {
-    /// z − r̂ + Hδ, over the sights, each over its standard deviation.
+    /// z − r̂ + Hδ over the sights, each divided by its standard deviation.
     pub(super) y: DVector<f64>,
-    /// Derivatives along the two axes of the departure, over the standard deviations.
+    /// Derivatives along the two axes of the deviation, divided by the standard deviations.
     pub(super) h: OMatrix<f64, Dyn, U2>,
-    /// The departure that fits best.
+    /// The deviation that fits best.
     pub(super) delta: Vector2<f64>,
     /// The two axes.
     pub(super) axes: [Vector3<f64>; 2],
     /// Exit direction.
     pub(super) v: Unit<Vector3<f64>>,
-    /// What the facet makes of the beam.
+    /// The facet's deflection of the beam.
     pub(super) fan: Fan,
     sightlines: Vec<Sightline>,
 }
 
-/// One board as the beam meets it.
+/// One board where the beam meets it.
 #[derive(Clone, Copy, Default)]
 struct Sightline {
-    /// Distance from the mirror to the board, and the cosine with its sign.
+    /// Distance from the mirror to the board, and the signed cosine of incidence.
     s: f64,
     closing: f64,
-    /// Derivatives of the biased range with respect to the range and to that cosine; a departure does not change them.
+    /// Derivatives of the biased range with respect to the range and to that cosine; a deviation does not change them.
     by_range: f64,
     by_closing: f64,
-    /// What one standard deviation of each common error adds.
+    /// Error per standard deviation of each common error.
     common: [(usize, f64); 4],
 }
 
-/// (I + τ²HHᵀ)^(−½), the weight of the rows of an element that departs from its facet.
+/// (I + τ²HHᵀ)^(−½), the weight of the rows of an element that deviates from its facet.
 pub(super) struct Weight<'l> {
     h: &'l OMatrix<f64, Dyn, U2>,
     inner: Matrix2<f64>,
@@ -77,35 +51,18 @@ pub(super) struct Weight<'l> {
     pub(super) log_determinant: f64,
 }
 
-impl<'j> Paint<'j> {
-    pub(super) fn of(joint: &'j Joint, color: &str) -> Self {
-        Self {
-            bias: joint.bias.on(color),
-            place: joint.common.place(color),
-        }
-    }
-
-    /// Derivatives of the biased range with respect to the range and to the cosine of the incidence.
-    fn slopes(&self, range: f64, cos: f64) -> (f64, f64) {
-        let at = |range: f64, cos: f64| self.bias.terms(range, cos).total();
-        let slope = (at(range + BIAS_STEP, cos) - at(range - BIAS_STEP, cos)) / (2.0 * BIAS_STEP);
-        let (low, high) = ((cos - BIAS_STEP).max(0.0), (cos + BIAS_STEP).min(1.0));
-        (1.0 + slope, (at(range, high) - at(range, low)) / (high - low))
-    }
-}
-
 impl Linear {
-    /// Prediction errors that the departure leaves, over the standard deviations.
+    /// Prediction errors that remain after the deviation, divided by the standard deviations.
     pub(super) fn rest(&self) -> DVector<f64> {
         &self.y - &self.h * self.delta
     }
 
-    /// The weight for departures of 1σ τ; `None` without any.
+    /// The weight for deviations of 1σ τ; `None` if there are none.
     pub(super) fn weight(&self, tau: f64) -> Option<Weight<'_>> {
         (tau > 0.0).then(|| {
             let squares = self.h.tr_mul(&self.h) * (tau * tau);
             let eigen = squares.symmetric_eigen();
-            // 1/√(1 + x) − 1 over x, without the difference of two near numbers.
+            // (1/√(1 + x) − 1)/x without cancellation.
             let gain = eigen.eigenvalues.map(|x| {
                 let root = (1.0 + x.max(0.0)).sqrt();
                 -1.0 / (root * (1.0 + root))
@@ -121,7 +78,7 @@ impl Linear {
 }
 
 impl Weight<'_> {
-    /// Weighs one column of the element's rows.
+    /// Applies the weight to one column of the element's rows.
     pub(super) fn apply(&self, column: &mut [f64]) {
         let (across, up) = self.h.as_slice().split_at(column.len());
         let product = |axis: &[f64]| -> f64 { axis.iter().zip(&*column).map(|(h, m)| h * m).sum() };
@@ -133,7 +90,7 @@ impl Weight<'_> {
 }
 
 impl Joint<'_> {
-    /// An element at a point; `None` where it meets none of its boards.
+    /// An element linearized at a point; `None` if it meets none of its boards.
     pub(super) fn element(
         &self,
         element: &Element,
@@ -156,13 +113,13 @@ impl Joint<'_> {
         let (across, up) = frame::tangent_basis(&fan.v);
         let base = [across.into_inner(), up.into_inner()];
         let rows = element.sights.len();
-        let tau = self.departure(element);
+        let tau = self.deviation(element);
         let mut delta = Vector2::<f64>::zeros();
         let mut y = DVector::zeros(rows);
         let mut h = OMatrix::<f64, Dyn, U2>::zeros(rows);
         let (mut v, mut axes) = (fan.v, base);
         let mut sightlines = vec![Sightline::default(); rows];
-        for round in 0..DEPARTURE_ROUNDS {
+        for round in 0..DEVIATION_ROUNDS {
             let q: Vector3<f64> = fan.v.into_inner() + base[0] * delta.x + base[1] * delta.y;
             let length = q.norm();
             v = Unit::new_unchecked(q / length);
@@ -197,7 +154,7 @@ impl Joint<'_> {
             let next = inner.try_inverse()? * h.tr_mul(&y) * (tau * tau);
             let change = (next - delta).norm();
             delta = next;
-            if change < SETTLED || round + 1 == DEPARTURE_ROUNDS {
+            if change < SETTLED || round + 1 == DEVIATION_ROUNDS {
                 break;
             }
         }
@@ -213,8 +170,8 @@ impl Joint<'_> {
         })
     }
 
-    /// Derivatives of an element's predicted ranges over the standard deviations, written into as many rows of those of its
-    /// group, which are 0 so far.
+    /// Writes the derivatives of an element's predicted ranges, divided by the standard deviations, into as many rows
+    /// of its group's derivatives, which must be 0.
     pub(super) fn differentiate(
         &self,
         group: &Group,
@@ -266,7 +223,7 @@ impl Joint<'_> {
 }
 
 impl Sightline {
-    /// Change of the biased range with what a turn of the beam adds to the cosine.
+    /// Total derivative of the biased range with respect to the cosine when the beam turns.
     fn lever(&self) -> f64 {
         self.by_closing - self.by_range * self.s / self.closing
     }

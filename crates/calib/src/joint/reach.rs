@@ -1,32 +1,34 @@
-//! Does a covariance hold as far as it reaches?
+//! Does the linear covariance hold over the region that it describes?
 //!
-//! Boards that stand face-on to a beam tell its direction by the curvature of the range only, ½·s·δ². Noise moves the
-//! estimate to some δ̂, where they seem to have a lever, s·δ̂, and so to say something; yet −δ̂ fits as well. The profile of
-//! ‖f‖² over a direction, all else at its best for each, shows it (Bates and Watts, "Nonlinear Regression Analysis and Its
-//! Applications", 1988, section 6.1): it rises by k² over k standard deviations as far as the problem is linear, and by
-//! k²(1 ± 1/q)² where it bends, with q = δ̂ over the standard deviation.
+//! Boards that are face-on to a beam determine its direction only by the curvature of the range, ½·s·δ². Noise moves
+//! the estimate to some δ̂, where they appear to have a lever, s·δ̂, and so to determine something; yet −δ̂ fits
+//! equally well. The profile of ‖f‖² along a direction, with all other parameters at their optimum, shows this (Bates
+//! and Watts, "Nonlinear Regression Analysis and Its Applications", 1988, section 6.1): over k standard deviations it
+//! rises by k² if the problem is linear, and by k²(1 ± 1/q)² if it is curved, with q = δ̂ over the standard deviation.
 
+use super::group::Element;
 use super::linear::Linear;
-use super::problem::{Element, Joint};
-use crate::least_squares::{self, GroupJacobian, GroupedProblem, Point, Solution};
+use super::problem::Joint;
+use crate::lsq::{self, GroupJacobian, GroupedProblem, Point, Solution};
 use catoptric_model::frame;
 use nalgebra::{DVector, Matrix2, Vector2, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Standard deviations by which a direction is moved: as far as a 95 % region reaches.
+/// Number of standard deviations by which a direction is moved: the extent of a 95 % region.
 const REACH: f64 = 2.0;
 
-/// Rise of the profile, over that of a linear problem, within which it counts as one: q ≥ 7.5.
+/// Rise of the profile, relative to that of a linear problem, that counts as linear: q ≥ 7.5.
 const LINEAR_RISE: std::ops::Range<f64> = 0.75..1.33;
 
-/// Standard deviation below which nothing bends, in radians (0.1°): ranges over twice of it do by 0.03 mm at 5 m.
+/// Standard deviation below which curvature is negligible, in radians (0.1°): over twice that, a range at 5 m bends by
+/// 0.03 mm.
 pub(super) const STRAIGHT_SD: f64 = 0.1 * std::f64::consts::PI / 180.0;
 
-/// Part of its standard deviation to which a moved direction is held.
+/// Tolerance to which a moved direction is held, as a fraction of its standard deviation.
 const HELD: f64 = 1e-2;
 
-/// How closely a profile is wanted: its rise is compared with a quarter.
-const SEARCH: least_squares::Options = least_squares::Options {
+/// Accuracy of a profile: its rise is compared with a quarter.
+const SEARCH: lsq::Options = lsq::Options {
     reduction_tolerance: 1e-6,
     step_tolerance: 1e-9,
     gradient_tolerance: 1e-9,
@@ -35,7 +37,7 @@ const SEARCH: least_squares::Options = least_squares::Options {
     rank_threshold: 1e-11,
 };
 
-/// A direction of one element that is moved from where it was found.
+/// One element's direction, moved from the solution.
 struct Moved<'a> {
     joint: &'a Joint<'a>,
     group: usize,
@@ -47,17 +49,17 @@ struct Moved<'a> {
     held: f64,
 }
 
-/// The direction of a facet that is known least.
+/// The least certain direction of a facet.
 struct Weakest<'a> {
     element: &'a Element,
     sd: f64,
     axis: Vector3<f64>,
-    /// The combination of parameters that it is.
+    /// The direction as a combination of parameters.
     combination: DVector<f64>,
 }
 
 impl Joint<'_> {
-    /// Facets, by their index in the session, whose covariance does not hold as far as it reaches.
+    /// Facets, by index in the session, whose linear covariance does not hold over its extent.
     pub(super) fn bent(&self, solution: &Solution) -> BTreeSet<usize> {
         let bends = |group: usize, weakest: &Weakest| {
             [REACH, -REACH].iter().any(|k| {
@@ -71,7 +73,8 @@ impl Joint<'_> {
             .collect()
     }
 
-    /// The least known direction of each facet, by group and facet, if it is known badly enough for anything to bend.
+    /// The least certain direction of each facet, by group and facet, if it is uncertain enough for curvature to
+    /// matter.
     fn weakest<'a>(&'a self, solution: &'a Solution) -> BTreeMap<(usize, usize), Weakest<'a>> {
         let information = &solution.information;
         let mut weakest: BTreeMap<(usize, usize), Weakest> = BTreeMap::new();
@@ -110,7 +113,7 @@ impl Joint<'_> {
         weakest
     }
 
-    /// How much ‖f‖² rises over k standard deviations, in k². `None` where nothing is defined so far away.
+    /// Rise of ‖f‖² over k standard deviations, divided by k². `None` if the problem is undefined that far away.
     fn rise(&self, solution: &Solution, group: usize, weakest: &Weakest, k: f64) -> Option<f64> {
         let step = solution.information.step_along(&weakest.combination)?;
         let moved = Moved {
@@ -122,14 +125,14 @@ impl Joint<'_> {
             held: HELD * weakest.sd,
         };
         let problem = self.with_priors(&moved);
-        let profile = least_squares::minimize(&problem, solution.state.retract(&(step * k)), &SEARCH).ok()?;
+        let profile = lsq::minimize(&problem, solution.state.retract(&(step * k)), &SEARCH).ok()?;
         Some((profile.sum_of_squares - solution.sum_of_squares) / (k * k))
     }
 }
 
 impl Moved<'_> {
-    /// The element linearized, with the derivatives of its rows, and how far it is from where it is to be, in parts of how
-    /// closely it is held.
+    /// The element linearized, the derivatives of its rows, and its distance from the prescribed angle in units of the
+    /// tolerance.
     fn row(&self, shared: &Point, own: &Point) -> Option<(Linear, GroupJacobian, f64)> {
         let group = &self.joint.groups[self.group];
         let boards = self.joint.boards(group, shared, own)?;

@@ -1,72 +1,72 @@
-//! Poses that a board can take before a facet: a low-discrepancy sequence, less what is not possible.
+//! Possible board poses in front of a facet: a low-discrepancy sequence without the poses that are impossible.
 //!
-//! A pose is given by the beam aimed at, the range s, the tilt α, its direction ψ and the roll about the normal. Number n
-//! of the sequence has them at the fractional parts of n/γ, n/γ², …, γ⁶ = γ + 1 (Roberts' generalization of the golden
-//! ratio). A pose is possible if the board stands in the room, clear of the rig, serves some elements with their whole
-//! spots, and none of these at an incidence beyond the limit.
+//! A pose is given by the beam aimed at, the range s, the tilt α, its direction ψ and the roll about the normal. Number
+//! n of the sequence has them at the fractional parts of n/γ, n/γ², …, γ⁶ = γ + 1 (Roberts' generalization of the
+//! golden ratio). A pose is possible if the board is inside the room, clear of the rig, serves some elements with their
+//! whole spots, and is hit by none of these at an incidence beyond the limit.
 //!
-//! Beam divergence bounds the lever s·tan α. A spot on a tilted board bends the leading edge by about κ(s·tan α)²,
-//! κ = k·σ_δ²/(2p), which no belief of a session covers; where that passes `UNMODELED` a longer lever is no gain.
+//! Beam divergence bounds the lever s·tan α. A spot on a tilted board bends the leading edge by about κ(s·tan α)², κ =
+//! k·σ_δ²/(2p), which no belief of a session covers; where that exceeds `UNMODELED` a longer lever gains nothing.
 
-use super::Request;
+use super::request::Request;
 use super::situation::{Element, Fan, Situation, in_sensor};
 use crate::error::CalibError;
-use crate::observations::{BoardInSensor, cone_half_angle};
+use crate::readings::observations::{BoardInSensor, cone_half_angle};
 use catoptric_model::frame::tangent_basis;
 use catoptric_model::session::BoardSheet;
 use catoptric_model::{Pose, Session};
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
-/// Least distance between a board and the shell of the room, in metres.
+/// Minimum distance between a board and the shell of the room, in meters.
 const WALL_CLEARANCE: f64 = 0.03;
 
-/// Least distance between a board and the outermost part of the rig, in metres.
+/// Minimum distance between a board and the outermost part of the rig, in meters.
 const RIG_CLEARANCE: f64 = 0.1;
 
-/// Poses tried around each that was chosen.
+/// Number of poses tried around each chosen one.
 const NEAR: usize = 48;
 
-/// How far they are off at first: beams, metres, and degrees of tilt, direction and roll.
+/// Their initial offsets: beams, meters, and degrees of tilt, direction and roll.
 const AROUND: (f64, f64, f64, f64, f64) = (12.0, 0.3, 10.0, 25.0, 40.0);
 
 /// Real root of γ⁶ = γ + 1.
 const GAMMA: f64 = 1.134_724_138_401_519_4;
 
-/// Range error by a spot on a tilted board that is borne, in metres: about a pose's drift.
+/// Tolerated range error from a spot on a tilted board, in meters: about a pose's drift.
 const UNMODELED: f64 = 1e-3;
 
-/// Standard deviation of a pulse in range, in metres: 1 ns (assumed).
+/// Standard deviation of a pulse in range, in meters: 1 ns (assumed).
 const PULSE_SD: f64 = 0.15;
 
 /// √(2·ln 2): the edge is timed at half its height (assumed).
 const HALF_HEIGHT: f64 = 1.177_410_022_515_474_7;
 
-/// A pose that a board can take.
+/// A possible pose of a board.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
     /// The board.
     pub board: String,
-    /// Where it would stand.
+    /// Its pose.
     pub room_from_board: Pose,
-    /// Beam that its center is on.
+    /// Beam at which its center is aimed.
     pub beam: usize,
-    /// Way from the mirror to its center, in metres.
+    /// Distance from the mirror to its center, in meters.
     pub range_m: f64,
     /// Tilt against that beam, in degrees.
     pub tilt_deg: f64,
     /// Direction to which its normal leans, seen along that beam in the room, in degrees: 0 to growing azimuth, 90 up.
     pub direction_deg: f64,
-    /// Turn about its normal, in degrees; at 0 its x axis lies along the fan as far as the tilt allows.
+    /// Rotation about its normal, in degrees; at 0 its x axis is along the fan as far as the tilt allows.
     pub roll_deg: f64,
     /// Beams that it serves, in order.
     pub beams: Vec<usize>,
     /// The board in the sensor frame.
     pub(crate) in_sensor: BoardInSensor,
-    /// The elements of those beams, by their numbers in the fan.
+    /// The elements of those beams, by their index in the fan.
     pub(crate) served: Vec<usize>,
 }
 
-/// What one number of the sequence asks for.
+/// A pose that the sequence proposes.
 struct Wish {
     element: usize,
     board: usize,
@@ -76,7 +76,7 @@ struct Wish {
     roll_deg: f64,
 }
 
-/// Longest lever s·tan α that beam divergence leaves useful, in metres.
+/// Longest lever s·tan α that is useful despite beam divergence, in meters.
 pub fn longest_lever(session: &Session) -> f64 {
     // The full 1/e² width is four standard deviations.
     let spread = 0.25e-3 * session.scanner.divergence_full_mrad;
@@ -84,11 +84,11 @@ pub fn longest_lever(session: &Session) -> f64 {
     (UNMODELED / kappa).sqrt()
 }
 
-/// All poses of the sequence that are possible before a facet, in order.
+/// All poses of the sequence that are possible in front of a facet, in order.
 ///
 /// # Errors
-/// [`CalibError::UnknownFacet`], [`CalibError::Session`] for limits that leave nothing, [`CalibError::NoPlace`] if no pose
-/// is possible, with what stood in the way most often.
+/// [`CalibError::UnknownFacet`], [`CalibError::Session`] for limits that exclude everything, [`CalibError::NoPlace`] if
+/// no pose is possible, with the most frequent obstacle.
 pub fn candidates(
     situation: &Situation,
     facet: &str,
@@ -126,8 +126,8 @@ pub fn candidates(
     Ok(found)
 }
 
-fn whole_centimetres(metres: f64) -> f64 {
-    (metres * 100.0).round() / 100.0
+fn whole_centimeters(meters: f64) -> f64 {
+    (meters * 100.0).round() / 100.0
 }
 
 /// Why a pose is not possible.
@@ -151,16 +151,18 @@ impl Refusal {
 
     fn words(self) -> &'static str {
         match self {
-            Self::Range => "walls, floor or ceiling are nearer than the least range",
+            Self::Range => "walls, floor or ceiling are nearer than the minimum range",
             Self::Room => "the board would reach through a wall, floor or ceiling",
-            Self::Rig => "the board would stand in the rig",
-            Self::Incidence => "a beam would meet the board beyond the largest incidence",
-            Self::Unserved => "the board would hold no beam's spot, directions as well known as they are",
+            Self::Rig => "the board would be inside the rig",
+            Self::Incidence => "a beam would hit the board beyond the largest incidence",
+            Self::Unserved => {
+                "the board would hold no beam's whole spot, given how well directions are known"
+            }
         }
     }
 }
 
-/// What all candidates of a facet share.
+/// Inputs shared by all candidates of a facet.
 pub(super) struct Site<'a> {
     situation: &'a Situation,
     fan: &'a Fan,
@@ -181,10 +183,10 @@ fn check(request: &Request) -> Result<(), CalibError> {
     };
     let [low, high] = request.range_m;
     if !(low.is_finite() && low > 0.0) {
-        return fail("least range", "a positive number of metres", low);
+        return fail("minimum range", "a positive number of meters", low);
     }
     if !(high.is_finite() && high >= low) {
-        return fail("greatest range", "at least the least range", high);
+        return fail("maximum range", "at least the minimum range", high);
     }
     if !(request.max_incidence_deg > 0.0 && request.max_incidence_deg < 90.0) {
         return fail(
@@ -201,7 +203,7 @@ fn names(session: &Session) -> String {
     names.join(", ")
 }
 
-/// Radius around the sensor that markers and mirrors reach to, in metres.
+/// Radius around the sensor within which all markers and mirrors are, in meters.
 fn rig_radius(session: &Session) -> f64 {
     let sensor_from_rig = Pose::from(&session.nominal_rig_from_sensor).inverse();
     let markers = session.rig_markers.iter().map(|m| sensor_from_rig * m.position());
@@ -225,7 +227,7 @@ impl<'a> Site<'a> {
         }
     }
 
-    /// The possible ones of some poses around another, the closer the later the round.
+    /// The possible ones among some poses around another; later rounds try closer ones.
     pub(super) fn near(&self, center: &Candidate, round: i32) -> Vec<Candidate> {
         let elements = &self.fan.elements;
         let boards = &self.situation.session().boards;
@@ -241,12 +243,12 @@ impl<'a> Site<'a> {
             let element = (aimed as f64 + off(1, AROUND.0))
                 .round()
                 .clamp(0.0, elements.len() as f64 - 1.0);
-            // Not negative and no more than the number of elements.
+            // Not negative and below the number of elements.
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             Wish {
                 element: element as usize,
                 board,
-                range: whole_centimetres(center.range_m + off(2, AROUND.1)),
+                range: whole_centimeters(center.range_m + off(2, AROUND.1)),
                 tilt_deg: (center.tilt_deg + off(3, AROUND.2)).round().max(0.0),
                 direction_deg: (center.direction_deg + off(4, AROUND.3))
                     .round()
@@ -259,7 +261,7 @@ impl<'a> Site<'a> {
 
     /// Number n of the sequence.
     fn wish(&self, number: usize) -> Wish {
-        // An even start and one step of the sequence for each seed, which moves all dimensions.
+        // An even start, and for each seed one step of the sequence, which moves all dimensions.
         let at = |dimension: i32| {
             let start = 0.5 + (self.request.seed % 1_000_003) as f64 * 0.618_033_988_749_894_9;
             (start + number as f64 * GAMMA.powi(-dimension)).fract()
@@ -270,18 +272,18 @@ impl<'a> Site<'a> {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let element = ((at(1) * elements as f64) as usize).min(elements - 1);
         let reach = self.reach(&self.fan.elements[element]).min(high);
-        // Whole centimetres and degrees, so that a person can set up what is said.
+        // Whole centimeters and degrees, so that a person can set up the pose as printed.
         Wish {
             element,
             board: number % self.situation.session().boards.len(),
-            range: whole_centimetres(low + (reach - low) * at(2)),
+            range: whole_centimeters(low + (reach - low) * at(2)),
             tilt_deg: (self.request.max_incidence_deg * at(3)).round(),
             direction_deg: (360.0 * at(4)).round() % 360.0,
             roll_deg: (180.0 * at(5)).round() % 180.0,
         }
     }
 
-    /// Way of an element's ray to the shell of the room, in metres.
+    /// Distance along an element's ray to the shell of the room, in meters.
     fn reach(&self, element: &Element) -> f64 {
         let (origin, v) = self.ray(element);
         let room = self.situation.session().room.as_ref();
@@ -302,8 +304,8 @@ impl<'a> Site<'a> {
         let sheet = &session.boards[wish.board];
         let aimed = &self.fan.elements[wish.element];
         let (sin, cos) = libm::sincos(wish.tilt_deg.to_radians());
-        let [least, greatest] = self.request.range_m;
-        if wish.range < least || wish.range > greatest || wish.range * sin > self.lever * cos {
+        let [min, max] = self.request.range_m;
+        if wish.range < min || wish.range > max || wish.range * sin > self.lever * cos {
             return Err(Refusal::Range);
         }
         let room_from_board = self.pose(wish);
@@ -341,7 +343,7 @@ impl<'a> Site<'a> {
         })
     }
 
-    /// The board on the ray, tilted against it; without a roll its x axis lies along the fan as far as the tilt allows.
+    /// The board on the ray, tilted against it; without a roll its x axis is along the fan as far as the tilt allows.
     fn pose(&self, wish: &Wish) -> Pose {
         let elements = &self.fan.elements;
         let (origin, v) = self.ray(&elements[wish.element]);
@@ -365,7 +367,7 @@ impl<'a> Site<'a> {
     }
 }
 
-/// Whether all corners of a board lie inside the room.
+/// Whether all corners of a board are inside the room.
 fn stands_in(session: &Session, sheet: &BoardSheet, room_from_board: &Pose) -> bool {
     let Some(room) = &session.room else {
         return true;
@@ -376,7 +378,7 @@ fn stands_in(session: &Session, sheet: &BoardSheet, room_from_board: &Pose) -> b
     })
 }
 
-/// Distance between the sensor and the nearest point of a board, in metres.
+/// Distance between the sensor and the nearest point of a board, in meters.
 fn distance_from_sensor(board: &BoardInSensor) -> f64 {
     let sensor = board.sensor_from_board.inverse_transform_point(&Point3::origin());
     let half = [0.5 * board.outline.width, 0.5 * board.outline.height];

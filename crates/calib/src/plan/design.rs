@@ -1,41 +1,43 @@
-//! From candidates to a design: one by one the best, then exchanges until none is better.
+//! From candidates to a design: greedy choice, then exchanges until none improves it.
 //!
-//! Each element keeps C, the covariance of (cos φ·θ_a, φ, q). A board with row g and variance σ² makes it
-//! C − (Cg)(Cg)ᵀ/(σ² + gᵀCg), whatever the order of boards. The angles start from a prior so wide that it does not count,
-//! so that elements without boards have a large but finite cost.
+//! Each element keeps C, the covariance of (cos φ·θ_a, φ, q). A board with row g and variance σ² makes it C −
+//! (Cg)(Cg)ᵀ/(σ² + gᵀCg), in any order of boards. The angles start from a prior so wide that it has no weight, so that
+//! elements without boards have a large but finite cost.
 
+use super::answer::{Open, Standing};
 use super::candidates::{Candidate, Site, candidates};
+use super::request::{Criterion, Request};
 use super::situation::{Element, Fan, Situation};
-use super::{Criterion, Open, Request, Standing, words};
-use crate::common::CommonErrors;
-use crate::covariance::{self, MountUncertainty, Sighting};
-use crate::element::LEAST_BOARDS;
+use super::words;
+use crate::element::attempt::MIN_BOARDS;
 use crate::error::CalibError;
-use crate::observability::{self, WEAKEST_SD};
-use crate::observations::BoardView;
-use crate::solve::libm_cos;
+use crate::judge::common::CommonErrors;
+use crate::judge::covariance::{self, MountUncertainty, Sighting};
+use crate::judge::levers::libm_cos;
+use crate::judge::observability::{self, WEAKEST_SD};
+use crate::readings::observations::BoardView;
 use catoptric_model::Session;
 use nalgebra::{DMatrix, DVector, Matrix6};
 
-/// Prior of each angle, in radians (30°): 10⁻⁶ of what a determined element knows.
+/// Prior of each angle, in radians (30°): 10⁻⁶ of the information about a determined element.
 const PRIOR_SD: f64 = std::f64::consts::PI / 6.0;
 
-/// Variance that stands for none, in square metres: a micrometre's.
-const LEAST_VARIANCE: f64 = 1e-12;
+/// Smallest variance, in square meters: that of one micrometer.
+const MIN_VARIANCE: f64 = 1e-12;
 
-/// Cost of each board that an element lacks, as log det: more than any board between candidates makes.
+/// Cost of each board that an element lacks, as log det: more than the difference between any two candidate boards.
 const LACKING_LOG_DET: f64 = 10.0;
 
-/// Relative gain below which an exchange is none.
-const LEAST_GAIN: f64 = 1e-9;
+/// Relative gain below which an exchange is not made.
+const MIN_GAIN: f64 = 1e-9;
 
-/// Rounds of exchanges, at most; five are usual.
-const MOST_ROUNDS: usize = 50;
+/// Maximum number of rounds of exchanges; five are usual.
+const MAX_ROUNDS: usize = 50;
 
-/// Rounds of looking around the chosen poses, each at half the distance of the one before.
+/// Number of rounds of trying poses around the chosen ones, each at half the distance of the round before.
 const REFINEMENTS: i32 = 4;
 
-/// What one board tells of one element.
+/// The contribution of one board to one element.
 #[derive(Debug, Clone)]
 struct Row {
     element: usize,
@@ -43,14 +45,14 @@ struct Row {
     variance: f64,
 }
 
-/// What is known of one element.
+/// The information about one element.
 #[derive(Debug, Clone)]
 struct Known {
     covariance: DMatrix<f64>,
     boards: usize,
 }
 
-/// Candidates before one facet, and what sets of them are worth.
+/// Candidates in front of one facet, and the value of sets of them.
 pub struct Designer<'a> {
     situation: &'a Situation,
     fan: &'a Fan,
@@ -58,12 +60,12 @@ pub struct Designer<'a> {
     site: Site<'a>,
     candidates: Vec<Candidate>,
     rows: Vec<Vec<Row>>,
-    /// With the boards there are.
+    /// With the boards already recorded or planned.
     start: Vec<Known>,
 }
 
 impl<'a> Designer<'a> {
-    /// The candidates before a facet.
+    /// Finds the candidates in front of a facet.
     ///
     /// # Errors
     /// As [`candidates`].
@@ -92,17 +94,17 @@ impl<'a> Designer<'a> {
         self.candidates.len()
     }
 
-    /// Never: without a candidate there is no designer.
+    /// Always `false`: a designer has at least one candidate.
     pub fn is_empty(&self) -> bool {
         self.candidates.is_empty()
     }
 
-    /// A candidate by its number.
+    /// A candidate by its index.
     pub fn candidate(&self, number: usize) -> &Candidate {
         &self.candidates[number]
     }
 
-    /// The criterion over all elements with some candidates set up; less is better. A is in deg², D a log of rad⁴.
+    /// The criterion over all elements with some candidates set up; lower is better. A is in deg², D a log of rad⁴.
     pub fn cost(&self, chosen: &[usize]) -> f64 {
         self.total(&self.with(chosen))
     }
@@ -132,8 +134,8 @@ impl<'a> Designer<'a> {
         }
     }
 
-    /// The bound of one beam with some candidates set up, in degrees per axis, the mounting taken as known; `None` for a
-    /// beam that is open.
+    /// The bound of one beam with some candidates set up, in degrees per axis, with the mounting taken as known; `None`
+    /// for a beam that is open.
     pub fn bound_deg(&self, beam: usize, chosen: &[usize]) -> Option<f64> {
         let number = self.fan.elements.iter().position(|e| e.beam == beam)?;
         if self.reasons(chosen)[number].is_some() {
@@ -146,8 +148,8 @@ impl<'a> Designer<'a> {
 
     /// The best set that greedy choice and exchange find, the most informative first.
     ///
-    /// Poses around those chosen become candidates too, and are exchanged for them while that is better. The same
-    /// candidate may be in the set more than once: setting a board up anew has a drift and marker errors of its own.
+    /// Poses around those chosen become candidates too, and replace them as long as that improves the set. The same
+    /// candidate may be in the set more than once: a board set up anew has its own drift and marker errors.
     pub fn best(&mut self, poses: usize) -> Vec<usize> {
         let mut chosen = Vec::with_capacity(poses);
         let mut known = self.start.clone();
@@ -170,10 +172,10 @@ impl<'a> Designer<'a> {
         self.ordered(chosen)
     }
 
-    /// Exchanges chosen candidates for others until no exchange is better.
+    /// Exchanges chosen candidates for others until no exchange improves the set.
     fn exchange(&self, chosen: &mut [usize]) {
         let mut cost = self.cost(chosen);
-        for _ in 0..MOST_ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             let mut changed = false;
             for place in 0..chosen.len() {
                 let others: Vec<usize> = (0..chosen.len())
@@ -183,7 +185,7 @@ impl<'a> Designer<'a> {
                 let without = self.with(&others);
                 let (best, gain) = self.most_useful(&without, 0..self.len());
                 let better = self.total(&without) - gain;
-                if better < cost - LEAST_GAIN * cost.abs() {
+                if better < cost - MIN_GAIN * cost.abs() {
                     chosen[place] = best;
                     cost = better;
                     changed = true;
@@ -195,7 +197,7 @@ impl<'a> Designer<'a> {
         }
     }
 
-    /// The elements that are open with some candidates set up, and why, neighbors together.
+    /// The elements that are open with some candidates set up, and why; neighbors are merged.
     pub fn open(&self, chosen: &[usize]) -> Vec<Open> {
         let reasons = self.reasons(chosen);
         let mut open: Vec<(usize, String)> = (self.fan.elements.iter().zip(reasons))
@@ -218,9 +220,9 @@ impl<'a> Designer<'a> {
                     .filter(|c| c.served.binary_search(&number).is_ok())
                     .map(|c| self.view(c)),
             );
-            if views.len() < LEAST_BOARDS {
+            if views.len() < MIN_BOARDS {
                 return Some(format!(
-                    "it reads {} of the {} boards before its facet; {LEAST_BOARDS} are needed",
+                    "it reads {} of the {} boards in front of its facet; {MIN_BOARDS} are needed",
                     views.len(),
                     self.fan.boards + chosen.len()
                 ));
@@ -232,7 +234,7 @@ impl<'a> Designer<'a> {
         self.fan.elements.iter().enumerate().map(of_one).collect()
     }
 
-    /// Puts the most informative first.
+    /// Sorts by information, the most informative first.
     fn ordered(&self, mut rest: Vec<usize>) -> Vec<usize> {
         let mut known = self.start.clone();
         let mut ordered = Vec::with_capacity(rest.len());
@@ -247,7 +249,7 @@ impl<'a> Designer<'a> {
         ordered
     }
 
-    /// The candidate that lowers the cost most, the first of equals, and by how much.
+    /// The candidate that lowers the cost most (the first of equals), and by how much.
     fn most_useful(&self, known: &[Known], among: impl Iterator<Item = usize>) -> (usize, f64) {
         let before: Vec<f64> = known
             .iter()
@@ -274,9 +276,9 @@ impl<'a> Designer<'a> {
         sum / known.len() as f64
     }
 
-    /// Cost of one element by C₁₁, C₁₂ and C₂₂ of its angles, in rad².
+    /// Cost of one element from C₁₁, C₁₂ and C₂₂ of its angles, in rad².
     fn cost_of(&self, [a, b, c]: [f64; 3], boards: usize) -> f64 {
-        let lacking = LEAST_BOARDS.saturating_sub(boards) as f64;
+        let lacking = MIN_BOARDS.saturating_sub(boards) as f64;
         let squared_deg = (180.0 / std::f64::consts::PI).powi(2);
         match self.request.criterion {
             Criterion::A => (0.5 * (a + c) + lacking * WEAKEST_SD * WEAKEST_SD) * squared_deg,
@@ -292,7 +294,7 @@ impl<'a> Designer<'a> {
         known
     }
 
-    /// What the boards there are tell; with the mounting as unknown as it is, or as known.
+    /// What is known from the existing boards, with the actual uncertainty of the mounting or with a known mounting.
     fn start(&self, mounting: bool) -> Vec<Known> {
         let session = self.situation.session();
         let columns = 2 + CommonErrors::of(session).len() + 1 + if mounting { 6 } else { 0 };
@@ -353,7 +355,7 @@ impl<'a> Designer<'a> {
         Some(Row {
             element: number,
             g,
-            variance: seen.own.max(LEAST_VARIANCE),
+            variance: seen.own.max(MIN_VARIANCE),
         })
     }
 
@@ -362,7 +364,7 @@ impl<'a> Designer<'a> {
         candidate.in_sensor.view(noise, self.request.readings)
     }
 
-    /// The boards that an element reads already.
+    /// The boards that an element already reads.
     fn views<'s>(&'s self, element: &Element) -> Vec<BoardView<'s>> {
         let boards = &self.situation.boards;
         element
@@ -391,10 +393,10 @@ fn corner(covariance: &DMatrix<f64>) -> [f64; 3] {
     [covariance[(0, 0)], covariance[(0, 1)], covariance[(1, 1)]]
 }
 
-/// The angles' part of C − (Cg)(Cg)ᵀ/(σ² + gᵀCg), without the rest.
+/// The angles' block of C − (Cg)(Cg)ᵀ/(σ² + gᵀCg), without the rest.
 fn updated_corner(covariance: &DMatrix<f64>, row: &Row) -> [f64; 3] {
     let (mut first, mut second, mut whole) = (0.0, 0.0, row.variance);
-    // By columns, as they lie in memory; C is symmetric.
+    // By columns, as stored in memory; C is symmetric.
     for (column, g) in covariance.column_iter().zip(row.g.iter()) {
         first += column[0] * g;
         second += column[1] * g;

@@ -1,37 +1,41 @@
-//! What the experimenter knows before the next pose: the drawing or what was recorded, never the truth.
+//! What the experimenter knows before the next pose: the drawing or a recording, never the truth.
 
-use crate::calibrate::{believable, calibrate, plane_as_built, plane_as_drawn, prepare};
-use crate::covariance::MountUncertainty;
+use crate::calibrate::calibrate;
+use crate::element::choose;
+use crate::element::facet_plane::{plane_as_built, plane_as_drawn};
 use crate::error::CalibError;
-use crate::observations::{BoardInSensor, azimuth, cone_half_angle};
-use crate::options::{Method, Options};
-use crate::pose;
-use crate::spread;
+use crate::judge::covariance::MountUncertainty;
+use crate::method::Method;
+use crate::mount::pose;
+use crate::options::Options;
+use crate::prepare::{believable, prepare};
+use crate::readings::observations::{BoardInSensor, azimuth, cone_half_angle};
+use crate::readings::spread;
 use catoptric_model::session::{BoardSheet, NominalFacet};
 use catoptric_model::{
-    BoardPlane, Dataset, Deflection, MirrorPlane, Pose, PoseKind, PoseLabel, PoseRecord, Session, Status,
-    Summary, beam,
+    BoardPlane, Dataset, Deflection, MirrorPlane, Pose, PoseKind, PoseLabel, PoseRecord, Readings, Session,
+    Status, Summary, beam,
 };
 use nalgebra::Point3;
 
-/// Directions that a drawing may be off by, in radians: what the rules that set boards up allow for (3°).
+/// Direction error allowed for a drawing, in radians: the same as in the rules that set boards up (3°).
 const DRAWN_MARGIN: f64 = 0.05;
 
-/// Directions that a facet's plane as built may be off by, in radians.
+/// Direction error allowed for a facet's plane as built, in radians.
 const BUILT_MARGIN: f64 = 0.01;
 
-/// A board that stands, or will stand, somewhere.
+/// A board that is or will be set up somewhere.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Placed {
     /// The board.
     pub board: String,
-    /// Facet in whose fan it stands; `None` before beams that no mirror deflects.
+    /// Facet in whose fan it is; `None` in front of beams that no mirror deflects.
     pub facet: Option<String>,
-    /// Where it stands.
+    /// Its pose.
     pub room_from_board: Pose,
-    /// First and last beam that it is set up for, if that is noted.
+    /// First and last beam that it is set up for, if noted.
     pub beams: Option<[usize; 2]>,
-    /// Readings of each element.
+    /// Number of readings of each element.
     pub readings: usize,
 }
 
@@ -41,7 +45,7 @@ pub(crate) struct Element {
     pub(crate) beam: usize,
     pub(crate) azimuth: f64,
     pub(crate) deflection: Deflection,
-    /// Boards it reads: number, noise of one reading in metres, readings.
+    /// Boards that it reads: index, noise of one reading in meters, number of readings.
     pub(crate) read: Vec<(usize, f64, usize)>,
 }
 
@@ -51,13 +55,13 @@ pub(crate) struct Fan {
     pub(crate) elements: Vec<Element>,
     /// Elements that no board can help, and why.
     pub(crate) excluded: Vec<(usize, String)>,
-    /// How far directions may be off, in radians.
+    /// Direction error allowed, in radians.
     pub(crate) margin: f64,
-    /// Boards that stand before this facet.
+    /// Number of boards in front of this facet.
     pub(crate) boards: usize,
 }
 
-/// What is known before the next pose.
+/// Everything known before the next pose.
 #[derive(Debug, Clone)]
 pub struct Situation {
     session: Session,
@@ -70,7 +74,7 @@ pub struct Situation {
 impl Situation {
     /// Before anything is recorded: the drawing, with the boards that will be recorded in any case.
     ///
-    /// Boards before undeflected beams tell how well the mounting will be known.
+    /// Boards in front of undeflected beams determine how well the mounting will be known.
     ///
     /// # Errors
     /// [`CalibError::Facet`] for a facet without a plane.
@@ -111,7 +115,7 @@ impl Situation {
         })
     }
 
-    /// After a recording: what its boards tell is the start.
+    /// After a recording: starts from what its boards determine.
     ///
     /// # Errors
     /// As [`calibrate`](fn@calibrate).
@@ -122,7 +126,7 @@ impl Situation {
         let options = Options::default();
         let calibration = calibrate(dataset, Method::BeamGls, &options)?;
         let prepared = prepare(dataset)?;
-        let work = prepared.workspace(dataset, Method::BeamGls, &options);
+        let work = prepared.workspace(dataset, &options);
         // Boards that could not be placed are in no element's list.
         let mut boards = Vec::new();
         let mut number_of = vec![None; dataset.poses.len()];
@@ -161,7 +165,7 @@ impl Situation {
                 if let Some(found) = estimate.and_then(|e| e.deflection()) {
                     element.deflection = found;
                 }
-                let hit = work.boards_at(element.beam, facet, &plane, &element.deflection);
+                let hit = choose::boards_at(&work, element.beam, facet, &plane, &element.deflection);
                 for pose in hit.unwrap_or_default() {
                     if let Some(number) = number_of[pose] {
                         let summary = &work.summaries[pose][element.beam];
@@ -187,17 +191,17 @@ impl Situation {
         })
     }
 
-    /// What the experimenter knows.
+    /// The session.
     pub fn session(&self) -> &Session {
         &self.session
     }
 
-    /// Where the sensor stands, as far as it is known.
+    /// Pose of the sensor in the room, as far as it is known.
     pub fn room_from_sensor(&self) -> &Pose {
         &self.room_from_sensor
     }
 
-    /// The beams of a facet that a board can help, with their rays in the room; none for a name that is no facet's.
+    /// The beams of a facet that a board can help, with their rays in the room; empty for an unknown name.
     pub fn rays(&self, facet: &str) -> Vec<(usize, Point3<f64>, nalgebra::Unit<nalgebra::Vector3<f64>>)> {
         let fan = self.fan(facet).map_or(&[][..], |fan| &fan.elements);
         fan.iter()
@@ -224,7 +228,7 @@ impl Fan {
             margin,
             boards: 0,
         };
-        for beam in facet.beams[0]..=facet.beams[1] {
+        for beam in session.scanner.scan.run(facet.beams) {
             let azimuth = azimuth(session, beam);
             let Some(deflection) = plane.deflect(beam::direction(azimuth)) else {
                 let reason = "the facet's plane does not face it".to_owned();
@@ -247,9 +251,9 @@ impl Fan {
 }
 
 impl Element {
-    /// Whether a board holds the element's whole spot on its face, directions being off by up to `margin`.
+    /// Whether a board holds the element's whole spot on its face, for direction errors up to `margin`.
     pub(crate) fn is_held(&self, board: &BoardInSensor, cone: f64, margin: f64) -> bool {
-        /// Board to spare beside a spot, in metres.
+        /// Margin of board required around a spot, in meters.
         const EDGE_MARGIN: f64 = 5e-3;
         let (origin, v) = (
             self.deflection.deflection_point(self.azimuth),
@@ -262,7 +266,7 @@ impl Element {
             })
     }
 
-    /// Another facet that the outgoing ray meets.
+    /// Another facet that the outgoing ray hits.
     fn shaded_by<'s>(&self, session: &'s Session, own: &NominalFacet) -> Option<&'s str> {
         let origin = self.deflection.deflection_point(self.azimuth);
         let v = self.deflection.exit_direction(self.azimuth);
@@ -280,7 +284,7 @@ impl Element {
     }
 }
 
-/// Whether a point of a convex polygon's plane lies in it; corners counter-clockwise about the normal.
+/// Whether a point in the plane of a convex polygon is inside it; corners counterclockwise about the normal.
 fn is_inside(corners: &[Point3<f64>], plane: &BoardPlane, at: &Point3<f64>) -> bool {
     let edges = corners.iter().zip(corners.iter().cycle().skip(1));
     edges
@@ -312,7 +316,8 @@ pub(crate) fn in_sensor(
     }
 }
 
-/// How well the boards before undeflected beams will place the sensor: step 5 on the readings that the drawing predicts.
+/// How well the boards in front of undeflected beams will place the sensor: step 5 on the readings predicted from the
+/// drawing.
 fn expected_mount(session: &Session, room_from_rig: &Pose, placed: &[Placed]) -> MountUncertainty {
     let rig_from_sensor = Pose::from(&session.nominal_rig_from_sensor);
     let mut poses = Vec::new();
@@ -333,21 +338,21 @@ fn expected_mount(session: &Session, room_from_rig: &Pose, placed: &[Placed]) ->
             room_from_board: Some(place.room_from_board),
             motion: None,
             watched: Vec::new(),
-            beams: session.scanner.beams,
-            ranges: Vec::new(),
+            readings: Readings::in_memory(session.scanner.scan.beams(), Vec::new()),
         });
     }
     let dataset = Dataset {
         session: session.clone(),
         poses,
+        id: None,
     };
     pose::estimate(&dataset, &summaries).uncertainty
 }
 
-/// What every undeflected beam would read of a board, free of chance.
+/// The noise-free readings of a board by every undeflected beam.
 fn predicted(session: &Session, board: &BoardInSensor, readings: usize) -> Vec<Summary> {
     let believed = &session.believed;
-    (0..session.scanner.beams)
+    (0..session.scanner.scan.beams())
         .map(|b| {
             let u = beam::direction(azimuth(session, b));
             match board.hit(&Point3::origin(), &u) {

@@ -1,11 +1,11 @@
 //! One facet in a room of 6 m: the search against the budget of the estimator, and what a design must never do.
 
 use super::*;
-use crate::covariance::{self, MountUncertainty};
-use crate::observations::BoardView;
+use crate::judge::covariance::{self, MountUncertainty};
+use crate::readings::observations::BoardView;
 use catoptric_model::frame::tangent_basis;
 use catoptric_model::session::*;
-use catoptric_model::{Pose, PoseData, RangeBias, beam};
+use catoptric_model::{Pose, PoseData, RangeBias, ScanGeometry, beam};
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
 const FACET: &str = "up";
@@ -24,9 +24,7 @@ fn session() -> Session {
         name: String::new(),
         scanner: ScannerSheet {
             preset: String::new(),
-            beams: 1081,
-            step_deg: 0.25,
-            scan_rate_hz: 40.0,
+            scan: ScanGeometry::default(),
             range_min_m: 0.06,
             range_max_m: 20.0,
             divergence_full_mrad: 10.0,
@@ -131,12 +129,12 @@ fn placed(range: f64, tilt_deg: f64, direction_deg: f64) -> Placed {
 }
 
 #[test]
-fn the_search_knows_what_the_budget_knows() {
+fn the_search_agrees_with_the_error_budget() {
     let situation = drawn(&[placed(1.0, 30.0, 40.0)]);
     let mut designer = Designer::new(&situation, FACET, &request(4, Criterion::A)).expect("there are poses");
     let chosen = designer.best(4);
     let session = session();
-    let fan = situation.fan(FACET).expect("it is there");
+    let fan = situation.fan(FACET).expect("the facet exists");
     let mut compared = 0;
     for element in &fan.elements {
         let mut views: Vec<BoardView> = Vec::new();
@@ -156,11 +154,11 @@ fn the_search_knows_what_the_budget_knows() {
         };
         let mount = MountUncertainty::none();
         let budget = covariance::budget(&session, &mount, element.azimuth, &element.deflection, &views)
-            .expect("it meets the boards");
-        let c = budget.bound().expect("it is determined");
+            .expect("the beam hits the boards");
+        let c = budget.bound().expect("both angles are determined");
         let cos = beam::direction(element.deflection.elevation).x;
         let expected = (0.5 * (cos * cos * c[(0, 0)] + c[(1, 1)])).sqrt().to_degrees();
-        // The prior of 30° is all that is between them.
+        // The prior of 30° is the only difference.
         assert!((bound / expected - 1.0).abs() < 1e-5, "{bound} and {expected}");
         compared += 1;
     }
@@ -179,12 +177,12 @@ fn the_mounting_only_adds() {
         standing.bound_deg.expect("determined"),
         standing.bound_with_mounting_deg.expect("determined"),
     );
-    // Nothing was recorded before undeflected beams: the drawing's half a degree is in every beam.
+    // Nothing was recorded in front of undeflected beams: the drawing's half a degree is in every beam.
     assert!(alone < 0.1 && mounted > 0.3, "{alone} and {mounted}");
 }
 
 #[test]
-fn a_pose_more_never_worsens_any_bound() {
+fn another_pose_never_worsens_any_bound() {
     let situation = drawn(&[placed(1.0, 30.0, 40.0), placed(1.3, 20.0, 130.0)]);
     for criterion in [Criterion::A, Criterion::D] {
         let designer = Designer::new(&situation, FACET, &request(0, criterion)).expect("there are poses");
@@ -199,7 +197,9 @@ fn a_pose_more_never_worsens_any_bound() {
             assert!(designer.cost(&more) < designer.cost(&chosen));
             for beam in &beams {
                 if let Some(before) = designer.bound_deg(*beam, &chosen) {
-                    let after = designer.bound_deg(*beam, &more).expect("it stays determined");
+                    let after = designer
+                        .bound_deg(*beam, &more)
+                        .expect("the beam stays determined");
                     assert!(
                         after <= before * (1.0 + 1e-12),
                         "beam {beam}: {before} to {after}"
@@ -212,7 +212,7 @@ fn a_pose_more_never_worsens_any_bound() {
 }
 
 #[test]
-fn no_exchange_is_better_than_what_is_found() {
+fn no_exchange_improves_the_design() {
     let situation = drawn(&[]);
     for criterion in [Criterion::A, Criterion::D] {
         let new = || Designer::new(&situation, FACET, &request(3, criterion)).expect("there are poses");
@@ -228,7 +228,7 @@ fn no_exchange_is_better_than_what_is_found() {
             }
         }
         assert_eq!(new().best(3), chosen);
-        // Looking around has found something.
+        // Trying poses around the chosen ones has found something.
         assert!(chosen.iter().any(|c| *c >= drawn));
     }
 }
@@ -293,7 +293,7 @@ fn a_hinge_gets_a_pose_tilted_across() {
             assert!(facet.before.open > facet.after.open);
             let pose = &facet.poses[0];
             let across = (pose.direction_deg - hinge).to_radians();
-            // More across the hinge than along it; how far beyond that, the room and the other beams decide.
+            // More across the hinge than along it; beyond that, the room and the other beams decide.
             let share = beam::direction(across).y.abs();
             assert!(
                 share > std::f64::consts::FRAC_1_SQRT_2 && pose.tilt_deg > 25.0,
@@ -305,12 +305,12 @@ fn a_hinge_gets_a_pose_tilted_across() {
 }
 
 #[test]
-fn what_cannot_be_is_refused() {
+fn impossible_requests_are_refused() {
     let situation = drawn(&[]);
     let asked = request(1, Criterion::D);
     let refused = |name: &str, asked: &Request| {
         plan(&situation, &[name.to_owned()], asked)
-            .expect_err("it must be refused")
+            .expect_err("the request is impossible")
             .to_string()
     };
     assert!(refused("down", &asked).contains("\"down\"") && refused("down", &asked).contains("up"));
@@ -318,7 +318,7 @@ fn what_cannot_be_is_refused() {
         range_m: [9.0, 9.5],
         ..asked
     };
-    assert!(refused(FACET, &far).contains("nearer than the least range"));
+    assert!(refused(FACET, &far).contains("nearer than the minimum range"));
     let steep = Request {
         max_incidence_deg: 90.0,
         ..asked
@@ -327,7 +327,7 @@ fn what_cannot_be_is_refused() {
 }
 
 #[test]
-fn the_pose_that_is_said_is_the_pose_that_is_meant() {
+fn the_reported_pose_is_the_planned_pose() {
     let situation = drawn(&[]);
     let plan = plan(&situation, &[], &request(4, Criterion::D)).expect("there are poses");
     for pose in &plan.facets[0].poses {

@@ -1,12 +1,12 @@
-//! A pose as a person is told it, and runs of beams.
+//! Describes a pose to a person, and merges beams into runs.
 
+use super::answer::{Open, PlannedPose, Standing};
 use super::candidates::Candidate;
-use super::{Open, PlannedPose, Standing};
 use catoptric_model::Pose;
 use catoptric_model::frame::tangent_basis;
 use nalgebra::{Unit, Vector3};
 
-/// A chosen pose with what it changes.
+/// A chosen pose and its effect.
 pub(super) fn planned(candidate: &Candidate, before: Standing, after: Standing) -> PlannedPose {
     let pose = &candidate.room_from_board;
     let (normal, turn_deg) = facing(pose);
@@ -37,7 +37,7 @@ pub(super) fn planned(candidate: &Candidate, before: Standing, after: Standing) 
     }
 }
 
-/// Normal of a board's face, and the board's turn about it in degrees: 0 with its x axis horizontal.
+/// Normal of a board's face, and the board's rotation about it in degrees: 0 with its x axis horizontal.
 pub fn facing(room_from_board: &Pose) -> ([f64; 3], f64) {
     let normal = Unit::new_normalize(room_from_board.rotation * Vector3::z());
     let (level, _) = tangent_basis(&normal);
@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn neighbors_stand_together() {
+    fn neighbors_are_merged() {
         assert_eq!(runs(&[3, 4, 5, 9, 11, 12]), vec![[3, 5], [9, 9], [11, 12]]);
         let open = |beam: usize, reason: &str| (beam, reason.to_owned());
         let found = runs_with_reasons(&[open(3, "a"), open(4, "a"), open(5, "b"), open(7, "b")]);

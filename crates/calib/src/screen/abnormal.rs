@@ -1,19 +1,19 @@
-//! Numbers that no good beam shows: no return, too close, of the structure, or spread too far in the known room.
+//! Statistics that no good beam shows: no return, too close, on the structure, or spread too far in the known room.
 
-use super::Screen;
-use crate::observations::azimuth;
-use crate::spread;
-use catoptric_model::{PoseKind, PoseRecord, Summary, beam};
+use super::evidence::Screen;
+use crate::readings::observations::azimuth;
+use crate::readings::spread;
+use catoptric_model::{PoseKind, Summary, beam};
 use nalgebra::Point3;
 
-/// A reading this near is of the structure around the sensor, in metres, wherever the mirrors are.
+/// Range below which a reading is of the structure around the sensor, in meters, wherever the mirrors are.
 const STRUCTURE_RANGE: f64 = 0.12;
 
-/// How far behind the farthest mirror point a reading is still of the structure, in metres.
+/// Distance behind the farthest mirror point up to which a reading is of the structure, in meters.
 const STRUCTURE_DEPTH: f64 = 0.03;
 
-impl<'a> Screen<'a> {
-    /// Numbers that no good beam shows, in words.
+impl Screen<'_> {
+    /// Describes statistics that no good beam shows.
     pub(super) fn abnormal(&self, beam: usize, facets: &[usize]) -> Option<String> {
         let session = &self.dataset.session;
         let noise = session.believed.range_noise_sd_mm * 1e-3;
@@ -25,7 +25,7 @@ impl<'a> Screen<'a> {
             count += summary.count;
             missing += summary.missing;
             if summary.missing > 0 {
-                close += record.readings(beam).filter(|r| *r == f64::NEG_INFINITY).count();
+                close += record.readings.statistics()[beam].too_close;
             }
             if summary.count > summary.missing {
                 seen.push(summary);
@@ -66,7 +66,7 @@ impl<'a> Screen<'a> {
         None
     }
 
-    /// Range below which a reading is of the structure, in metres.
+    /// Range below which a reading is of the structure, in meters.
     fn structure_limit(&self, beam: usize, facets: &[usize]) -> f64 {
         let session = &self.dataset.session;
         let u = beam::direction(azimuth(session, beam));
@@ -75,17 +75,9 @@ impl<'a> Screen<'a> {
             .iter()
             .filter_map(|f| session.facets[*f].plane()?.distance_along(&origin, &u))
             .map(|d| d + STRUCTURE_DEPTH)
-            // Beyond its own polygon a facet's plane runs off to anywhere; mirrors stand within a hand of the sensor.
+            // Outside its own polygon a facet's plane extends arbitrarily far; mirrors are within a hand's width of the
+            // sensor.
             .filter(|d| *d < 3.0 * STRUCTURE_RANGE)
             .fold(STRUCTURE_RANGE, f64::max)
-    }
-
-    /// All stretches with the mirrors on and nothing moving, with their statistics.
-    fn screened(&self) -> impl Iterator<Item = (&'a PoseRecord, &'a Vec<Summary>)> {
-        self.dataset
-            .poses
-            .iter()
-            .zip(self.summaries)
-            .filter(|(record, _)| record.label.kind.is_evidence())
     }
 }

@@ -1,80 +1,60 @@
-//! Which elements a mirror deflects (step 4): what each beam read in the known room and elsewhere, against what a beam
-//! that no mirror touches would have read.
+//! Which elements a mirror deflects (step 4): compares what each beam read in the known room and elsewhere with what an
+//! undeflected beam would have read.
 
 mod abnormal;
+mod evidence;
 mod near;
 mod tally;
 
-use crate::common::CommonErrors;
-use crate::observations::BoardInSensor;
-use crate::pose::Mount;
-use catoptric_model::{Dataset, Pose, Summary};
-use nalgebra::Matrix6;
+use crate::mount::pose::Mount;
+use crate::readings::observations::BoardInSensor;
+use catoptric_model::{Dataset, Summary};
+use evidence::Screen;
+use near::facets_near;
+use rayon::prelude::*;
 
-pub use near::{EDGE_BEAMS, facets_near};
-
-/// What screening makes of an element.
+/// The class of an element by screening.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Candidate {
-    /// It reads what a beam without a mirror reads; the text says how often.
+pub(crate) enum ScreenClass {
+    /// It reads what an undeflected beam reads; the text states how often.
     Direct(String),
-    /// A mirror may deflect it: indices of facets, the likeliest first.
+    /// A mirror may deflect it: indices of facets, the most probable first.
     Deflected(Vec<usize>),
-    /// Its readings are of no use, and why.
+    /// Its readings are unusable, with the reason.
     Rejected(String),
 }
 
-/// The stretches of a dataset prepared for screening.
-pub struct Screen<'a> {
-    dataset: &'a Dataset,
-    summaries: &'a [Vec<Summary>],
-    /// Covariance of the mounting.
-    mount: Matrix6<f64>,
-    common: CommonErrors<'a>,
-    boards: &'a [Option<BoardInSensor>],
-    rooms_from_sensor: Vec<Pose>,
+/// The class of every element, in order; `boards` holds each pose's board in the sensor frame.
+pub(crate) fn candidates(
+    dataset: &Dataset,
+    summaries: &[Vec<Summary>],
+    mount: &Mount,
+    boards: &[Option<BoardInSensor>],
+) -> Vec<ScreenClass> {
+    let screen = Screen::new(dataset, summaries, mount, boards);
+    let beams = (0..dataset.session.scanner.scan.beams()).into_par_iter();
+    beams.map(|b| screen.classify(b)).collect()
 }
 
-impl<'a> Screen<'a> {
-    /// Prepares the stretches; `boards` holds each pose's board in the sensor frame.
-    pub fn new(
-        dataset: &'a Dataset,
-        summaries: &'a [Vec<Summary>],
-        mount: &'a Mount,
-        boards: &'a [Option<BoardInSensor>],
-    ) -> Self {
-        Self {
-            dataset,
-            summaries,
-            mount: mount.uncertainty.total(),
-            common: CommonErrors::of(&dataset.session),
-            boards,
-            rooms_from_sensor: dataset
-                .poses
-                .iter()
-                .map(|p| p.room_from_rig * mount.rig_from_sensor)
-                .collect(),
-        }
-    }
-
+impl Screen<'_> {
     /// The class of one element, from statistics alone.
-    pub fn classify(&self, beam: usize) -> Candidate {
+    fn classify(&self, beam: usize) -> ScreenClass {
         let session = &self.dataset.session;
-        let facets = facets_near(&session.facets, beam);
+        let facets = facets_near(&session.scanner.scan, &session.facets, beam);
         let tally = self.tally(beam, &facets);
         if let Some(reason) = self.abnormal(beam, &facets) {
-            return Candidate::Rejected(reason);
+            return ScreenClass::Rejected(reason);
         }
         if tally.is_direct() {
-            return Candidate::Direct(format!(
+            return ScreenClass::Direct(format!(
                 "reads what is straight ahead in {} of {} stretches",
                 tally.agreeing, tally.usable
             ));
         }
         if !facets.is_empty() {
-            return Candidate::Deflected(facets);
+            return ScreenClass::Deflected(facets);
         }
-        Candidate::Rejected(match tally.worst {
+        ScreenClass::Rejected(match tally.worst {
             Some((expected, found, stretch)) => format!(
                 "no mirror is drawn for it, yet it reads what is straight ahead in only {} of {} stretches: \
                  expected {expected:.3} m in stretch {stretch}, found {found:.3} m",

@@ -1,24 +1,24 @@
 //! How often a beam reads what is straight ahead of it: what an undeflected beam would have read, stretch by stretch.
 
-use super::Screen;
-use crate::ahead::{AGREEMENT_FLOOR, ahead};
-use crate::jacobian;
-use crate::observations::{azimuth, cone_half_angle};
-use crate::spread;
+use super::evidence::Screen;
+use crate::readings::ahead::{AGREEMENT_FLOOR, ahead};
+use crate::readings::jacobian;
+use crate::readings::observations::{azimuth, cone_half_angle};
+use crate::readings::spread;
 use catoptric_model::{PoseKind, Summary, beam};
 use nalgebra::Point3;
 
-/// Share of the usable stretches in which a direct beam has to read what is in front of it.
+/// Share of the usable stretches in which a direct beam has to read what is straight ahead.
 const DIRECT_SHARE: f64 = 0.9;
 
-/// Standard deviations within which a range agrees with its prediction.
+/// Gate on the difference of a range from its prediction, in standard deviations.
 const AGREEMENT_SIGMAS: f64 = 6.0;
 
 /// What an undeflected beam should have read in one stretch.
 enum Expected {
-    /// This range, give or take this much, both in metres.
+    /// A range and its tolerance, both in meters.
     Range(f64, f64),
-    /// An edge lies in the beam: nothing can be said.
+    /// An edge is inside the beam: no prediction.
     Unclear,
 }
 
@@ -29,19 +29,20 @@ pub(super) struct Tally {
     pub(super) agreeing: usize,
     rooms: usize,
     rooms_agreeing: usize,
-    /// Stretches with a board before a mirror that may deflect it.
+    /// Stretches with a board in front of a mirror that may deflect it.
     own: usize,
     own_agreeing: usize,
-    /// Expected and found range, in metres, of the stretch with the largest disagreement, and its number.
+    /// Expected and found range, in meters, of the stretch with the largest disagreement, and its number.
     pub(super) worst: Option<(f64, f64, usize)>,
     worst_off: f64,
 }
 
 impl Tally {
-    /// Every known room, nearly every stretch, and most of those in which a mirror would have shown it a board.
+    /// Whether the beam agrees in every known room, in nearly every stretch, and in most of those in which a mirror
+    /// would have shown it a board.
     ///
-    /// The last are what counts: a mirror may by chance show a wall as far away as the one ahead, and does so again
-    /// in every stretch whose board stands elsewhere.
+    /// The last condition decides: by coincidence a mirror may show a wall as far away as the one straight ahead, and
+    /// does so again in every stretch with the board elsewhere.
     pub(super) fn is_direct(&self) -> bool {
         self.usable > 0
             && self.rooms_agreeing == self.rooms
@@ -124,7 +125,7 @@ impl Screen<'_> {
             + (1e-3 * beliefs.element_sd_mm).powi(2)
             + (1e-3 * beliefs.marker_sd_mm / cos_incidence).powi(2)
             + noise * noise / summary.count as f64;
-        // A beam of finite width on a sloping wall is smeared over s·tan α·width; its mean moves by a tenth of that.
+        // On a sloping wall a beam of finite width is smeared over s·tan α·width; its mean shifts by a tenth of that.
         let tan = (1.0 / (cos_incidence * cos_incidence) - 1.0).max(0.0).sqrt();
         let smear = 0.1 * ahead.distance * tan * cone_half_angle(session);
         Expected::Range(

@@ -1,38 +1,38 @@
-//! Do the markers of a body stand to each other as its template says?
+//! Do the markers of a body agree with its template?
 
-use super::{Body, limit, solved};
+use super::body::{Body, limit, solved};
 use catoptric_model::{Pose, Watched};
 use nalgebra::{Point3, Vector3};
 
-/// What a template is good for, in metres: rulers, glue.
+/// Accuracy of a template, in meters: rulers, glue.
 const TEMPLATE_SD: f64 = 1e-4;
 
-/// Errors of a marker are believed with one number for three axes; all of the variance may be along one of them.
+/// The belief about marker errors is one number for three axes; all of the variance may be along one of them.
 const ONE_AXIS: f64 = 3.0;
 
-/// Cosine between a board's normal and the way to the rig below which the board shows its back.
+/// Cosine between a board's normal and the direction to the rig below which the board shows its back.
 const BACK: f64 = -0.25;
 
-/// How far normals may be apart and still be of one plane, in radians.
+/// Largest angle between normals that count as one plane, in radians.
 const SAME_NORMAL: f64 = 0.02;
 
-/// Markers that do not stand as the template says.
+/// Markers that disagree with the template.
 pub(super) struct Misfit {
     cause: Cause,
-    /// Root mean square of what is left per marker, in metres.
+    /// Root-mean-square residual per marker, in meters.
     rms: f64,
 }
 
 enum Cause {
-    /// Labels that are exchanged, every pair that explains it, and the pose then.
+    /// Exchanged labels, as every pair that explains the misfit, and the pose with them corrected.
     Exchange(Vec<[String; 2]>, Pose),
-    /// One label that is on something else, and how far from its marker, in metres.
+    /// One misplaced label, and its distance from its marker, in meters.
     Stray(String, f64),
     Unknown,
 }
 
 impl Misfit {
-    /// What happened to a body of that name.
+    /// Describes what happened to a body of that name.
     pub(super) fn words(&self, name: &str) -> String {
         match &self.cause {
             Cause::Exchange(pairs, _) => {
@@ -53,7 +53,7 @@ impl Misfit {
         }
     }
 
-    /// The body's pose, where it is certain.
+    /// The body's pose, if it is certain.
     pub(super) fn corrected(&self) -> Option<Pose> {
         match &self.cause {
             Cause::Exchange(_, pose) => Some(*pose),
@@ -66,12 +66,12 @@ impl Misfit {
 struct Constellation<'a> {
     body: &'a Body<'a>,
     seen: Vec<Option<Point3<f64>>>,
-    /// Variance of each marker's place along one axis, in m².
+    /// Variance of each marker's position along one axis, in m².
     variance: Vec<f64>,
     faces: Option<&'a Point3<f64>>,
 }
 
-/// What is wrong with the markers; `faces` is what a board's face is turned to.
+/// What is wrong with the markers; `faces` is the point that a board's face is turned to.
 pub(super) fn misfit(
     body: &Body<'_>,
     watched: &Watched,
@@ -111,19 +111,19 @@ impl Constellation<'_> {
 
     fn shows_its_back(&self, pose: &Pose) -> bool {
         self.faces.is_some_and(|to| {
-            let way = to.coords - pose.translation.vector;
-            (pose.rotation * Vector3::z()).dot(&way) < BACK * way.norm()
+            let toward = to.coords - pose.translation.vector;
+            (pose.rotation * Vector3::z()).dot(&toward) < BACK * toward.norm()
         })
     }
 
-    /// The pose by other points, if they fit and the board then shows its face.
+    /// The pose from other points, if they fit and the board then shows its face.
     fn as_well(&self, seen: &[Option<Point3<f64>>]) -> Option<Pose> {
         let (pose, squares) = solved(&self.body.template, seen)?;
         (self.fits(seen, &squares) && !self.shows_its_back(&pose)).then_some(pose)
     }
 
-    /// Two labels that explain everything once they are put back. Where several pairs do, a symmetric board hides which;
-    /// that does not matter if its plane comes out the same.
+    /// Two labels whose exchange explains everything. If several pairs do, the board is symmetric and the pair is
+    /// ambiguous; that does not matter if the plane is the same for all.
     fn exchange(&self) -> Option<Cause> {
         let mut found: Vec<([String; 2], Pose)> = Vec::new();
         for a in 0..self.seen.len() {
@@ -142,7 +142,7 @@ impl Constellation<'_> {
         all_alike.then(|| Cause::Exchange(found.into_iter().map(|(names, _)| names).collect(), pose))
     }
 
-    /// One label without which the others fit; of three markers two always would.
+    /// One label without which the others fit; of three markers, two always would.
     fn stray(&self) -> Option<Cause> {
         if self.seen.iter().flatten().count() < 4 {
             return None;

@@ -1,37 +1,22 @@
-//! What went wrong while a pose was recorded, from the recording alone: exchanged labels, a stray label, a body that
-//! moved, readings that changed their level.
+//! What went wrong while a pose was recorded, from the recording alone: exchanged labels, a misplaced label, a body
+//! that moved, readings that changed their level.
 //!
-//! A body at rest shows its markers where its template has them, give or take what is believed of their errors, and
-//! shows them there from the first frame to the last. What is off is said in words, pose by pose; where it is certain
-//! what happened, the pose is put right, else it is left out.
+//! A body at rest shows its markers where its template has them, to within the believed errors, and shows them there
+//! from the first frame to the last. Every deviation is reported in plain language, pose by pose. If it is certain what
+//! happened, the pose is corrected, else it is left out.
 
+mod body;
 mod constellation;
 mod movement;
 
+use body::{Body, body, name_of};
 use catoptric_model::dataset::RIG_SUBJECT;
-use catoptric_model::session::Marker;
-use catoptric_model::{Dataset, Pose, PoseKind, PoseRecord, Session, Watched};
+use catoptric_model::{Dataset, PoseKind, PoseRecord, Watched};
 use constellation::Misfit;
 use nalgebra::Point3;
+use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-
-/// Standard normal deviate of the limits: exceeded by chance once in 10⁹.
-const SIGMAS: f64 = 6.0;
-
-/// χ² that is exceeded by chance once in 10⁹ (Wilson and Hilferty 1931).
-fn limit(degrees_of_freedom: usize) -> f64 {
-    let n = degrees_of_freedom as f64;
-    let root = 1.0 - 2.0 / (9.0 * n) + SIGMAS * (2.0 / (9.0 * n)).sqrt();
-    n * root * root * root
-}
-
-/// A tracked body as the session knows it.
-struct Body<'a> {
-    subject: &'a str,
-    markers: &'a [Marker],
-    template: Vec<Point3<f64>>,
-}
 
 /// What is wrong with one body in one pose.
 struct Finding {
@@ -46,13 +31,17 @@ enum What {
     Misfit(Misfit),
 }
 
-/// The dataset with poses put right or left out, and a sentence for each; the dataset itself if nothing went wrong.
+/// The dataset with poses corrected or left out, and a sentence for each; the dataset itself if nothing went wrong.
 ///
-/// A pose that is left out keeps its place: its readings are none. Where a body's markers do not fit in most of the poses
-/// it was seen in, its template or what is believed of its markers is wrong rather than each of those poses; that is said,
-/// and the poses stay.
+/// A pose that is left out keeps its index: its readings become invalid. If a body's markers do not fit in most of the
+/// poses in which it was seen, its template or the belief about its markers is wrong rather than each of those poses;
+/// that is reported, and the poses are kept.
 pub fn put_right(dataset: &Dataset) -> (Cow<'_, Dataset>, Vec<String>) {
     let session = &dataset.session;
+    // Of readings in memory they are gathered now, side by side.
+    dataset.poses.par_iter().for_each(|record| {
+        record.readings.statistics();
+    });
     let mut findings = Vec::new();
     let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
     for (pose, record) in dataset.poses.iter().enumerate() {
@@ -72,7 +61,7 @@ pub fn put_right(dataset: &Dataset) -> (Cow<'_, Dataset>, Vec<String>) {
                 what,
             }));
         }
-        // What moved has changed the readings as well; it is said once.
+        // A motion has changed the readings as well; it is reported once.
         if findings.len() == before
             && let Some(change) = movement::of_readings(record, session)
         {
@@ -92,44 +81,27 @@ pub fn put_right(dataset: &Dataset) -> (Cow<'_, Dataset>, Vec<String>) {
     for finding in findings {
         let record = &mut repaired.poses[finding.pose];
         let name = name_of(&finding.subject);
-        let (said, corrected) = match finding.what {
+        let (message, corrected) = match finding.what {
             What::Moved(how) => (how, None),
             What::Misfit(misfit) => (misfit.words(&name), misfit.corrected()),
         };
         let remedy = match corrected {
             Some(pose) if finding.subject == RIG_SUBJECT => {
                 record.room_from_rig = pose;
-                "its pose was solved anew with the labels put right"
+                "its pose was solved anew with the labels corrected"
             }
             Some(pose) => {
                 record.room_from_board = Some(pose);
-                "its pose was solved anew with the labels put right"
+                "its pose was solved anew with the labels corrected"
             }
             None => {
-                record.ranges.fill(f64::NAN);
+                record.readings = record.readings.left_out();
                 "the pose is left out"
             }
         };
-        warnings.push(format!("pose {}: {said}; {remedy}", record.label.pose));
+        warnings.push(format!("pose {}: {message}; {remedy}", record.label.pose));
     }
     (Cow::Owned(repaired), warnings)
-}
-
-/// The rig, or the board that was set up; other bodies are of no use here.
-fn body<'a>(session: &'a Session, record: &PoseRecord, subject: &str) -> Option<Body<'a>> {
-    let (subject, markers) = if subject == RIG_SUBJECT {
-        (RIG_SUBJECT, &session.rig_markers)
-    } else if record.label.board.as_deref() == Some(subject) {
-        let sheet = session.board(subject)?;
-        (sheet.name.as_str(), &sheet.markers)
-    } else {
-        return None;
-    };
-    Some(Body {
-        subject,
-        markers,
-        template: markers.iter().map(Marker::position).collect(),
-    })
 }
 
 fn examine(record: &PoseRecord, body: &Body<'_>, watched: &Watched, marker_sd: f64) -> Option<What> {
@@ -145,7 +117,7 @@ fn examine(record: &PoseRecord, body: &Body<'_>, watched: &Watched, marker_sd: f
     constellation::misfit(body, watched, marker_sd, faces.as_ref()).map(What::Misfit)
 }
 
-/// Takes out the misfits of bodies that fit hardly ever, and says so.
+/// Removes the misfits of bodies that hardly ever fit, and reports these bodies.
 fn without_templates_that_never_fit(
     findings: Vec<Finding>,
     seen: &BTreeMap<&str, usize>,
@@ -159,7 +131,7 @@ fn without_templates_that_never_fit(
         let of = seen.get(subject.as_str()).copied().unwrap_or_default();
         of > 1 && 2 * *count > of
     });
-    let said = |(subject, count): (&String, &usize)| {
+    let message = |(subject, count): (&String, &usize)| {
         format!(
             "the markers of {} do not fit its template in {count} of {} poses: the template in the session, or what it \
              believes of marker errors, is wrong; the poses are used as they were tracked",
@@ -167,37 +139,7 @@ fn without_templates_that_never_fit(
             seen.get(subject.as_str()).copied().unwrap_or_default()
         )
     };
-    let warnings = odd.iter().map(said).collect();
+    let warnings = odd.iter().map(message).collect();
     let kept = |f: &Finding| !(unexplained(f) && odd.contains_key(&f.subject));
     (warnings, findings.into_iter().filter(kept).collect())
-}
-
-fn name_of(subject: &str) -> String {
-    if subject == RIG_SUBJECT {
-        "the rig".to_owned()
-    } else {
-        format!("board {subject:?}")
-    }
-}
-
-/// The pose of a body, and the squared distance of each marker from where it then should be.
-fn solved(template: &[Point3<f64>], seen: &[Option<Point3<f64>>]) -> Option<(Pose, Vec<f64>)> {
-    let pose = catoptric_model::tracking::solve_pose(template, seen)?;
-    let off = template.iter().zip(seen);
-    let squares = off.map(|(t, s)| s.map_or(0.0, |s| (s - pose * t).norm_squared()));
-    Some((pose, squares.collect()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_limit_is_six_sigma() {
-        // Exact quantiles at an upper tail of 0.987e-9, from the closed form for even degrees of freedom.
-        for (n, exact) in [(6, 53.373_68), (10, 62.976_24), (40, 118.721_77)] {
-            let over = limit(n) / exact;
-            assert!((1.0..1.07).contains(&over), "{n} degrees of freedom: {over}");
-        }
-    }
 }

@@ -1,30 +1,30 @@
-//! Did a body stay where it was while it was scanned?
+//! Did a body stay in place while it was scanned?
 
-use super::{limit, solved};
+use super::body::{limit, solved};
 use catoptric_model::tracking::MeanMarker;
-use catoptric_model::{PoseRecord, Session, Watched};
+use catoptric_model::{Moments, PoseRecord, Session, Watched};
 use nalgebra::{Point3, Vector3};
 
-/// A mean place of a marker may wander by this much along one axis without the body having moved, in metres.
+/// Drift of a marker's mean position along one axis that does not count as a motion of the body, in meters.
 const WANDER: f64 = 3e-4;
 
-/// A change of level that is always taken for that of a sensor which is not quite steady, in metres.
+/// Change of level that is always attributed to a sensor that is not quite steady, in meters.
 const LEVEL_FLOOR: f64 = 3e-3;
 
-/// Standard errors, and drifts, that a level may change by.
+/// Allowed change of a level, in standard errors and in drifts.
 const LEVEL_SIGMAS: f64 = 5.0;
 
-/// Readings of a beam in each half of a stretch that its levels are compared by, at least.
-const LEAST_READINGS: usize = 5;
+/// Minimum number of readings of a beam in each half of a stretch for comparing its levels.
+const MIN_READINGS: usize = 5;
 
-/// Beams, at least, whose levels say something of a pose.
-const LEAST_BEAMS: usize = 5;
+/// Minimum number of beams whose levels are evidence about a pose.
+const MIN_BEAMS: usize = 5;
 
 /// How a body moved.
 pub(super) struct Movement {
-    /// Shift of the middle of its markers, in metres.
+    /// Shift of the centroid of its markers, in meters.
     shift: f64,
-    /// Turn, in radians.
+    /// Rotation angle, in radians.
     turn: f64,
 }
 
@@ -41,7 +41,7 @@ impl Movement {
     }
 }
 
-/// How the markers of a body moved, if they did: the parting of the stretch in two that they differ most between.
+/// How the markers of a body moved, if they did: between the two parts of the stretch that differ most.
 pub(super) fn of_markers(watched: &Watched) -> Option<Movement> {
     let parts = watched.parts.len();
     let split = |at: usize| (watched.mean(0, at), watched.mean(at, parts));
@@ -86,20 +86,18 @@ fn excess(before: &[MeanMarker], after: &[MeanMarker], jitter: f64) -> f64 {
     }
 }
 
-/// Whether most beams before a board read another level in the second half of the stretch than in the first, in words.
+/// Describes a change of level between the halves of the stretch that most beams on the board show.
 pub(super) fn of_readings(record: &PoseRecord, session: &Session) -> Option<String> {
     let label = &record.label;
     let facet = label.facet.as_deref();
     let drawn = facet.and_then(|name| session.facets.iter().find(|f| f.name == name));
-    let [first, last] = label.beams.or(drawn.map(|f| f.beams))?;
+    let run = label.beams.or(drawn.map(|f| f.beams))?;
     label.board.as_ref()?;
-    let half = label.scans / 2;
     let unsteady = LEVEL_FLOOR + LEVEL_SIGMAS * session.believed.drift_sd_mm * 1e-3;
     let (mut beams, mut changes) = (0, Vec::new());
-    for beam in first..(last + 1).min(record.beams) {
-        let before = level(record.readings(beam).take(half));
-        let after = level(record.readings(beam).skip(half));
-        let (Some((m1, v1)), Some((m2, v2))) = (before, after) else {
+    let statistics = record.readings.statistics();
+    for beam in session.scanner.scan.run(run).filter_map(|b| statistics.get(b)) {
+        let [Some((m1, v1)), Some((m2, v2))] = beam.halves.map(level) else {
             continue;
         };
         beams += 1;
@@ -108,25 +106,19 @@ pub(super) fn of_readings(record: &PoseRecord, session: &Session) -> Option<Stri
             changes.push(change);
         }
     }
-    if beams < LEAST_BEAMS || 2 * changes.len() <= beams {
+    if beams < MIN_BEAMS || 2 * changes.len() <= beams {
         return None;
     }
     let count = changes.len();
     let (_, middle, _) = changes.select_nth_unstable_by(count / 2, f64::total_cmp);
     Some(format!(
-        "the readings of {count} of {beams} beams changed by {:.1} mm in the middle during the stretch, and no marker moved",
+        "the readings of {count} of {beams} beams changed by {:.1} mm (median) during the stretch, and no marker moved",
         1e3 * *middle
     ))
 }
 
 /// Mean of readings, and its variance.
-fn level(readings: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
-    let (mut count, mut mean, mut squares) = (0_usize, 0.0, 0.0);
-    for r in readings.filter(|r| r.is_finite()) {
-        count += 1;
-        let step = r - mean;
-        mean += step / count as f64;
-        squares += step * (r - mean);
-    }
-    (count >= LEAST_READINGS).then(|| (mean, squares / ((count - 1) * count) as f64))
+fn level(of: Moments) -> Option<(f64, f64)> {
+    let count = of.count;
+    (count >= MIN_READINGS).then(|| (of.mean, of.squares / ((count - 1) * count) as f64))
 }

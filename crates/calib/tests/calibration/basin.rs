@@ -1,4 +1,4 @@
-//! From how far away an element's angles are still found: a start 60° off, as no drawing is.
+//! Basin of convergence: an element's angles are found even from a start 60° off, farther than any drawing.
 
 use crate::synthetic::Draw;
 use catoptric_calib::observations::{BoardView, Observation};
@@ -10,7 +10,7 @@ use nalgebra::{Unit, Vector3};
 const AZIMUTH: f64 = 0.3;
 const TRIALS: usize = 1000;
 
-/// A direction at an angle from another, any way round.
+/// A random direction at a given angle from another.
 fn away(from: &Unit<Vector3<f64>>, angle: f64, draw: &mut Draw) -> Unit<Vector3<f64>> {
     let (a, b) = frame::tangent_basis(from);
     let turn = beam::direction(std::f64::consts::TAU * draw.uniform());
@@ -19,7 +19,7 @@ fn away(from: &Unit<Vector3<f64>>, angle: f64, draw: &mut Draw) -> Unit<Vector3<
     Unit::new_normalize(from.into_inner() * cos + across * sin)
 }
 
-/// Five boards at 0.5 to 4 m, tilted by 20° to 60° any way round: the random design of the reference setting.
+/// Five boards at 0.5 to 4 m, tilted by 20° to 60° in random directions: the random design of the reference setting.
 fn boards(truth: &Deflection, draw: &mut Draw) -> Vec<BoardPlane> {
     let (origin, v) = (truth.deflection_point(AZIMUTH), truth.exit_direction(AZIMUTH));
     (0..5)
@@ -32,7 +32,8 @@ fn boards(truth: &Deflection, draw: &mut Draw) -> Vec<BoardPlane> {
         .collect()
 }
 
-/// How many of the elements end at the truth from a start `angle` away, with so much noise of each mean in metres.
+/// Number of elements that converge to the truth from a start `angle` away, with the given noise of each mean in
+/// meters.
 fn found(noise: f64, angle: f64, closed_form: bool) -> usize {
     let mut draw = Draw(7);
     let bias = RangeBias::default();
@@ -47,7 +48,7 @@ fn found(noise: f64, angle: f64, closed_form: bool) -> usize {
         let observations: Vec<Observation> = planes
             .iter()
             .map(|plane| {
-                let exact = range::predict(&truth, AZIMUTH, plane).expect("it was aimed at");
+                let exact = range::predict(&truth, AZIMUTH, plane).expect("the beam was aimed at the board");
                 Observation {
                     board: BoardView {
                         plane: *plane,
@@ -81,7 +82,7 @@ fn found(noise: f64, angle: f64, closed_form: bool) -> usize {
         };
         let near = |end: &Deflection| {
             let off = beam::angle_between(&end.exit_direction(AZIMUTH), &v);
-            // Random boards at noise of a millimetre leave up to a degree now and then.
+            // Random boards with a noise of one millimeter occasionally leave up to a degree.
             off < if noise > 0.0 { 0.05 } else { 1e-9 }
         };
         let solution = solve::batch(&element, &start, &Options::default());
@@ -99,7 +100,7 @@ fn a_start_sixty_degrees_away_is_near_enough() {
             with >= TRIALS * 95 / 100,
             "{with} of {TRIALS} with noise of {noise} m"
         );
-        // The closed form is what does it.
+        // The closed form is what makes the difference.
         assert!(without < with, "{without} of {TRIALS} without the closed form");
     }
 }

@@ -1,4 +1,5 @@
-//! Without noise the truth comes back: to 1e-9 rad by every method that measures, from a mounting and facets 1° off the drawing.
+//! Noise-free data return the truth: to 1e-9 rad with every method that measures, from a mounting and facets 1° off the
+//! drawing.
 
 use crate::synthetic::World;
 use catoptric_calib::{JacobianForm, Method, Options, calibrate, pose};
@@ -12,7 +13,9 @@ fn every_method_returns_every_direction_and_the_mounting() {
         let calibration = calibrate(&made.dataset, method, &Options::default()).expect("a sound dataset");
         assert_eq!(calibration.method, method.name());
         assert_eq!(calibration.beams.len(), world.beams);
-        let mount = calibration.rig_from_sensor.expect("it is always estimated");
+        let mount = calibration
+            .rig_from_sensor
+            .expect("the mounting is always estimated");
         let off = pose::motion_between(&made.rig_from_sensor, &mount.pose());
         assert!(off.norm() < 1e-9, "{method:?}: mounting off by {off}");
         for (index, estimate) in calibration.beams.iter().enumerate() {
@@ -32,7 +35,7 @@ fn every_method_returns_every_direction_and_the_mounting() {
                 "beam {index}: {:?}",
                 estimate.reason
             );
-            let found = estimate.deflection().expect("it is solved");
+            let found = estimate.deflection().expect("the element is solved");
             let azimuth = world.azimuth(index);
             let angle = beam::angle_between(&found.exit_direction(azimuth), &truth.exit_direction(azimuth));
             assert!(angle < 1e-9, "{method:?}, beam {index}: off by {angle:e} rad");
@@ -42,7 +45,7 @@ fn every_method_returns_every_direction_and_the_mounting() {
 }
 
 #[test]
-fn the_paper_s_differences_end_where_the_derivatives_end() {
+fn the_paper_s_differences_reach_the_estimate_of_the_derivatives() {
     let made = World::noisy(5).make();
     let solve = |jacobian| {
         let options = Options {
@@ -72,7 +75,7 @@ fn the_paper_s_differences_end_where_the_derivatives_end() {
 }
 
 #[test]
-fn recursion_ends_at_the_batch_s_answer() {
+fn the_recursion_reaches_the_batch_estimate() {
     let made = World::noisy(6).make();
     let solve = |method| calibrate(&made.dataset, method, &Options::default()).expect("a sound dataset");
     let (batch, recursive) = (solve(Method::Beam), solve(Method::Recursive));
@@ -89,7 +92,7 @@ fn recursion_ends_at_the_batch_s_answer() {
 
 #[test]
 fn a_wide_facet_is_solved_group_by_group_on_the_boards_that_are_hit() {
-    // Boards of half a metre, seen by a third of the fan each: most beams miss most boards and read the wall there.
+    // Boards of half a meter, each seen by a third of the fan: most beams miss most boards and read the wall there.
     let world = World {
         served: vec![[480, 600]],
         groups: 3,

@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Matrix6, Vector2};
 
 const SEEDS: u64 = 250;
 
-/// χ² quantile by Wilson and Hilferty, good to 0.1 % at these many degrees of freedom, over its mean.
+/// χ² quantile over its mean, by Wilson and Hilferty; accurate to 0.1 % for this many degrees of freedom.
 fn bound(dof: f64, z: f64) -> f64 {
     let c = 2.0 / (9.0 * dof);
     (1.0 - c + z * c.sqrt()).powi(3)
@@ -46,18 +46,22 @@ fn nees(method: Method, world: impl Fn(u64) -> World) -> Nees {
                 .unwrap_or_else(|| panic!("seed {seed}, beam {index}: {:?}", estimate.reason));
             let error = Vector2::new(found.azimuth - truth.azimuth, found.elevation - truth.elevation);
             let squared = |c: Option<[[f64; 2]; 2]>| {
-                let c = Matrix2::from(c.expect("it is solved"));
-                (error.transpose() * c.try_inverse().expect("it is positive definite") * error)[0]
+                let c = Matrix2::from(c.expect("the element is solved"));
+                (error.transpose() * c.try_inverse().expect("a covariance is positive definite") * error)[0]
             };
             *sum += squared(estimate.covariance_rad2) / (2.0 * runs);
             if estimate.noise_covariance_rad2.is_some() {
                 sums.noise_only += squared(estimate.noise_covariance_rad2) / (6.0 * runs);
             }
         }
-        let mount = calibration.rig_from_sensor.expect("it is always estimated");
+        let mount = calibration
+            .rig_from_sensor
+            .expect("the mounting is always estimated");
         let off = pose::motion_between(&mount.pose(), &made.rig_from_sensor);
-        let covariance = Matrix6::from(mount.covariance.expect("it is always given"));
-        let inverse = covariance.try_inverse().expect("it is positive definite");
+        let covariance = Matrix6::from(mount.covariance.expect("its covariance is always given"));
+        let inverse = covariance
+            .try_inverse()
+            .expect("a covariance is positive definite");
         sums.mount += (off.transpose() * inverse * off)[0] / (6.0 * runs);
     }
     sums
@@ -77,10 +81,10 @@ fn assert_honest(found: &Nees) {
 }
 
 #[test]
-fn angles_and_mounting_err_as_much_as_they_say() {
+fn angles_and_mounting_have_honest_covariances() {
     let found = nees(Method::Beam, |seed| World::noisy(1000 + 17 * seed));
     assert_honest(&found);
-    // The paper's own covariance is far too small here, and this test would see it.
+    // The paper's own covariance is far too small here, and this test detects it.
     assert!(
         found.noise_only > bound(2.0 * SEEDS as f64, Z),
         "{}",
@@ -90,7 +94,7 @@ fn angles_and_mounting_err_as_much_as_they_say() {
 
 #[test]
 fn biases_that_mounting_and_elements_share_are_counted_once() {
-    // The mounting errs by the very biases that the elements are then corrected with.
+    // The mounting has errors from the very biases that the elements are then corrected with.
     let found = nees(Method::Beam, |seed| World {
         distance_bias_sd_mm: 5.0,
         angle_gain_sd_mm: 8.0,
@@ -104,7 +108,7 @@ fn biases_that_mounting_and_elements_share_are_counted_once() {
 }
 
 #[test]
-fn every_other_method_errs_as_much_as_it_says() {
+fn every_other_method_has_honest_covariances() {
     for method in [Method::Joint, Method::Facet, Method::BeamGls, Method::ClosedForm] {
         let found = nees(method, |seed| World::noisy(31_000 + 11 * seed));
         assert_honest(&found);
@@ -112,11 +116,11 @@ fn every_other_method_errs_as_much_as_it_says() {
 }
 
 /// Mean squared error along both axes, in square degrees, of every beam, over some seeds.
-fn mean_square(method: Method, departure_deg: f64) -> f64 {
+fn mean_square(method: Method, deviation_deg: f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0);
     for seed in 0..40 {
         let world = World {
-            departure_deg,
+            deviation_deg,
             ..World::noisy(70_000 + seed)
         };
         let made = world.make();
@@ -137,20 +141,20 @@ fn mean_square(method: Method, departure_deg: f64) -> f64 {
     sum / count
 }
 
-/// However far beams depart from their planes, knowing of the others never harms.
+/// However far beams deviate from their planes, the joint solution is never worse.
 #[test]
-fn joint_is_never_worse_than_each_element_by_itself() {
+fn joint_is_never_worse_than_each_element_individually() {
     let mut last = 0.0;
-    for departure_deg in [0.0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.3] {
+    for deviation_deg in [0.0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.3] {
         let (joint, alone) = (
-            mean_square(Method::Joint, departure_deg).sqrt(),
-            mean_square(Method::BeamGls, departure_deg).sqrt(),
+            mean_square(Method::Joint, deviation_deg).sqrt(),
+            mean_square(Method::BeamGls, deviation_deg).sqrt(),
         );
-        let rigid = mean_square(Method::Facet, departure_deg).sqrt();
-        // A thousand errors each, of which those of one run are correlated: a hundredth is chance.
-        assert!(joint < 1.01 * alone, "{departure_deg}°: {joint} against {alone}");
+        let rigid = mean_square(Method::Facet, deviation_deg).sqrt();
+        // A thousand errors each, of which those of one run are correlated: one percent is statistical fluctuation.
+        assert!(joint < 1.01 * alone, "{deviation_deg}°: {joint} against {alone}");
         last = joint / rigid;
     }
-    // A plane that is none is what the rigid facet pays for.
+    // The rigid facet suffers if its facet is not flat.
     assert!(last < 0.5, "{last}");
 }

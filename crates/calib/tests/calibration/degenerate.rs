@@ -1,11 +1,11 @@
-//! Board sets that leave a direction open: no number for it, and the right name.
+//! Board sets that leave a direction open: it gets no number, and the right name.
 
 use crate::synthetic::{World, placements};
 use catoptric_calib::{Method, Options, calibrate};
 use catoptric_model::{Status, frame};
 use nalgebra::{Unit, Vector2, Vector3};
 
-/// The methods that look at each element by itself.
+/// The methods that solve each element individually.
 const ALONE: [Method; 4] = [
     Method::BeamGls,
     Method::Beam,
@@ -13,8 +13,8 @@ const ALONE: [Method; 4] = [
     Method::ClosedForm,
 ];
 
-/// Solves the middle beam of the middle facet on the given boards; its status and its null direction as an angle
-/// from "across" towards "up" in the tangent plane, in degrees.
+/// Solves the middle beam of the middle facet on the given boards; returns its status and its null direction as an
+/// angle from "across" toward "up" in the tangent plane, in degrees.
 fn null_angle(boards: &[(f64, f64, f64)], facet_tilt_deg: f64, method: Method) -> (Status, Option<f64>) {
     null_angle_in(World::exact(), boards, facet_tilt_deg, method)
 }
@@ -50,8 +50,8 @@ fn null_angle_in(
     (estimate.status, angle)
 }
 
-/// Where the boards leave a direction open, the estimate stays off along it, and the common tilt is seen from there:
-/// `tolerance_deg` is what a facet off the drawing by `facet_tilt_deg` may turn it.
+/// If the boards leave a direction open, the estimate stays off along it, and from there the common tilt looks rotated:
+/// `tolerance_deg` is the rotation that a facet off the drawing by `facet_tilt_deg` may cause.
 fn assert_open_across(boards: &[(f64, f64, f64)], psi_deg: f64, facet_tilt_deg: f64, tolerance_deg: f64) {
     for method in ALONE {
         let (status, angle) = null_angle(boards, facet_tilt_deg, method);
@@ -100,8 +100,8 @@ fn all_face_on() {
     }
 }
 
-/// Tilts on a line that passes the beam by tan 6°: mirrored at it, a direction 12° away gives the same ranges. That both
-/// angles are determined where the element points does not help; a fourth board off the line does.
+/// Tilts on a line that passes the beam by tan 6°: mirrored at that line, a direction 12° away gives the same ranges.
+/// It does not help that both angles are determined at the estimate; a fourth board off the line does.
 #[test]
 fn tilts_on_a_line_leave_two_directions() {
     let tilted = |x: f64, y: f64, s: f64| {
@@ -113,18 +113,18 @@ fn tilts_on_a_line_leave_two_directions() {
         )
     };
     let x = 0.105_104;
-    // A thick mirror's face is elsewhere for another direction, which data without errors would tell.
+    // A thick mirror's face depends on the direction, which error-free data would reveal.
     let thin = || World {
         thickness_mm: 0.0,
         ..World::exact()
     };
     let mut boards = vec![tilted(x, -0.7, 1.2), tilted(x, 0.1, 1.4), tilted(x, 0.6, 1.6)];
-    // The closed form is linear in three components, of which these boards leave one open: it has no answer at all.
+    // The closed form is linear in three components, of which these boards leave one open: it has no solution at all.
     for method in [Method::BeamGls, Method::Beam, Method::Recursive] {
         let (status, angle) = null_angle_in(thin(), &boards, 0.0, method);
         assert_eq!(status, Status::Unobservable, "{method:?}");
         let angle = angle
-            .expect("it points from one direction to the other")
+            .expect("the null direction points from one direction to the other")
             .rem_euclid(180.0);
         assert!(angle.min(180.0 - angle) < 1e-6, "{method:?}: {angle}");
     }

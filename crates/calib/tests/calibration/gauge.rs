@@ -1,6 +1,6 @@
-//! Ranks and open directions of board sets and layouts, against the tables that were worked out by hand and by SVD.
+//! Ranks and open directions of board sets and layouts, against tables computed by hand and by SVD.
 //!
-//! Only the geometry: whether a direction that is not open is known well enough is the business of covariances.
+//! Only the geometry: whether a direction that is not open is known well enough is covered by covariances.
 
 use catoptric_calib::gauge::{Determined, Layout, Ray, Unknowns, determine};
 use catoptric_model::{BoardPlane, Deflection, MirrorPlane, Pose, beam, frame};
@@ -12,7 +12,7 @@ const UP: Deflection = Deflection {
     distance: 0.07,
 };
 
-/// A board at a range along the beam, tilted by α towards ψ as seen along it.
+/// A board at a range along the beam, tilted by α toward ψ as seen along it.
 fn tilted(range: f64, alpha_deg: f64, psi_deg: f64) -> BoardPlane {
     let v = UP.exit_direction(0.0);
     let (across, up) = frame::tangent_basis(&v);
@@ -64,7 +64,7 @@ fn columns() -> [Unknowns; 5] {
             ..none
         },
         Unknowns {
-            per_metre: true,
+            per_meter: true,
             ..constant
         },
         Unknowns {
@@ -146,9 +146,9 @@ fn sets_of_boards_determine_what_the_table_says() {
             );
             assert_eq!(found.open.len(), width - found.rank);
             for open in &found.open {
-                // Nothing finite along it: every unknown that takes part is open.
+                // No finite number along it: every unknown that takes part is open.
                 for (unknown, _) in open.terms.iter().filter(|t| t.1.abs() > 0.1) {
-                    assert_eq!(found.per_metre(unknown), None, "{name}: {unknown}");
+                    assert_eq!(found.per_meter(unknown), None, "{name}: {unknown}");
                 }
             }
         }
@@ -169,7 +169,7 @@ fn open_directions_have_the_right_names() {
     let found = of_element(&vertical, scale);
     assert!(names(&found).contains(&"φ".to_owned()) && names(&found).contains(&"A_c".to_owned()));
     assert!(found.open[0].words.contains("pitched"), "{}", found.open[0].words);
-    // A hinge towards ψ = 70°: what is open is the direction across, (−sin ψ, cos ψ) in (θ, φ).
+    // A hinge toward ψ = 70°: the open direction is the one across, (−sin ψ, cos ψ) in (θ, φ).
     let hinge = [(1.0, 40.0), (1.3, -40.0), (1.6, 20.0)].map(|(r, a)| tilted(r, a, 70.0));
     let found = of_element(&hinge, Unknowns::default());
     assert_eq!(found.rank, 1);
@@ -178,22 +178,22 @@ fn open_directions_have_the_right_names() {
             .terms
             .iter()
             .find(|t| t.0 == name)
-            .expect("it takes part")
+            .expect("the unknown takes part")
             .1
     };
     let psi = beam::direction(70.0_f64.to_radians());
     assert!((share("θ") / share("φ") + psi.y / psi.x).abs() < 1e-9);
-    // Equal tilts: A_a is a constant.
+    // Equal tilts: A_a acts as a constant.
     let around = [0.0, 90.0, 180.0, 270.0, 45.0].map(|p| tilted(1.2, 45.0, p));
     let [.., incidence] = columns();
     let found = of_element(&around, incidence);
     assert_eq!(names(&found), ["A_a", "B"]);
-    // Equal ranges: so is A_c. B_a and B_c need no test: they are one unknown here.
+    // Equal ranges: so does A_c. B_a and B_c need no test: they are one unknown here.
     let found = of_element(&around, scale);
     assert_eq!(names(&found), ["A_c", "B"]);
 }
 
-/// Facets that look elsewhere, each on five boards of its own, and direct beams of two fans on boards.
+/// Facets that face different directions, each with five boards of its own, and direct beams of two fans on boards.
 fn structure(facets: usize, direct: &[f64]) -> Layout {
     let mut layout = Layout::default();
     for facet in 0..facets {
@@ -206,7 +206,7 @@ fn structure(facets: usize, direct: &[f64]) -> Layout {
         layout.facets.push(plane);
         let exit = plane
             .deflect(u)
-            .expect("it faces its beams")
+            .expect("the facet faces its beams")
             .exit_direction(middle);
         let rays: Vec<usize> = (-5..=5)
             .map(|i| {
@@ -270,7 +270,7 @@ fn the_sensor_s_place_is_determined_as_the_table_says() {
         (1, &[0.4, -2.2][..], 9, 9),
         (3, &[0.4, -2.2][..], 15, 15),
     ] {
-        let found = determine(&structure(facets, direct), &sensor).expect("all meet");
+        let found = determine(&structure(facets, direct), &sensor).expect("every ray hits its boards");
         assert_eq!(
             (found.unknowns.len(), found.rank),
             (parameters, rank),
@@ -288,11 +288,11 @@ fn the_sensor_s_place_is_determined_as_the_table_says() {
     let all = Unknowns {
         mounting: true,
         constant: true,
-        per_metre: true,
+        per_meter: true,
         incidence: true,
         distance: false,
     };
-    let found = determine(&structure(3, &[0.4, -2.2]), &all).expect("all meet");
+    let found = determine(&structure(3, &[0.4, -2.2]), &all).expect("every ray hits its boards");
     assert_eq!((found.unknowns.len(), found.rank), (18, 18));
 }
 
@@ -303,7 +303,7 @@ fn two_mirrors_turn_about_the_line_in_which_they_meet() {
         mounting: true,
         ..Unknowns::default()
     };
-    let found = determine(&layout, &sensor).expect("all meet");
+    let found = determine(&layout, &sensor).expect("every ray hits its boards");
     let share = |name: &str| {
         found.open[0]
             .terms

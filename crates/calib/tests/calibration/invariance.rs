@@ -1,4 +1,4 @@
-//! What must not change an answer, and what must change only its covariance.
+//! What must not change a result, and what must change only its covariance.
 
 use crate::synthetic::{Draw, World};
 use catoptric_calib::{Method, Options, calibrate};
@@ -11,7 +11,7 @@ fn solve(dataset: &Dataset) -> Calibration {
 /// A random order of a list.
 fn shuffle<T>(list: &mut [T], draw: &mut Draw) {
     for last in (1..list.len()).rev() {
-        // Truncation picks a place evenly.
+        // Truncation picks an index uniformly.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         list.swap(last, (draw.uniform() * (last as f64 + 1.0)) as usize);
     }
@@ -23,7 +23,7 @@ fn the_number_of_threads_does_not_matter() {
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let solve = || calibrate(&made.dataset, Method::Joint, &Options::default());
-        pool.expect("threads are to be had")
+        pool.expect("threads can be started")
             .install(solve)
             .expect("a sound dataset")
     };
@@ -47,7 +47,7 @@ fn the_order_of_poses_and_facets_does_not_matter() {
         for (a, b) in straight.beams.iter().zip(&shuffled.beams) {
             assert_eq!((a.beam, a.status, &a.facet), (b.beam, b.status, &b.facet));
             if let (Some(x), Some(y)) = (a.deflection(), b.deflection()) {
-                // Sums in another order.
+                // Sums in a different order.
                 assert!((x.azimuth - y.azimuth).abs() < 1e-12 && (x.elevation - y.elevation).abs() < 1e-12);
                 compared += 1;
             }
@@ -59,11 +59,12 @@ fn the_order_of_poses_and_facets_does_not_matter() {
 #[test]
 fn twice_the_readings_halve_the_noise_covariance_and_not_the_whole() {
     let mut made = World::noisy(8).make();
-    // Believed larger than any sample shows: otherwise a repeated sample may pass for proof of larger noise.
+    // Believed larger than any sample shows: otherwise a repeated sample may be taken as evidence of larger noise.
     made.dataset.session.believed.range_noise_sd_mm = 8.0;
     let once = solve(&made.dataset);
     for pose in &mut made.dataset.poses {
-        pose.ranges.extend_from_within(..);
+        let ranges = pose.readings.held_mut().expect("in memory");
+        ranges.extend_from_within(..);
         pose.label.scans *= 2;
     }
     let twice = solve(&made.dataset);
@@ -87,8 +88,8 @@ fn twice_the_readings_halve_the_noise_covariance_and_not_the_whole() {
     }
 }
 
-/// Noise is all there is here: no drift, no error of markers, tables or distances, nothing known of the mounting before.
-/// Whatever else is believed in does not shrink with readings, and the covariance would not halve.
+/// Only noise here: no drift, no error of markers, tables or distances, no prior knowledge of the mounting. Any other
+/// believed error does not shrink with the number of readings, and the covariance would not halve.
 #[test]
 fn with_noise_alone_twice_the_readings_halve_the_whole_covariance() {
     let mut made = World {
@@ -107,7 +108,8 @@ fn with_noise_alone_twice_the_readings_halve_the_whole_covariance() {
     session.mount_tolerance.translation_sd_mm = [1e6; 3];
     let once = solve(&made.dataset);
     for pose in &mut made.dataset.poses {
-        pose.ranges.extend_from_within(..);
+        let ranges = pose.readings.held_mut().expect("in memory");
+        ranges.extend_from_within(..);
         pose.label.scans *= 2;
     }
     let twice = solve(&made.dataset);

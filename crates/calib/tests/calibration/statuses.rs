@@ -1,4 +1,4 @@
-//! No element disappears: what is wrong with each is said.
+//! No element disappears: every fault is reported.
 
 use crate::synthetic::World;
 use catoptric_calib::{CalibError, Method, Options, calibrate, pose};
@@ -12,8 +12,9 @@ fn solve(dataset: &Dataset) -> Calibration {
 /// Rewrites every reading of a beam in every stretch.
 fn rewrite(dataset: &mut Dataset, beam: usize, with: impl Fn(PoseKind, usize, f64) -> f64) {
     for pose in &mut dataset.poses {
-        let (kind, beams) = (pose.label.kind, pose.beams);
-        for (scan, r) in pose.ranges.iter_mut().skip(beam).step_by(beams).enumerate() {
+        let (kind, beams) = (pose.label.kind, pose.beams());
+        let ranges = pose.readings.held_mut().expect("in memory");
+        for (scan, r) in ranges.iter_mut().skip(beam).step_by(beams).enumerate() {
             *r = with(kind, scan, *r);
         }
     }
@@ -21,8 +22,8 @@ fn rewrite(dataset: &mut Dataset, beam: usize, with: impl Fn(PoseKind, usize, f6
 
 fn assert_rejected(estimate: &BeamEstimate, word: &str) {
     assert_eq!(estimate.status, Status::Rejected, "{:?}", estimate.reason);
-    let reason = estimate.reason.as_deref().expect("a rejection says why");
-    assert!(reason.contains(word), "{reason:?} does not say {word:?}");
+    let reason = estimate.reason.as_deref().expect("a rejection has a reason");
+    assert!(reason.contains(word), "{reason:?} does not contain {word:?}");
 }
 
 #[test]
@@ -55,14 +56,15 @@ fn every_fault_has_its_reason() {
 fn one_reading_of_the_wall_does_not_lose_the_element() {
     let mut made = World::noisy(12).make();
     let clean = solve(&made.dataset).beams[66].clone();
-    let beams = made.dataset.session.scanner.beams;
+    let beams = made.dataset.session.scanner.scan.beams();
     let pose = made
         .dataset
         .poses
         .iter_mut()
         .find(|p| p.label.kind == PoseKind::Facet)
         .expect("there are boards for facets");
-    for r in pose.ranges.iter_mut().skip(66).step_by(beams) {
+    let ranges = pose.readings.held_mut().expect("in memory");
+    for r in ranges.iter_mut().skip(66).step_by(beams) {
         *r += 0.12;
     }
     let found = &solve(&made.dataset).beams[66];
@@ -94,11 +96,13 @@ fn good_elements_survive_honest_noise() {
 }
 
 #[test]
-fn without_boards_for_it_the_mounting_is_the_drawing_s_and_says_so() {
+fn without_boards_for_it_the_mounting_and_its_covariance_are_the_drawing_s() {
     let mut made = World::noisy(13).make();
     made.dataset.poses.retain(|p| p.label.kind != PoseKind::Direct);
-    let mount = solve(&made.dataset).rig_from_sensor.expect("it is always given");
-    let covariance = Matrix6::from(mount.covariance.expect("it is always given"));
+    let mount = solve(&made.dataset)
+        .rig_from_sensor
+        .expect("the mounting is always estimated");
+    let covariance = Matrix6::from(mount.covariance.expect("its covariance is always given"));
     let nominal = catoptric_model::Pose::from(&made.dataset.session.nominal_rig_from_sensor);
     assert!(pose::motion_between(&nominal, &mount.pose()).norm() < 1e-14);
     assert!((covariance[(5, 5)].sqrt().to_degrees() - 1.0).abs() < 1e-9);
@@ -106,7 +110,7 @@ fn without_boards_for_it_the_mounting_is_the_drawing_s_and_says_so() {
 }
 
 #[test]
-fn one_board_determines_some_motions_and_the_tolerance_stands_in_for_the_rest() {
+fn one_board_determines_some_motions_and_the_tolerance_covers_the_rest() {
     let mut made = World::noisy(15).make();
     made.dataset.session.mount_tolerance.rotation_sd_deg = [3.0; 3];
     let mut boards = 0;
@@ -115,8 +119,10 @@ fn one_board_determines_some_motions_and_the_tolerance_stands_in_for_the_rest() 
         p.label.kind != PoseKind::Direct || boards == 1
     });
     let calibration = solve(&made.dataset);
-    let mount = calibration.rig_from_sensor.expect("it is always given");
-    let covariance = Matrix6::from(mount.covariance.expect("it is always given"));
+    let mount = calibration
+        .rig_from_sensor
+        .expect("the mounting is always estimated");
+    let covariance = Matrix6::from(mount.covariance.expect("its covariance is always given"));
     let scale = Matrix6::from_diagonal(
         &[
             5e-3,
@@ -136,17 +142,17 @@ fn one_board_determines_some_motions_and_the_tolerance_stands_in_for_the_rest() 
     );
     assert!(
         values.min() > 0.0 && values.min() < 0.1,
-        "one board says something: {values}"
+        "one board determines something: {values}"
     );
-    // A poorly known mounting is not the boards' fault: elements are solved, with a covariance to match.
+    // A poorly known mounting is not the boards' fault: elements are solved, with a matching covariance.
     let estimate = &calibration.beams[66];
     assert_eq!(estimate.status, Status::Solved, "{:?}", estimate.reason);
-    let variance = estimate.covariance_rad2.expect("it is solved")[1][1];
+    let variance = estimate.covariance_rad2.expect("the element is solved")[1][1];
     assert!(variance.sqrt().to_degrees() > 0.3);
 }
 
 #[test]
-fn a_dataset_that_cannot_be_is_refused() {
+fn an_impossible_dataset_is_refused() {
     let mut made = World::noisy(14).make();
     made.dataset.session.facets[0].corners_mm.truncate(2);
     let refused = calibrate(&made.dataset, Method::Beam, &Options::default());
@@ -154,7 +160,8 @@ fn a_dataset_that_cannot_be_is_refused() {
     made.dataset.session.believed.drift_sd_mm = -1.0;
     let refused = calibrate(&made.dataset, Method::Beam, &Options::default());
     assert!(matches!(refused, Err(CalibError::Session { found, .. }) if found == -1.0));
-    made.dataset.poses[0].ranges.pop();
+    let ranges = made.dataset.poses[0].readings.held_mut().expect("in memory");
+    ranges.pop();
     let refused = calibrate(&made.dataset, Method::Beam, &Options::default());
     assert!(matches!(refused, Err(CalibError::Dataset(_))));
 }
@@ -182,7 +189,7 @@ fn a_wide_beam_and_edges_off_the_drawing_lose_only_edge_beams() {
                     "seed {seed}, beam {index}, {inside} inside: {:?}",
                     estimate.reason
                 );
-                // Half a beam's width is 1.03 steps: two steps inside an edge all its light is mirrored.
+                // Half a beam's width is 1.03 steps: two steps inside an edge all of its light is reflected.
                 if inside >= 2 {
                     assert_eq!(estimate.status, Status::Solved, "{context}");
                 }

@@ -24,7 +24,7 @@ impl Draw {
     }
 }
 
-/// A board relative to the ray it is set up for: distance after the mirror, tilt and direction of tilt.
+/// A board relative to the ray it is set up for: distance from the mirror, tilt and direction of tilt.
 #[derive(Clone, Copy)]
 pub(crate) struct Placement {
     pub(crate) s: f64,
@@ -38,7 +38,7 @@ pub(crate) fn placements(list: &[(f64, f64, f64)]) -> Vec<Placement> {
         .collect()
 }
 
-/// What to record, and with which errors.
+/// A dataset to record, and its errors.
 #[derive(Clone)]
 pub(crate) struct World {
     pub(crate) seed: u64,
@@ -51,11 +51,11 @@ pub(crate) struct World {
     pub(crate) groups: usize,
     /// Boards of each group.
     pub(crate) facet_boards: Vec<Placement>,
-    /// Azimuths, in degrees, at which boards for the mounting stand.
+    /// Azimuths, in degrees, of the boards for the mounting.
     pub(crate) direct_boards: Vec<(f64, Placement)>,
-    /// Full width of a beam along the scan, in radians: its light is spread over it evenly. 0 for a pencil.
+    /// Full width of a beam along the scan, in radians, with its light spread evenly. 0 for an infinitely thin beam.
     pub(crate) width: f64,
-    /// Beams by which the mirrors as built reach less far (first) or farther (last) than drawn, at either end.
+    /// Number of beams by which the mirrors as built start later (first) or end later (last) than drawn.
     pub(crate) edges: [i64; 2],
     pub(crate) board_mm: f64,
     pub(crate) thickness_mm: f64,
@@ -70,11 +70,11 @@ pub(crate) struct World {
     pub(crate) angle_gain_sd_mm: f64,
     pub(crate) color_bias_sd_mm: f64,
     pub(crate) distance_sd_mm: f64,
-    /// Departure of each beam from what its facet's plane gives it, 1σ along each axis, by chance.
-    pub(crate) departure_deg: f64,
+    /// Random deviation of each beam from the direction that its facet's plane gives it, 1σ along each axis.
+    pub(crate) deviation_deg: f64,
 }
 
-/// A dataset and what it was made from.
+/// A dataset and the quantities it was made from.
 pub(crate) struct Made {
     pub(crate) dataset: Dataset,
     pub(crate) deflections: BTreeMap<usize, Deflection>,
@@ -82,7 +82,7 @@ pub(crate) struct Made {
 }
 
 impl World {
-    /// The whole scanner, no noise: mounting off by 1°, facets off by 1° and half a millimetre.
+    /// The whole scanner without noise: mounting off by 1°, facets off by 1° and half a millimeter.
     pub(crate) fn exact() -> Self {
         Self {
             seed: 1,
@@ -127,11 +127,11 @@ impl World {
             angle_gain_sd_mm: 0.0,
             color_bias_sd_mm: 0.0,
             distance_sd_mm: 0.0,
-            departure_deg: 0.0,
+            deviation_deg: 0.0,
         }
     }
 
-    /// A coarse scanner with every error that a session can believe in.
+    /// A coarse scanner with every error that a session can state a belief about.
     pub(crate) fn noisy(seed: u64) -> Self {
         Self {
             seed,
@@ -150,8 +150,13 @@ impl World {
         }
     }
 
+    fn scan(&self) -> ScanGeometry {
+        let angles = ScanAngles::centered(self.step_deg, self.beams);
+        ScanGeometry::new(angles, 40.0, None).expect("a scanner can have it")
+    }
+
     pub(crate) fn azimuth(&self, beam: usize) -> f64 {
-        (beam as f64 - 0.5 * (self.beams as f64 - 1.0)) * self.step_deg.to_radians()
+        self.scan().azimuth(beam)
     }
 
     /// The plane of a facet, as built or as drawn.
@@ -170,7 +175,7 @@ impl World {
         MirrorPlane::through(Point3::from(u.into_inner() * distance), normal)
     }
 
-    /// What the mirrors as built do to a ray.
+    /// Deflection of a ray by the mirrors as built.
     fn mirrored(&self, azimuth: f64) -> Option<Deflection> {
         let step = self.step_deg.to_radians();
         let facet = self.served.iter().position(|s| {
@@ -181,13 +186,13 @@ impl World {
         self.mirror(facet, true).deflect(beam::direction(azimuth))
     }
 
-    fn departed(&self, azimuth: f64, deflection: &Deflection, draw: &mut Draw) -> Deflection {
-        if self.departure_deg == 0.0 {
+    fn deviated(&self, azimuth: f64, deflection: &Deflection, draw: &mut Draw) -> Deflection {
+        if self.deviation_deg == 0.0 {
             return *deflection;
         }
         let v = deflection.exit_direction(azimuth);
         let (across, up) = frame::tangent_basis(&v);
-        let mut by = || self.departure_deg.to_radians() * draw.normal();
+        let mut by = || self.deviation_deg.to_radians() * draw.normal();
         let exit = Unit::new_normalize(v.into_inner() + across.into_inner() * by() + up.into_inner() * by());
         Deflection::from_exit(azimuth, &exit, deflection.distance)
     }
@@ -241,7 +246,7 @@ impl World {
                 *bare = deflection.distance
                     + 1e-3 * self.thickness_mm / mirror.normal.dot(&u).abs()
                     + 1e-3 * self.distance_sd_mm * draw.normal();
-                deflections.insert(beam, self.departed(self.azimuth(beam), &deflection, &mut draw));
+                deflections.insert(beam, self.deviated(self.azimuth(beam), &deflection, &mut draw));
             }
         }
         let session = self.session(&nominal, believed, bare);
@@ -275,7 +280,11 @@ impl World {
             pose.label.pose = i;
         }
         Made {
-            dataset: Dataset { session, poses },
+            dataset: Dataset {
+                session,
+                poses,
+                id: None,
+            },
             deflections,
             rig_from_sensor,
         }
@@ -308,9 +317,7 @@ impl World {
             name: "inverse crime".to_owned(),
             scanner: ScannerSheet {
                 preset: "ust-20lx".to_owned(),
-                beams: self.beams,
-                step_deg: self.step_deg,
-                scan_rate_hz: 40.0,
+                scan: self.scan(),
                 range_min_m: 0.06,
                 range_max_m: 20.0,
                 divergence_full_mrad: 10.0,
@@ -411,12 +418,12 @@ impl Lab<'_> {
             room_from_board: board.map(|b| self.tracked(&(self.room_from_sensor * b), draw)),
             motion: None,
             watched: Vec::new(),
-            beams: world.beams,
-            ranges,
+            readings: Readings::in_memory(world.beams, ranges),
         }
     }
 
-    /// The board as markers with a constant error show it: height and two tilts of the plane through them.
+    /// The board's pose as tracked with markers that have a constant error: height and two tilts of the plane through
+    /// them.
     fn tracked(&self, room_from_board: &Pose, draw: &mut Draw) -> Pose {
         let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
         for marker in &self.session.boards[0].markers {
@@ -429,7 +436,7 @@ impl Lab<'_> {
         room_from_board * Pose::from_parts(Translation3::new(0.0, 0.0, fit.x), tilt)
     }
 
-    /// Range of a beam: the mean over what its light meets first, whatever lies within a pulse of the nearest.
+    /// Range of a beam: the mean over the first surfaces that its light hits, of those within a pulse of the nearest.
     fn range(&self, beam: usize, sensor_from_board: Option<&Pose>) -> f64 {
         const PARTS: usize = 9;
         const PULSE: f64 = 0.45;
@@ -450,7 +457,7 @@ impl Lab<'_> {
         merged.iter().sum::<f64>() / merged.len() as f64
     }
 
-    /// Range of a ray with its biases.
+    /// Range of a ray, with its biases.
     fn part(&self, azimuth: f64, deflection: Option<Deflection>, sensor_from_board: Option<&Pose>) -> f64 {
         let deflection = deflection.unwrap_or(Deflection::NONE);
         let (origin, v) = (
@@ -467,15 +474,15 @@ impl Lab<'_> {
                 .then(|| (s, plane.cos_incidence(&v)))
         });
         let (s, cos_incidence) = on_board.unwrap_or_else(|| {
-            let (from, towards) = (self.room_from_sensor * origin, self.room_from_sensor.rotation * v);
+            let (from, toward) = (self.room_from_sensor * origin, self.room_from_sensor.rotation * v);
             let (s, wall) = self
                 .session
                 .room
                 .as_ref()
                 .expect("this laboratory has walls")
-                .cast(&from, &towards)
-                .expect("it stands in the room");
-            (s, wall.cos_incidence(&towards))
+                .cast(&from, &toward)
+                .expect("the scanner is inside the room");
+            (s, wall.cos_incidence(&toward))
         });
         let range = deflection.distance + s;
         range + self.bias.terms(range, cos_incidence, "white").total()

@@ -1,7 +1,7 @@
-//! Problems of Moré, Garbow, Hillstrom (1981), from their starts and from 10 and 100 times as far.
+//! Problems of Moré, Garbow, Hillstrom (1981), from their starts and from starts 10 and 100 times as far.
 
 use super::duals::{ByDuals, Formula};
-use catoptric_calib::least_squares::{Options, Point, Solution, Stop, minimize};
+use catoptric_calib::lsq::{Options, Point, Solution, Stop, minimize};
 use num_dual::DualNumCopy;
 
 struct Rosenbrock;
@@ -126,7 +126,7 @@ impl Formula for BrownBadlyScaled {
 }
 
 fn solve<F: Formula>(formula: F, start: &[f64]) -> Solution {
-    minimize(&ByDuals(formula), Point::vector(start), &Options::default()).expect("it is defined")
+    minimize(&ByDuals(formula), Point::vector(start), &Options::default()).expect("the residuals are defined")
 }
 
 fn values(solution: &Solution) -> &[f64] {
@@ -147,7 +147,7 @@ fn far(start: &[f64]) -> impl Iterator<Item = Vec<f64>> {
 }
 
 #[test]
-fn zero_residuals_are_reached_from_afar() {
+fn zero_residuals_are_reached_from_far_away() {
     for start in far(&[-1.2, 1.0]) {
         let found = solve(Rosenbrock, &start);
         assert!(close(values(&found), &[1.0, 1.0], 1e-12), "{start:?}: {found:?}");
@@ -164,7 +164,7 @@ fn zero_residuals_are_reached_from_afar() {
 }
 
 #[test]
-fn a_singular_minimum_is_reached_and_said_to_be_singular() {
+fn a_singular_minimum_is_reached_and_reported_as_singular() {
     for start in far(&[3.0, -1.0, 0.0, 1.0]) {
         let found = solve(PowellSingular, &start);
         assert!(
@@ -181,7 +181,7 @@ fn a_singular_minimum_is_reached_and_said_to_be_singular() {
 
 #[test]
 fn residual_sums_are_the_published_ones() {
-    // Moré, Garbow, Hillstrom's numbers 15, 10, 8, 16, 6.
+    // Problems 15, 10, 8, 16 and 6 of Moré, Garbow, Hillstrom.
     let near = |found: &Solution, sum: f64| (found.sum_of_squares / sum - 1.0).abs() < 5e-6;
     assert!(near(
         &solve(KowalikOsborne, &[0.25, 0.39, 0.415, 0.39]),
@@ -198,7 +198,7 @@ fn residual_sums_are_the_published_ones() {
 
 #[test]
 fn a_local_minimum_has_a_perpendicular_residual() {
-    // Number 2: from (0.5, −2) the minimum is 48.9842 at (11.4127…, −0.8968…), not 0 at (5, 4).
+    // Problem 2: from (0.5, −2) the minimum is 48.9842 at (11.4127…, −0.8968…), not 0 at (5, 4).
     let found = solve(FreudensteinRoth, &[0.5, -2.0]);
     assert!((found.sum_of_squares / 48.9842 - 1.0).abs() < 1e-5, "{found:?}");
     assert!(found.gradient_cosine < 1e-6);
@@ -212,7 +212,8 @@ fn the_limit_is_reported() {
         max_evaluations: 3,
         ..Options::default()
     };
-    let found = minimize(&ByDuals(Rosenbrock), Point::vector(&[-1.2, 1.0]), &options).expect("it is defined");
+    let found = minimize(&ByDuals(Rosenbrock), Point::vector(&[-1.2, 1.0]), &options)
+        .expect("the residuals are defined");
     assert_eq!((found.stop, found.evaluations), (Stop::Limit, 3));
     assert!(!found.stop.converged() && found.gradient_cosine > 1e-3);
 }

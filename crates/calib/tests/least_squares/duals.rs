@@ -1,10 +1,10 @@
-//! Problems written once for numbers and dual numbers; the Jacobian is exact.
+//! Problems written once for numbers and dual numbers, so that the Jacobian is exact.
 
-use catoptric_calib::least_squares::{Point, Problem};
+use catoptric_calib::lsq::{Point, Problem};
 use nalgebra::{DMatrix, DVector};
 use num_dual::{Dual64, DualNumCopy};
 
-/// Residuals as a function that does not care what kind of number it is given.
+/// Residuals as a function that is generic over the type of number.
 pub(crate) trait Formula: Sync {
     fn residuals<D: DualNumCopy<Primitive = f64>>(&self, b: &[D]) -> Vec<D>;
 }

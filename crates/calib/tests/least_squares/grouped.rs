@@ -1,8 +1,9 @@
-//! Grouped problems: elimination gives what the dense matrix gives, at the size of a joint calibration.
+//! Grouped problems: elimination gives the same as the dense matrix, at the size of a joint calibration.
 
+use super::flat::Flat;
 use super::sample::Sample;
-use catoptric_calib::least_squares::{
-    Block, Flat, GroupJacobian, GroupedProblem, Options, Point, Prior, Problem, Reduced, State, WithPriors,
+use catoptric_calib::lsq::{
+    Block, GroupJacobian, GroupedProblem, Options, Point, Prior, Problem, Reduced, State, WithPriors,
     linearize, minimize,
 };
 use catoptric_model::Pose;
@@ -160,13 +161,13 @@ fn start(truth: &State) -> State {
 }
 
 #[test]
-fn elimination_gives_what_the_dense_matrix_gives() {
+fn elimination_agrees_with_the_dense_matrix() {
     let (boards, truth) = Boards::simulated(12, 10, &mut Sample::new(8));
     let problem = boards.with_priors();
     let options = Options::default();
-    let grouped = minimize(&problem, start(&truth), &options).expect("it is defined");
+    let grouped = minimize(&problem, start(&truth), &options).expect("the residuals are defined");
     let (flat, at) = Flat::new(&problem, &start(&truth));
-    let dense = minimize(&flat, at, &options).expect("it is defined");
+    let dense = minimize(&flat, at, &options).expect("the residuals are defined");
     assert!(grouped.stop.converged() && dense.stop.converged());
     let state = flat.state(&dense.state.shared);
     let blocks = |s: &State| Flat::new(&problem, s).1.blocks;
@@ -185,10 +186,10 @@ fn elimination_gives_what_the_dense_matrix_gives() {
 }
 
 #[test]
-fn the_step_along_a_combination_is_the_likeliest_that_changes_it_by_one_sd() {
+fn the_step_along_a_combination_is_the_most_probable_change_by_one_sd() {
     let (boards, truth) = Boards::simulated(6, 12, &mut Sample::new(11));
     let problem = boards.with_priors();
-    let found = minimize(&problem, start(&truth), &Options::default()).expect("it is defined");
+    let found = minimize(&problem, start(&truth), &Options::default()).expect("the residuals are defined");
     let covariance = found.information.covariance().expect("priors hold all");
     let mut sample = Sample::new(12);
     let g = DVector::from_fn(covariance.nrows(), |_, _| sample.normal());
@@ -206,7 +207,7 @@ fn a_covariance_within_a_group_is_that_among_all() {
     let shared = DMatrix::from_fn(3, truth.shared.dimension(), |_, _| sample.normal());
     let own = DMatrix::from_fn(3, 4, |_, _| sample.normal());
     let problem = boards.with_priors();
-    let found = minimize(&problem, start(&truth), &Options::default()).expect("it is defined");
+    let found = minimize(&problem, start(&truth), &Options::default()).expect("the residuals are defined");
     for group in 0..boards.boards.len() {
         let mut all = DMatrix::zeros(3, truth.dimension());
         all.columns_mut(0, shared.ncols()).copy_from(&shared);
@@ -218,32 +219,32 @@ fn a_covariance_within_a_group_is_that_among_all() {
             .expect("priors hold all");
         assert!((within - &among).norm() < 1e-12 * among.norm(), "group {group}");
     }
-    // Without priors each drift is its board's offset and the bias.
+    // Without priors each drift is indistinguishable from its board's offset and the bias.
     let options = Options {
         max_evaluations: 1,
         rank_threshold: 1e-8,
         ..Options::default()
     };
-    let open = minimize(&boards, truth, &options).expect("it is defined");
+    let open = minimize(&boards, truth, &options).expect("the residuals are defined");
     assert_eq!(open.information.covariance_within(0, &shared, &own), None);
 }
 
 #[test]
-fn a_reduced_problem_changes_as_the_whole_one_does() {
+fn a_reduced_problem_changes_like_the_whole_one() {
     let (boards, truth) = Boards::simulated(6, 12, &mut Sample::new(15));
-    // The boards are where their priors have them.
+    // The boards are at the means of their priors.
     let at = start(&truth);
-    let whole = linearize(&boards.with_priors(), &at).expect("it is defined");
+    let whole = linearize(&boards.with_priors(), &at).expect("the residuals are defined");
     let without = WithPriors {
         own: Vec::new(),
         ..boards.with_priors()
     };
-    let reduced = Reduced::new(&without, &at).expect("it is defined");
+    let reduced = Reduced::new(&without, &at).expect("the residuals are defined");
     let mut weights = DVector::zeros(at.dimension());
     for (i, weight) in weights.iter_mut().skip(at.shared.dimension()).enumerate() {
         *weight = 1.0 / [0.0005, 0.001, 0.001, 0.001][i % 4];
     }
-    // In other units a prior is in them as well, and nothing but the units changes.
+    // In other units a prior is converted as well, and nothing but the units changes.
     let factors = DVector::from_fn(at.dimension(), |i, _| 0.5 + (i % 3) as f64);
     let changed = reduced.changed(&factors, &weights.component_mul(&factors));
     let units: f64 = factors.iter().map(|f| 2.0 * libm::log(*f)).sum();
@@ -259,8 +260,9 @@ fn a_reduced_problem_changes_as_the_whole_one_does() {
 }
 
 #[test]
-fn what_a_group_leaves_open_is_found_as_in_the_dense_matrix() {
-    // Without priors a facet's turn is the mounting's, each drift is its board's offset and the bias.
+fn open_directions_of_a_group_agree_with_the_dense_matrix() {
+    // Without priors a rotation of the facet is indistinguishable from one of the mounting, and each drift from its
+    // board's offset and the bias.
     let (boards, truth) = Boards::simulated(6, 12, &mut Sample::new(9));
     let options = Options {
         max_evaluations: 1,
@@ -268,9 +270,9 @@ fn what_a_group_leaves_open_is_found_as_in_the_dense_matrix() {
         rank_threshold: 1e-8,
         ..Options::default()
     };
-    let grouped = minimize(&boards, truth.clone(), &options).expect("it is defined");
+    let grouped = minimize(&boards, truth.clone(), &options).expect("the residuals are defined");
     let (flat, at) = Flat::new(&boards, &truth);
-    let dense = minimize(&flat, at, &options).expect("it is defined");
+    let dense = minimize(&flat, at, &options).expect("the residuals are defined");
     let (a, b) = (grouped.information.null_space(), dense.information.null_space());
     assert_eq!(grouped.information.rank(), dense.information.rank());
     assert!(
@@ -282,18 +284,19 @@ fn what_a_group_leaves_open_is_found_as_in_the_dense_matrix() {
     let difference = a * a.transpose() - b * b.transpose();
     assert!(difference.norm() < 1e-5, "{}", difference.norm());
     for vector in a.column_iter() {
-        let image =
-            Problem::jacobian(&flat, &Flat::new(&boards, &grouped.state).1).expect("it is defined") * vector;
+        let image = Problem::jacobian(&flat, &Flat::new(&boards, &grouped.state).1)
+            .expect("the residuals are defined")
+            * vector;
         assert!(image.norm() < 1e-6, "{}", image.norm());
     }
 }
 
 #[test]
-fn estimates_of_a_whole_session_are_as_far_off_as_they_say() {
+fn estimates_of_a_whole_session_have_honest_covariances() {
     // 60 boards of 160 readings: 9600 residuals, 10 shared and 240 own parameters.
     let (boards, truth) = Boards::simulated(60, 160, &mut Sample::new(10));
     let problem = boards.with_priors();
-    let found = minimize(&problem, start(&truth), &Options::default()).expect("it is defined");
+    let found = minimize(&problem, start(&truth), &Options::default()).expect("the residuals are defined");
     assert!(
         found.stop.converged() && found.iterations < 30,
         "{}",
@@ -313,10 +316,15 @@ fn estimates_of_a_whole_session_are_as_far_off_as_they_say() {
         .flat_map(|(a, b)| b.difference(a).as_slice().to_vec())
         .collect();
     let error = DVector::from_vec(error);
-    let squared = error.dot(&covariance.cholesky().expect("it is regular").solve(&error));
+    let squared = error.dot(
+        &covariance
+            .cholesky()
+            .expect("the matrix is regular")
+            .solve(&error),
+    );
     // χ² of 10 degrees of freedom: 99.9 % between 1.26 and 31.4.
     assert!(squared > 1.26 && squared < 31.4, "{squared}");
-    // Residuals and priors together have as many degrees of freedom as there are readings and a prior of 6.
+    // The degrees of freedom of residuals and priors together equal the number of readings plus 6 for a prior.
     let readings: usize = boards.boards.iter().map(|b| b.rays.len()).sum();
     let freedom = (readings + 6 - 10) as f64;
     assert_eq!(found.degrees_of_freedom(), readings + 6 - 10);

@@ -1,7 +1,7 @@
 //! Rank, open directions and covariance, against finite differences and known null spaces.
 
 use super::duals::{ByDuals, Formula};
-use catoptric_calib::least_squares::{Options, Point, ProblemError, Solution, minimize};
+use catoptric_calib::lsq::{Options, Point, ProblemError, Solution, minimize};
 use nalgebra::{DMatrix, DVector};
 use num_dual::DualNumCopy;
 
@@ -22,7 +22,7 @@ impl Formula for Decay {
     }
 }
 
-/// Two gains of one signal, whose product alone is seen, an offset, and a parameter that nothing sees.
+/// Two gains of one signal, of which only the product is observed, an offset, and a parameter that is not observed.
 struct Gains;
 
 impl Formula for Gains {
@@ -34,7 +34,7 @@ impl Formula for Gains {
 }
 
 fn solve<F: Formula>(formula: F, start: &[f64]) -> Solution {
-    minimize(&ByDuals(formula), Point::vector(start), &Options::default()).expect("it is defined")
+    minimize(&ByDuals(formula), Point::vector(start), &Options::default()).expect("the residuals are defined")
 }
 
 #[test]
@@ -55,12 +55,12 @@ fn covariance_is_the_inverse_of_half_the_hessian() {
         };
         (shifted(1.0, 1.0) - shifted(1.0, -1.0) - shifted(-1.0, 1.0) + shifted(-1.0, -1.0)) / (4.0 * h * h)
     });
-    let expected = hessian.try_inverse().expect("it is regular");
+    let expected = hessian.try_inverse().expect("the matrix is regular");
     let covariance = found.information.covariance().expect("nothing is open");
     assert!((&covariance - &expected).norm() < 1e-4 * expected.norm());
     assert!((&covariance - covariance.transpose()).norm() == 0.0);
     assert!(covariance.symmetric_eigenvalues().min() > 0.0);
-    let correlation = found.information.correlation(0, 2).expect("nothing is open");
+    let correlation = covariance[(0, 2)] / (covariance[(0, 0)] * covariance[(2, 2)]).sqrt();
     assert!(correlation < -0.5 && correlation > -1.0);
     let g = DVector::from_vec(vec![1.0, -2.0, 0.5]);
     let direct = (g.transpose() * found.information.covariance().expect("nothing is open") * &g)[0];
@@ -87,7 +87,7 @@ fn open_directions_are_named_and_get_no_number() {
     let information = &found.information;
     let b = found.state.shared.numbers(0).expect("numbers").clone();
     assert!((b[0] * b[1] - 6.0).abs() < 1e-10 && (b[2] - 1.0).abs() < 1e-10);
-    assert_eq!(b[3], 5.0, "what nothing sees stays where it was");
+    assert_eq!(b[3], 5.0, "a parameter that is not observed keeps its value");
     assert_eq!((information.rank(), information.null_space().ncols()), (2, 2));
     let named = information.open_directions(&["sender gain", "receiver gain", "offset", "color"]);
     let names: Vec<Vec<&str>> = named
@@ -105,7 +105,7 @@ fn open_directions_are_named_and_get_no_number() {
     assert!(gains[0].1 > 0.0 && gains[1].1 < 0.0);
     let deviations = information.standard_deviations();
     assert!(deviations[0].is_none() && deviations[1].is_none() && deviations[3].is_none());
-    assert!(information.covariance().is_none() && information.correlation(0, 2).is_none());
+    assert!(information.covariance().is_none() && information.covariance_among(&[0, 2]).is_none());
     // The offset of a straight line over 0 … 5: s²(1/6 + 2.5²/17.5).
     let offset = deviations[2].expect("the offset is determined");
     assert!((offset.powi(2) - (1.0 / 6.0 + 6.25 / 17.5)).abs() < 1e-12);
@@ -120,7 +120,7 @@ fn open_directions_are_named_and_get_no_number() {
 }
 
 #[test]
-fn fewer_residuals_than_parameters_leave_the_rest_open() {
+fn fewer_residuals_than_parameters_leave_directions_open() {
     struct OneLine;
     impl Formula for OneLine {
         fn residuals<D: DualNumCopy<Primitive = f64>>(&self, b: &[D]) -> Vec<D> {
@@ -130,14 +130,13 @@ fn fewer_residuals_than_parameters_leave_the_rest_open() {
     let found = solve(OneLine, &[0.0; 3]);
     assert!(found.sum_of_squares < 1e-28);
     assert_eq!((found.information.rank(), found.degrees_of_freedom()), (1, 0));
-    assert!(found.residual_variance().is_none());
     let normal = DVector::from_vec(vec![1.0, 2.0, -1.0]);
     assert!((found.information.null_space().transpose() * &normal).norm() < 1e-14);
     assert!(!found.information.is_open(&normal));
 }
 
 #[test]
-fn what_cannot_be_solved_is_an_error() {
+fn unsolvable_problems_are_errors() {
     struct Undefined;
     impl Formula for Undefined {
         fn residuals<D: DualNumCopy<Primitive = f64>>(&self, b: &[D]) -> Vec<D> {
@@ -151,13 +150,13 @@ fn what_cannot_be_solved_is_an_error() {
         place: "start",
     };
     assert_eq!(found, Err(undefined));
-    // From within, a step into the undefined is only shortened.
+    // A step from inside into the undefined region is only shortened.
     let found = minimize(&ByDuals(Undefined), Point::vector(&[20.0]), &Options::default());
     let found = found.expect("the start is defined");
     assert!((found.state.shared.numbers(0).expect("numbers")[0] - 1.0).abs() < 1e-12);
 
     struct Narrow;
-    impl catoptric_calib::least_squares::Problem for Narrow {
+    impl catoptric_calib::lsq::Problem for Narrow {
         fn residuals(&self, _: &Point) -> Option<DVector<f64>> {
             Some(DVector::zeros(2))
         }
@@ -166,7 +165,7 @@ fn what_cannot_be_solved_is_an_error() {
         }
     }
     let error =
-        minimize(&Narrow, Point::vector(&[0.0, 0.0]), &Options::default()).expect_err("a column lacks");
+        minimize(&Narrow, Point::vector(&[0.0, 0.0]), &Options::default()).expect_err("a column is missing");
     assert_eq!(
         error.to_string(),
         "the Jacobian of group 0 is 2 × 1 for its shared parameters; needed are 2 × 2"

@@ -3,10 +3,10 @@
 
 mod classics;
 mod duals;
+mod flat;
 mod grouped;
 mod information;
 mod manifolds;
 mod nist;
 mod priors;
-mod robust;
 mod sample;

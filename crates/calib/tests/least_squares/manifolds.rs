@@ -1,7 +1,7 @@
-//! Laws of the retractions, and their derivatives against dual numbers.
+//! Properties of the retractions, and their derivatives against dual numbers.
 
 use super::sample::Sample;
-use catoptric_calib::least_squares::{Block, Options, Point, Problem, Stop, minimize};
+use catoptric_calib::lsq::{Block, Options, Point, Problem, Stop, minimize};
 use catoptric_model::Pose;
 use nalgebra::{DMatrix, DVector, Translation3, Unit, UnitQuaternion, Vector3};
 use num_dual::{Dual64, DualNumCopy};
@@ -22,7 +22,7 @@ fn blocks(sample: &mut Sample) -> Vec<Block> {
 }
 
 fn step(sample: &mut Sample, block: &Block, size: f64) -> DVector<f64> {
-    // No turn of half a circle or more: there the shortest step is another one.
+    // No rotation by half a circle or more: there the shortest step is another one.
     let step = DVector::from_fn(block.dimension(), |_, _| sample.normal());
     &step * (size / step.norm())
 }
@@ -45,7 +45,7 @@ fn retraction_and_difference_undo_each_other() {
                     (block.difference(&moved) - &step).norm() < 1e-13,
                     "{block:?} {step}"
                 );
-                // And from the other side: x ⊞ (y ⊟ x) = y.
+                // In the other direction: x ⊞ (y ⊟ x) = y.
                 let again = block.retract(block.difference(&moved).as_slice());
                 assert!(distance(&moved, &again) < 1e-13);
                 let back = moved.difference(&block);
@@ -103,7 +103,7 @@ fn rotated<D: DualNumCopy<Primitive = f64>>(turn: [D; 3], p: [D; 3]) -> [D; 3] {
 
 #[test]
 fn dual_numbers_agree_with_the_steps_of_each_block() {
-    // d(x ⊞ δ)/dδ of a point that the block carries, by dual numbers through the formula of the retraction, against
+    // d(x ⊞ δ)/dδ of a point that the block transforms: dual numbers through the formula of the retraction, against
     // differences through `retract`.
     let mut sample = Sample::new(4);
     for _ in 0..20 {
@@ -112,12 +112,12 @@ fn dual_numbers_agree_with_the_steps_of_each_block() {
         let pose = Block::Pose(Pose::from_parts(Translation3::from(t), r));
         let carried = |step: &[f64]| match pose.retract(step) {
             Block::Pose(pose) => pose * nalgebra::Point3::from(p),
-            other => panic!("{other:?} is no pose"),
+            other => panic!("{other:?} is not a pose"),
         };
         for varied in 0..6 {
             let dual = |i: usize| Dual64::new(0.0, if i == varied { 1.0 } else { 0.0 });
             let turned = rotated([dual(3), dual(4), dual(5)], [p.x, p.y, p.z].map(Dual64::from));
-            // Body-frame point plus body-frame shift, then into the world by R.
+            // Body-frame point plus body-frame shift, then rotated into the world by R.
             let inner = Vector3::new(
                 turned[0].eps + dual(0).eps,
                 turned[1].eps + dual(1).eps,
@@ -135,7 +135,7 @@ fn dual_numbers_agree_with_the_steps_of_each_block() {
     }
 }
 
-/// Points seen from an unknown pose, q = T⁻¹·p, and a direction seen from it.
+/// Points and a direction observed from an unknown pose, q = T⁻¹·p.
 struct Seen {
     points: Vec<(Vector3<f64>, Vector3<f64>)>,
 }
@@ -165,7 +165,7 @@ impl Problem for Seen {
 }
 
 #[test]
-fn a_pose_is_found_from_any_turn() {
+fn a_pose_is_found_from_any_rotation() {
     let mut sample = Sample::new(5);
     for _ in 0..30 {
         let truth = Pose::from_parts(
@@ -184,7 +184,8 @@ fn a_pose_is_found_from_any_turn() {
         let start = Point {
             blocks: vec![Block::Pose(Pose::identity())],
         };
-        let found = minimize(&Seen { points }, start, &Options::default()).expect("it is defined");
+        let found =
+            minimize(&Seen { points }, start, &Options::default()).expect("the residuals are defined");
         let error = found.state.shared.blocks[0]
             .difference(&Block::Pose(truth))
             .norm();

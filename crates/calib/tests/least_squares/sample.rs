@@ -1,4 +1,4 @@
-//! A fixed generator of normal deviates, the same on every machine: SplitMix64 and the transform of Box and Muller.
+//! A fixed generator of normal deviates, the same on every machine: SplitMix64 and the Box–Muller transform.
 
 /// The generator's state.
 pub(crate) struct Sample(u64);

@@ -1,12 +1,13 @@
-//! Room and procedure: whether everything has its place, and whether beams meet the boards.
+//! Checks of room and procedure: whether everything fits in the room, and whether beams hit the boards.
 
+use super::findings::{Findings, suggestion};
 use super::outline::{Meets, Obstacles, nominal_room_from_sensor};
-use super::structure::{SCAN_HALF_DEG, rounded};
-use super::{Findings, Path, suggestion};
-use crate::placement::{before_beam, stands_in};
+use super::structure::{reach, rounded};
+use crate::build::board::{before_beam, stands_in};
 use crate::scene::{Board, BoardPose, Scene, SensorTest};
 use catoptric_model::frame::yaw_pitch_roll;
-use catoptric_model::{BoardPlane, Pose, Rectangle, beam};
+use catoptric_model::place::Path;
+use catoptric_model::{BoardPlane, Pose, Rectangle, ScanGeometry, beam};
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// Names of the two walls of each axis.
@@ -16,15 +17,16 @@ const WALLS: [[&str; 2]; 3] = [
     ["floor", "ceiling"],
 ];
 
-pub(super) fn check(scene: &Scene, found: &mut Findings) {
+pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     let before = found.0.len();
-    check_rig(scene, found);
+    check_rig(scene, scan, found);
     let rig_has_its_place = found.0.len() == before;
     check_boards(scene, found);
-    let obstacles = Obstacles::of(scene);
+    let obstacles = Obstacles::of(scene, scan);
     let met = obstacles.met_by_beams();
     let bench = Bench {
         scene,
+        scan,
         room_from_sensor: nominal_room_from_sensor(scene),
         obstacles,
         met,
@@ -50,7 +52,7 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
         found.add(
             &Path::of("experiment").key("direct_poses"),
             format_args!(
-                "asks for {} boards before undeflected beams, and there is no such beam",
+                "asks for {} boards in front of undeflected beams, but there is no such beam",
                 scene.experiment.direct_poses
             ),
             "set it to 0, or leave part of the scan free".to_owned(),
@@ -58,7 +60,7 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
     }
 }
 
-fn check_rig(scene: &Scene, found: &mut Findings) {
+fn check_rig(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     let room = &scene.room;
     let path = Path::of("room").key("rig_position_m");
     let rig = Point3::from(Vector3::from(room.rig_position_m));
@@ -84,7 +86,7 @@ fn check_rig(scene: &Scene, found: &mut Findings) {
         return;
     }
     for (i, facet) in scene.superstructure.facet.iter().enumerate() {
-        let corners = crate::layout::corners(&facet.shape).unwrap_or_default();
+        let corners = crate::build::layout::corners(&facet.shape, scan).unwrap_or_default();
         let beyond = corners
             .iter()
             .find_map(|c| outside(&(room_from_sensor * c), &room.size_m));
@@ -152,7 +154,7 @@ pub(super) fn outside(point: &Point3<f64>, size_m: &[f64; 3]) -> Option<(&'stati
 pub(super) fn room_extent(size_m: &[f64; 3]) -> String {
     let [x, y, z] = *size_m;
     format!(
-        "the room reaches from ({}, {}, 0) m to ({}, {}, {z}) m; its frame stands on the middle of the floor",
+        "the room reaches from ({}, {}, 0) m to ({}, {}, {z}) m; its origin is the center of the floor",
         -0.5 * x,
         -0.5 * y,
         0.5 * x,
@@ -160,10 +162,10 @@ pub(super) fn room_extent(size_m: &[f64; 3]) -> String {
     )
 }
 
-/// The pose of a board as the scene gives it; `None` for a normal of no length.
+/// The pose of a board as the scene gives it; `None` for a zero-length normal.
 fn room_from_board(pose: &BoardPose) -> Option<Pose> {
     let normal = Unit::try_new(Vector3::from(pose.normal), f64::MIN_POSITIVE)?;
-    // On a board that lies flat every direction is horizontal; x will do.
+    // On a horizontal board every direction is horizontal; use x.
     let across = Unit::try_new(Vector3::z().cross(&normal), 1e-9).unwrap_or(Vector3::x_axis());
     let axes = Matrix3::from_columns(&[across.into_inner(), normal.cross(&across), normal.into_inner()]);
     let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
@@ -177,6 +179,7 @@ fn room_from_board(pose: &BoardPose) -> Option<Pose> {
 /// The experiment as drawn.
 struct Bench<'a> {
     scene: &'a Scene,
+    scan: &'a ScanGeometry,
     room_from_sensor: Pose,
     obstacles: Obstacles,
     met: Vec<Option<Meets>>,
@@ -245,7 +248,7 @@ impl Bench<'_> {
         }
     }
 
-    /// Boards before one beam of the bare sensor.
+    /// Checks boards in front of one beam of the bare sensor.
     fn check_test(&self, test: &SensorTest, path: &Path, place: bool, found: &mut Findings) {
         let scene = self.scene;
         let mut boards = Vec::new();
@@ -262,7 +265,15 @@ impl Bench<'_> {
         if !place {
             return;
         }
-        let beam = beam::nearest(test.azimuth_deg.to_radians());
+        let beam = self.scan.nearest(test.azimuth_deg.to_radians());
+        if beam.is_none() {
+            found.add(
+                &path.key("azimuth_deg"),
+                format_args!("is {}°; {}", test.azimuth_deg, reach(self.scan)),
+                None,
+            );
+            return;
+        }
         if let Some(met) = beam.and_then(|b| self.met[b]) {
             let what = match met {
                 Meets::Facet(facet) => format!("facet {:?}", scene.superstructure.facet[facet].name),
@@ -270,8 +281,8 @@ impl Bench<'_> {
             };
             found.add(
                 &path.key("azimuth_deg"),
-                format_args!("is {}°, where the beam meets {what}", test.azimuth_deg),
-                "a test of the bare sensor takes a beam that nothing deflects".to_owned(),
+                format_args!("is {}°, where the beam hits {what}", test.azimuth_deg),
+                "a test of the bare sensor needs an undeflected beam".to_owned(),
             );
             return;
         }
@@ -288,7 +299,7 @@ impl Bench<'_> {
                 found.add(
                     &path.key("range_m").index(i),
                     format_args!(
-                        "is {range} m, where board {:?} under {incidence}° would reach through a wall, floor or ceiling",
+                        "is {range} m, where board {:?} at {incidence}° would reach through a wall, floor or ceiling",
                         board.name
                     ),
                     room_extent(&scene.room.size_m),
@@ -297,17 +308,17 @@ impl Bench<'_> {
         }
     }
 
-    /// A board before undeflected beams.
+    /// Checks a board in front of undeflected beams.
     fn check_direct(&self, outline: &Rectangle, sensor_from_board: &Pose, path: &Path, found: &mut Findings) {
         let center = sensor_from_board.translation.vector;
         let azimuth = libm::atan2(center.y, center.x).to_degrees();
-        if azimuth.abs() > SCAN_HALF_DEG {
+        if self.scan.nearest(azimuth.to_radians()).is_none() {
             found.add(
                 &path.key("center_m"),
                 format_args!(
-                    "puts the board behind the sensor: at azimuth {}°, the scan reaches from -{SCAN_HALF_DEG}° \
-                     to {SCAN_HALF_DEG}°",
-                    rounded(azimuth)
+                    "puts the board behind the sensor: at azimuth {}°, {}",
+                    rounded(azimuth),
+                    reach(self.scan)
                 ),
                 self.forward_help(),
             );
@@ -318,22 +329,22 @@ impl Bench<'_> {
             return;
         }
         let direct = self.met.iter().enumerate().filter(|(_, met)| met.is_none());
-        let mut rays = direct.map(|(i, _)| (Point3::origin(), beam::direction(beam::azimuth(i))));
+        let mut rays = direct.map(|(i, _)| (Point3::origin(), beam::direction(self.scan.azimuth(i))));
         if !rays.any(|(origin, v)| meets(outline, sensor_from_board, &origin, &v)) {
             found.add(
                 &path.key("center_m"),
                 format_args!(
-                    "puts the board where no undeflected beam meets it: at azimuth {}°, {} m {} the scan plane",
+                    "puts the board where no undeflected beam hits it: at azimuth {}°, {} m {} the scan plane",
                     rounded(azimuth),
                     rounded(center.z.abs()),
                     if center.z < 0.0 { "below" } else { "above" }
                 ),
-                "name the `facet` if the board stands in a mirror's fan".to_owned(),
+                "name the `facet` if the board is in the fan of a mirror".to_owned(),
             );
         }
     }
 
-    /// A board in the fan of a facet.
+    /// Checks a board in the fan of a facet.
     fn check_in_fan(
         &self,
         facet: usize,
@@ -345,10 +356,10 @@ impl Bench<'_> {
         let Some(face) = &self.obstacles.facets[facet] else {
             return;
         };
-        let rays: Vec<(Point3<f64>, Unit<Vector3<f64>>)> = (0..beam::COUNT)
+        let rays: Vec<(Point3<f64>, Unit<Vector3<f64>>)> = (0..self.scan.beams())
             .filter(|i| self.met[*i] == Some(Meets::Facet(facet)))
             .filter_map(|i| {
-                let azimuth = beam::azimuth(i);
+                let azimuth = self.scan.azimuth(i);
                 let deflection = face.deflect(&beam::direction(azimuth))?;
                 Some((
                     deflection.deflection_point(azimuth),
@@ -356,7 +367,7 @@ impl Bench<'_> {
                 ))
             })
             .collect();
-        // A facet without beams has been reported where it is drawn.
+        // A facet without beams is already reported by the checks of the structure.
         let Some((origin, v)) = rays.get(rays.len() / 2) else {
             return;
         };
@@ -373,7 +384,7 @@ impl Bench<'_> {
         if ahead <= 0.0 {
             found.add(
                 &path.key("center_m"),
-                format_args!("puts the board behind facet {name:?}: the fan goes away from it"),
+                format_args!("puts the board behind facet {name:?}: the fan points away from it"),
                 help,
             );
         } else if shows_its_back(sensor_from_board, origin) {
@@ -381,7 +392,7 @@ impl Bench<'_> {
         } else if !rays.iter().any(|(o, v)| meets(outline, sensor_from_board, o, v)) {
             found.add(
                 &path.key("center_m"),
-                format_args!("puts the board where no beam of facet {name:?} meets it"),
+                format_args!("puts the board where no beam of facet {name:?} hits it"),
                 help,
             );
         }
@@ -391,7 +402,7 @@ impl Bench<'_> {
         found.add(
             &path.key("normal"),
             format_args!("turns the back of the board to {seen_from}"),
-            "turn the normal round: it points from the board's face into the room".to_owned(),
+            "reverse the normal: it points from the board's face into the room".to_owned(),
         );
     }
 
@@ -399,7 +410,7 @@ impl Bench<'_> {
         let v = self.room_from_sensor * Vector3::x();
         let sensor = self.room_from_sensor.translation.vector;
         format!(
-            "the sensor stands at ({}, {}, {}) m and looks along ({}, {}, 0)",
+            "the sensor is at ({}, {}, {}) m and looks along ({}, {}, 0)",
             rounded(sensor.x),
             rounded(sensor.y),
             rounded(sensor.z),

@@ -1,22 +1,25 @@
-//! Flights: whether time goes on, a scan fits in, the turns are clear, and the way stays in the room.
+//! Checks of flights: increasing times, at least one whole scan, unambiguous turns, and a trajectory inside the room.
 
 use super::experiment::{outside, room_extent};
+use super::findings::Findings;
 use super::structure::rounded;
 use super::values::distinct;
-use super::{Findings, Path};
-use crate::layout;
+use crate::build::layout;
+use crate::build::structure;
+use crate::build::trajectory::{self, Trajectory};
 use crate::scene::{Flight, Scene};
-use crate::structure;
-use crate::trajectory::{self, Trajectory};
+use catoptric_model::ScanGeometry;
+use catoptric_model::place::Path;
 use nalgebra::{Point3, Vector3};
 
-/// Turns from waypoint to waypoint must fall this short of half a turn, in degrees: there either arc is the shorter.
+/// The turn between two waypoints must be this much less than half a turn, in degrees; there both arcs are equally
+/// short.
 const HALF_TURN_MARGIN_DEG: f64 = 1.0;
 
-/// Places between two waypoints at which the way is looked at.
+/// Number of steps between two waypoints at which the trajectory is examined.
 const STEPS: u32 = 32;
 
-pub(super) fn check(scene: &Scene, found: &mut Findings) {
+pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     let flights = Path::of("flight");
     distinct(&flights, scene.flight.iter().map(|f| f.name.as_str()), found);
     for (i, flight) in scene.flight.iter().enumerate() {
@@ -25,9 +28,9 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
         check_times(flight, &path, found);
         check_turns(flight, &path, found);
         if found.0.len() == before {
-            check_scans(scene, flight, &path, found);
+            check_scans(scan, flight, &path, found);
             if scene.room.has_walls() {
-                check_way(scene, flight, &path, found);
+                check_trajectory(scene, scan, flight, &path, found);
             }
         }
     }
@@ -39,7 +42,7 @@ fn check_times(flight: &Flight, path: &Path, found: &mut Findings) {
         found.add(
             &waypoints,
             format_args!(
-                "has {} entries; a flight goes from one to another",
+                "has {} entries; a flight goes from one waypoint to another",
                 flight.waypoint.len()
             ),
             "at least 2 are needed; a rig that hovers has the same pose twice".to_owned(),
@@ -67,7 +70,7 @@ fn check_turns(flight: &Flight, path: &Path, found: &mut Findings) {
             found.add(
                 &path.key("waypoint").index(i + 1),
                 format_args!(
-                    "turns the rig by {}°: which way round is not clear",
+                    "turns the rig by {}°: the direction of the turn is ambiguous",
                     rounded(turn)
                 ),
                 "the attitude takes the shorter arc; put a waypoint between the two".to_owned(),
@@ -76,34 +79,36 @@ fn check_turns(flight: &Flight, path: &Path, found: &mut Findings) {
     }
 }
 
-fn check_scans(scene: &Scene, flight: &Flight, path: &Path, found: &mut Findings) {
-    let period = scene.scanner.limits().scan_period_s();
+fn check_scans(scan: &ScanGeometry, flight: &Flight, path: &Path, found: &mut Findings) {
+    let period = scan.scan_period_s();
     let whole = flight.whole_scans(period);
     let duration = rounded(flight.duration_s());
     if whole == 0 {
         let last = flight.waypoint.len().saturating_sub(1);
         found.add(
             &path.key("waypoint").index(last).key("time_s"),
-            format_args!("ends the flight after {duration} s, before one scan of {period} s is whole"),
+            format_args!("ends the flight after {duration} s, before one scan of {period} s is complete"),
             None,
         );
     } else if let Some(scans) = flight.scans.filter(|s| *s as usize > whole) {
         found.add(
             &path.key("scans"),
-            format_args!("is {scans}; the waypoints last {duration} s, which {whole} whole scans fit into"),
-            "put the last waypoint later, or leave `scans` out".to_owned(),
+            format_args!("is {scans}; the waypoints span {duration} s, enough for {whole} whole scans"),
+            "put the last waypoint later, or omit `scans`".to_owned(),
         );
     }
 }
 
-/// The rig, the sensor and the mirrors have to stay inside the walls all the way.
-fn check_way(scene: &Scene, flight: &Flight, path: &Path, found: &mut Findings) {
-    let Some(way) = Trajectory::of(flight) else { return };
+/// Checks that the rig, the sensor and the mirrors stay inside the walls during the whole flight.
+fn check_trajectory(scene: &Scene, scan: &ScanGeometry, flight: &Flight, path: &Path, found: &mut Findings) {
+    let Some(trajectory) = Trajectory::of(flight) else {
+        return;
+    };
     let rig_from_sensor = structure::nominal_mount(scene);
     let mut parts = vec![("rig".to_owned(), Point3::origin())];
     parts.push(("sensor".to_owned(), rig_from_sensor * Point3::origin()));
     for facet in &scene.superstructure.facet {
-        let corners = layout::corners(&facet.shape).unwrap_or_default();
+        let corners = layout::corners(&facet.shape, scan).unwrap_or_default();
         parts.extend(
             corners
                 .iter()
@@ -115,7 +120,7 @@ fn check_way(scene: &Scene, flight: &Flight, path: &Path, found: &mut Findings) 
         for step in 0..=STEPS {
             let share = f64::from(step) / f64::from(STEPS);
             let time = pair[0].time_s + share * (pair[1].time_s - pair[0].time_s);
-            let room_from_rig = way.room_from_rig(time - start);
+            let room_from_rig = trajectory.room_from_rig(time - start);
             let beyond = parts.iter().find_map(|(name, place)| {
                 let (wall, beyond) = outside(&(room_from_rig * place), &scene.room.size_m)?;
                 Some((name, wall, beyond))

@@ -1,8 +1,10 @@
-//! Mishaps: whether each is one thing that can happen. That its pose is recorded with a board shows when it is set up.
+//! Checks of mishaps: each is exactly one thing that can happen. Whether its pose is recorded with a board is checked
+//! by the setup.
 
-use super::{Findings, Path, suggestion};
-use crate::laboratory::board_markers;
+use super::findings::{Findings, suggestion};
+use crate::build::board::board_markers;
 use crate::scene::{Mishap, Scene};
+use catoptric_model::place::Path;
 
 pub(super) fn check(scene: &Scene, found: &mut Findings) {
     let mishaps = &scene.experiment.mishap;
@@ -18,8 +20,8 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
         if mishaps[..i].iter().any(|m| m.pose == mishap.pose) {
             found.add(
                 &path.key("pose"),
-                format_args!("is {} as in an earlier mishap", mishap.pose),
-                "a pose has one mishap at most".to_owned(),
+                format_args!("is {}, as in an earlier mishap", mishap.pose),
+                "a pose has at most one mishap".to_owned(),
             );
         }
         check_kind(mishap, &path, found);
@@ -43,7 +45,7 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
     }
 }
 
-/// Whether a mishap is an exchange, a stray label or a movement.
+/// Checks that a mishap is exactly one of an exchange, a wrong label or a movement.
 fn check_kind(mishap: &Mishap, path: &Path, found: &mut Findings) {
     let kinds = [
         mishap.swapped_markers.is_some(),
@@ -54,16 +56,12 @@ fn check_kind(mishap: &Mishap, path: &Path, found: &mut Findings) {
     if count != 1 {
         found.add(
             path,
-            format_args!("says {count} things that happen; a mishap is one"),
+            format_args!("describes {count} things that happen; a mishap is exactly one"),
             "set `swapped_markers`, or `mislabelled`, or `moved_mm` and `moved_deg`".to_owned(),
         );
     }
     let still = |by: Option<[f64; 3]>| by.is_none_or(|by| by == [0.0; 3]);
     if mishap.moves() && still(mishap.moved_mm) && still(mishap.moved_deg) {
-        found.add(
-            path,
-            "moves the board by nothing",
-            "set how far it moves".to_owned(),
-        );
+        found.add(path, "moves the board by zero", "set how far it moves".to_owned());
     }
 }

@@ -1,28 +1,28 @@
-//! What every beam meets in the drawing.
+//! What every beam hits in the drawing.
 
-use crate::cast::Shape;
-use crate::footprint::Ray;
-use crate::layout;
-use crate::placement;
+use crate::build::layout;
+use crate::build::room::room_from_rig;
+use crate::build::structure;
 use crate::scene::Scene;
-use crate::structure;
+use catoptric_cast::Ray;
+use catoptric_cast::Shape;
 use catoptric_model::beam;
 use catoptric_model::frame::yaw_pitch_roll;
-use catoptric_model::{Deflection, MirrorPlane, Pose};
+use catoptric_model::{Deflection, MirrorPlane, Pose, ScanGeometry};
 use nalgebra::{Point3, Translation3, Unit, Vector3};
 
-/// What the beams of a scan are for, from the drawing alone.
+/// How the beams of a scan are used, by the drawing alone.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outline {
-    /// The facets and the beams that the drawing sends to them.
+    /// The facets, with the beams that the drawing sends to them.
     pub facets: Vec<ServedFacet>,
-    /// Beams that meet neither facet nor post.
+    /// Beams that hit neither facet nor post.
     pub direct_beams: usize,
     /// Beams that end on a post or on the back of a facet.
     pub blocked_beams: usize,
 }
 
-/// What a facet is for.
+/// A facet and its beams.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ServedFacet {
     /// Name.
@@ -31,9 +31,11 @@ pub struct ServedFacet {
     pub beams: usize,
 }
 
-/// What the beams of a scan are for, from the drawing alone.
+/// Determines from the drawing alone how the beams of a scan are used.
 pub fn outline(scene: &Scene) -> Outline {
-    let met = Obstacles::of(scene).met_by_beams();
+    // Of a scanner that cannot be, the checks have said so.
+    let scan = scene.scanner.scan().unwrap_or_default();
+    let met = Obstacles::of(scene, &scan).met_by_beams();
     let facets: Vec<ServedFacet> = scene
         .superstructure
         .facet
@@ -49,16 +51,16 @@ pub fn outline(scene: &Scene) -> Outline {
     Outline {
         facets,
         direct_beams,
-        blocked_beams: beam::COUNT - direct_beams - served,
+        blocked_beams: scan.beams() - direct_beams - served,
     }
 }
 
-/// What a beam meets first.
+/// What a beam hits first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Meets {
     /// The reflecting side of a facet.
     Facet(usize),
-    /// The other side of a facet.
+    /// The back of a facet.
     Back(usize),
     /// A post.
     Post(usize),
@@ -70,7 +72,7 @@ pub(super) struct Face {
     pub(super) plane: MirrorPlane,
 }
 
-/// An opaque box: its frame, its half extents.
+/// An opaque box: its frame and half extents.
 struct Block {
     post_from_sensor: Pose,
     half: Vector3<f64>,
@@ -80,6 +82,7 @@ struct Block {
 pub(super) struct Obstacles {
     pub(super) facets: Vec<Option<Face>>,
     posts: Vec<Solid>,
+    scan: ScanGeometry,
 }
 
 /// An opaque body.
@@ -90,7 +93,7 @@ enum Solid {
 }
 
 impl Solid {
-    /// Distance at which a beam meets it from outside.
+    /// Distance at which a beam hits it from outside.
     fn distance(&self, u: &Unit<Vector3<f64>>) -> Option<f64> {
         let ray = Ray {
             origin: Point3::origin(),
@@ -106,12 +109,12 @@ impl Solid {
 impl Face {
     /// `None` if the corners span no plane.
     pub(super) fn new(corners: Vec<Point3<f64>>) -> Option<Self> {
-        let normal = Unit::try_new(layout::area_vector(&corners), f64::MIN_POSITIVE)?;
+        let normal = Unit::try_new(catoptric_cast::area_vector(&corners), f64::MIN_POSITIVE)?;
         let plane = MirrorPlane::through(*corners.first()?, normal);
         Some(Self { corners, plane })
     }
 
-    /// Whether a point of the plane lies inside the convex outline.
+    /// Whether a point of the plane is inside the convex outline.
     fn contains(&self, point: &Point3<f64>) -> bool {
         let edges = self.corners.iter().zip(self.corners.iter().cycle().skip(1));
         edges
@@ -119,13 +122,13 @@ impl Face {
             .all(|(a, b)| (b - a).cross(&(point - a)).dot(&self.plane.normal) >= 0.0)
     }
 
-    /// Distance at which a beam meets the outline, from either side.
+    /// Distance at which a beam hits the outline, from either side.
     pub(super) fn distance(&self, u: &Unit<Vector3<f64>>) -> Option<f64> {
         let d = self.plane.offset / self.plane.normal.dot(u);
         (d.is_finite() && d > 0.0 && self.contains(&Point3::from(u.into_inner() * d))).then_some(d)
     }
 
-    /// What the facet does to a beam that meets its reflecting side.
+    /// How the facet deflects a beam that hits its reflecting side.
     pub(super) fn deflect(&self, u: &Unit<Vector3<f64>>) -> Option<Deflection> {
         self.distance(u)?;
         self.plane.deflect(*u)
@@ -133,8 +136,8 @@ impl Face {
 }
 
 impl Block {
-    /// Distance at which a beam meets the box (slab method). From inside there is none: that post is reported by
-    /// itself, and what it would hide is not worth a word.
+    /// Distance at which a beam hits the box (slab method). `None` from inside: that post is reported separately, and
+    /// what it would hide does not matter.
     fn distance(&self, u: &Unit<Vector3<f64>>) -> Option<f64> {
         let origin = self.post_from_sensor * Point3::origin();
         let v = self.post_from_sensor * u.into_inner();
@@ -156,9 +159,9 @@ impl Block {
 }
 
 impl Obstacles {
-    pub(super) fn of(scene: &Scene) -> Self {
+    pub(super) fn of(scene: &Scene, scan: &ScanGeometry) -> Self {
         let drawn = &scene.superstructure;
-        let face = |shape| layout::corners(shape).and_then(Face::new);
+        let face = |shape| layout::corners(shape, scan).and_then(Face::new);
         let facets = drawn.facet.iter().map(|f| face(&f.shape)).collect();
         let posts = drawn.post.iter().map(|post| match (post.size_mm, &post.shape) {
             (Some(size), None) => {
@@ -179,10 +182,11 @@ impl Obstacles {
         Self {
             facets,
             posts: posts.collect(),
+            scan: *scan,
         }
     }
 
-    /// What one beam meets first.
+    /// What one beam hits first.
     pub(super) fn met_by(&self, u: &Unit<Vector3<f64>>) -> Option<Meets> {
         let facets = self.facets.iter().enumerate().filter_map(|(i, face)| {
             let face = face.as_ref()?;
@@ -201,10 +205,10 @@ impl Obstacles {
             .map(|(_, what)| what)
     }
 
-    /// What every beam of a scan meets first.
+    /// What every beam of a scan hits first.
     pub(super) fn met_by_beams(&self) -> Vec<Option<Meets>> {
-        (0..beam::COUNT)
-            .map(|i| self.met_by(&beam::direction(beam::azimuth(i))))
+        (0..self.scan.beams())
+            .map(|i| self.met_by(&beam::direction(self.scan.azimuth(i))))
             .collect()
     }
 
@@ -220,7 +224,7 @@ impl Obstacles {
     }
 }
 
-/// Where the drawing puts the sensor in the room.
+/// Pose of the sensor in the room, as drawn.
 pub(super) fn nominal_room_from_sensor(scene: &Scene) -> Pose {
-    placement::room_from_rig(&scene.room) * structure::nominal_mount(scene)
+    room_from_rig(&scene.room) * structure::nominal_mount(scene)
 }

@@ -1,10 +1,12 @@
-//! What stands in the room by itself, the material of mirrors, and whether there is enough of a scene at all.
+//! Checks of mirrors and surfaces fixed in the room, of the mirror material, and of whether the scene contains enough
+//! to simulate.
 
+use super::findings::Findings;
 use super::structure::check_outline;
 use super::values::distinct;
-use super::{Findings, Path};
+use crate::build::stage;
 use crate::scene::{PlaneRectangle, PlaneShape, Scene, SurfaceShape};
-use crate::stage;
+use catoptric_model::place::Path;
 use nalgebra::{Point3, Vector3};
 
 pub(super) fn check(scene: &Scene, found: &mut Findings) {
@@ -14,8 +16,8 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
         if mirrors.is_empty() && surfaces.is_empty() {
             found.add(
                 &room,
-                "holds nothing, and there is no laboratory either",
-                "add [[room.mirror]] and [[room.surface]] to trace rays; recording takes a \
+                "is empty, and there is no laboratory either",
+                "add [[room.mirror]] and [[room.surface]] to trace rays; recording needs a \
                  [superstructure] with markers, and either room.size_m and a board or a facet, or a [[flight]]"
                     .to_owned(),
             );
@@ -23,8 +25,8 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
     } else if !scene.room.has_walls() && !scene.only_flies() {
         found.add(
             &room.key("size_m"),
-            "is missing; boards stand in a room with walls",
-            "add size_m = [x, y, z], in metres".to_owned(),
+            "is missing; boards need a room with walls",
+            "add size_m = [x, y, z], in meters".to_owned(),
         );
     }
     distinct(
@@ -73,7 +75,7 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
         found.add(
             &path.key("diffuse_reflectivity"),
             format_args!(
-                "is {} and `{path}.reflectivity` is {}: a mirror returns no more light than it gets",
+                "is {} and `{path}.reflectivity` is {}: a mirror cannot return more light than it receives",
                 material.diffuse_reflectivity, material.reflectivity
             ),
             format!("their sum is {total}; 1 is allowed"),
@@ -81,13 +83,13 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
     }
 }
 
-/// Glass is part of the mirror's body.
+/// Checks that the glass is no thicker than the mirror, of which it is a part.
 fn check_glass(glass_mm: f64, body_mm: f64, path: &Path, found: &mut Findings) {
     if glass_mm > body_mm {
         found.add(
             &path.key("thickness_mm"),
             format_args!("is {glass_mm} mm, more than the {body_mm} mm of the whole mirror"),
-            "raise the mirror's own thickness_mm".to_owned(),
+            "increase the mirror's own thickness_mm".to_owned(),
         );
     }
 }
@@ -103,7 +105,7 @@ fn check_normal(rectangle: &PlaneRectangle, shape: &Path, found: &mut Findings) 
 }
 
 fn check_corners(corners_m: &[[f64; 3]], shape: &Path, found: &mut Findings) {
-    // The schema says that there are three at least.
+    // The schema requires at least three.
     if corners_m.len() >= 3 {
         let corners: Vec<Point3<f64>> = corners_m.iter().map(|c| Vector3::from(*c).into()).collect();
         check_outline(&corners, &shape.key("polygon").key("corners_m"), found);

@@ -1,54 +1,53 @@
-//! Mirrors, posts and markers: whether each is a body, and whether light can reach it.
+//! Checks of mirrors, posts and markers: whether each is a valid body, and whether light can reach it.
 
+use super::findings::Findings;
 use super::outline::{Face, Meets, Obstacles};
 use super::values::distinct;
-use super::{Findings, Path};
-use crate::layout;
+use crate::build::layout;
 use crate::scene::{Facet, FacetShape, Marker, Plate, RectangleShape, Scanner, Scene, Wedge};
-use catoptric_model::beam;
+use catoptric_model::place::Path;
+use catoptric_model::{ScanGeometry, beam};
 use nalgebra::{Point3, Unit, Vector3};
 
-/// Corners nearer than this are one corner, and a polygon narrower than this is a line: no cutter is better.
-/// Corners that are written to 0.01 mm lie in a plane to within this.
+/// Corners closer than this coincide, and a polygon narrower than this is a line: no cutter is more precise. Corners
+/// written to 0.01 mm lie in a plane to within this.
 const CUTTING_ERROR_M: f64 = 1e-5;
 
-/// Markers nearer than this to one line do not fix the turn about it: cameras see a marker to some tenths of it.
+/// Markers closer than this to one line do not determine the rotation about it: cameras locate a marker to a few tenths
+/// of it.
 const MARKER_SPREAD_M: f64 = 1e-3;
 
-/// Half the field of view of the scan, in degrees.
-pub(super) const SCAN_HALF_DEG: f64 = 135.0;
-
-pub(super) fn check(scene: &Scene, found: &mut Findings) {
+pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     let structure = Path::of("superstructure");
     if !scene.superstructure.pattern.is_empty() {
         found.add(
             &structure.key("pattern"),
-            "is not worked out into facets yet",
-            "io::scene does so as it reads a file, sim::pattern::expand by itself".to_owned(),
+            "has not been expanded into facets",
+            "a scene read from a file is expanded; otherwise call `build::pattern::expand`".to_owned(),
         );
     }
-    let obstacles = Obstacles::of(scene);
+    let obstacles = Obstacles::of(scene, scan);
     let met = obstacles.met_by_beams();
     for (i, facet) in scene.superstructure.facet.iter().enumerate() {
         let path = structure.key("facet").index(i).key("shape");
         let before = found.0.len();
         match &facet.shape {
-            FacetShape::Wedge(wedge) => check_wedge(wedge, &path.key("wedge"), found),
-            FacetShape::Plate(plate) => check_plate(plate, &path.key("plate"), found),
-            FacetShape::Rectangle(shape) => check_rectangle(shape, &path.key("rectangle"), found),
+            FacetShape::Wedge(wedge) => check_wedge(wedge, scan, &path.key("wedge"), found),
+            FacetShape::Plate(plate) => check_plate(plate, scan, &path.key("plate"), found),
+            FacetShape::Rectangle(shape) => check_rectangle(shape, scan, &path.key("rectangle"), found),
             FacetShape::Polygon(shape) => {
-                let corners = layout::corners(&facet.shape).unwrap_or_default();
+                let corners = layout::corners(&facet.shape, scan).unwrap_or_default();
                 let path = path.key("polygon").key("corners_mm");
                 if shape.corners_mm.len() >= 3 {
                     check_polygon(&corners, &path, found);
                 }
             }
         }
-        // What light does at a facet that is none would only repeat what was said.
+        // For an invalid facet this would only repeat what has been reported.
         if found.0.len() == before
             && let Some(face) = &obstacles.facets[i]
         {
-            check_reach(scene, i, face, &met, found);
+            check_reach(scene, scan, i, face, &met, found);
         }
     }
     for (i, post) in scene.superstructure.post.iter().enumerate() {
@@ -61,7 +60,7 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
             ),
             (Some(_), Some(_)) => found.add(
                 &path.key("size_mm"),
-                "is the size of a box, and `shape` makes the post something else",
+                "is the size of a box, but `shape` makes the post something else",
                 "delete one of the two".to_owned(),
             ),
             _ => {}
@@ -81,7 +80,7 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
     let path = structure.key("marker");
     check_markers(&scene.superstructure.marker, &path, "the rig", found);
     for (i, board) in scene.board.iter().enumerate() {
-        // Without any, the laboratory puts five markers itself.
+        // Without any, the laboratory places five markers itself.
         if !board.marker.is_empty() {
             let path = Path::of("board").index(i).key("marker");
             check_markers(&board.marker, &path, &format!("board {:?}", board.name), found);
@@ -95,8 +94,8 @@ fn check_housing(scanner: &Scanner, found: &mut Findings) {
     if !scanner.housing && !boxes.is_empty() {
         found.add(
             &path,
-            "describes a housing, and `scanner.housing` is false",
-            "leave out one of the two".to_owned(),
+            "describes a housing, but `scanner.housing` is false",
+            "delete one of the two".to_owned(),
         );
     }
     for (i, part) in boxes.iter().enumerate() {
@@ -111,7 +110,7 @@ fn check_housing(scanner: &Scanner, found: &mut Findings) {
     }
 }
 
-fn check_wedge(wedge: &Wedge, path: &Path, found: &mut Findings) {
+fn check_wedge(wedge: &Wedge, scan: &ScanGeometry, path: &Path, found: &mut Findings) {
     let [first, last] = wedge.azimuth_deg;
     let azimuths = path.key("azimuth_deg");
     if first >= last {
@@ -122,17 +121,16 @@ fn check_wedge(wedge: &Wedge, path: &Path, found: &mut Findings) {
         );
         return;
     }
-    if first.abs().max(last.abs()) > SCAN_HALF_DEG {
+    if !covers(scan, first, last) {
         found.add(
             &azimuths,
-            format_args!(
-                "is [{first}, {last}]°; the scan reaches from -{SCAN_HALF_DEG}° to {SCAN_HALF_DEG}°"
-            ),
+            format_args!("is [{first}, {last}]°; {}", reach(scan)),
             "a mirror behind the scanner would get no light".to_owned(),
         );
         return;
     }
-    if last - first < beam::STEP.to_degrees() {
+    let step_deg = scan.angles().step_deg;
+    if last - first < step_deg {
         let radians = last.abs().max(first.abs()) <= std::f64::consts::PI;
         let in_degrees = || {
             let [a, b] = [first, last].map(|v| rounded(v.to_degrees()));
@@ -143,13 +141,13 @@ fn check_wedge(wedge: &Wedge, path: &Path, found: &mut Findings) {
             format_args!(
                 "spans {}°; a mirror needs at least the {}° between two beams",
                 rounded(last - first),
-                beam::STEP.to_degrees()
+                rounded(step_deg)
             ),
             radians.then(in_degrees),
         );
         return;
     }
-    if layout::corners(&FacetShape::Wedge(wedge.clone())).is_none() {
+    if layout::corners(&FacetShape::Wedge(wedge.clone()), scan).is_none() {
         let middle = 0.5 * (first + last);
         let u = beam::direction(middle.to_radians());
         let v = beam::spherical(
@@ -160,8 +158,8 @@ fn check_wedge(wedge: &Wedge, path: &Path, found: &mut Findings) {
         found.add(
             path,
             format_args!(
-                "describes no mirror: turning the beam at {middle}° by {}° takes a plane that not all beams \
-                 from {first}° to {last}° meet",
+                "describes no mirror: turning the beam at {middle}° by {}° needs a plane that not all beams \
+                 from {first}° to {last}° hit",
                 rounded(turn)
             ),
             "turn the beam farther, narrow azimuth_deg or lower height_mm".to_owned(),
@@ -169,17 +167,25 @@ fn check_wedge(wedge: &Wedge, path: &Path, found: &mut Findings) {
     }
 }
 
-fn check_plate(plate: &Plate, path: &Path, found: &mut Findings) {
+fn check_plate(plate: &Plate, scan: &ScanGeometry, path: &Path, found: &mut Findings) {
     match (plate.azimuth_deg, plate.beam) {
         (Some(_), Some(_)) => found.add(
             &path.key("beam"),
-            "names a beam, and `azimuth_deg` another",
+            "names a beam, and `azimuth_deg` names another",
             "delete one of the two".to_owned(),
         ),
+        (None, Some(beam)) if beam as usize >= scan.beams() => {
+            found.add(
+                &path.key("beam"),
+                format_args!("is {beam}; 0 to {} is allowed", scan.beams() - 1),
+                None,
+            );
+            return;
+        }
         (None, None) => found.add(
             path,
-            "says of no beam that it meets its center",
-            "give it azimuth_deg, or beam".to_owned(),
+            "does not name the beam that hits its center",
+            "set azimuth_deg or beam".to_owned(),
         ),
         _ => {}
     }
@@ -189,29 +195,29 @@ fn check_plate(plate: &Plate, path: &Path, found: &mut Findings) {
     if !matches!((given(&exit), given(&normal)), (2, 0) | (0, 2)) {
         found.add(
             path,
-            "needs one direction, and has none, half of one, or two",
-            "give it exit_azimuth_deg and exit_elevation_deg, or normal_azimuth_deg and normal_elevation_deg"
+            "needs exactly one direction, but has none, half of one, or two",
+            "set exit_azimuth_deg and exit_elevation_deg, or normal_azimuth_deg and normal_elevation_deg"
                 .to_owned(),
         );
         return;
     }
     let one_beam = plate.azimuth_deg.is_some() != plate.beam.is_some();
-    match layout::corners(&FacetShape::Plate(plate.clone())) {
+    match layout::corners(&FacetShape::Plate(plate.clone()), scan) {
         Some(corners) => {
-            let help = "turn the normal round: it points from the mirror towards the scanner's side";
+            let help = "reverse the normal: it points from the mirror toward the scanner's side";
             check_side(&corners, path, help, found);
         }
         None if one_beam => found.add(
             path,
-            "describes no mirror: its beam leaves as it comes",
+            "describes no mirror: its beam leaves undeflected",
             "turn exit_azimuth_deg or exit_elevation_deg away from the beam".to_owned(),
         ),
         None => {}
     }
 }
 
-fn check_rectangle(shape: &RectangleShape, path: &Path, found: &mut Findings) {
-    let Some(corners) = layout::corners(&FacetShape::Rectangle(shape.clone())) else {
+fn check_rectangle(shape: &RectangleShape, scan: &ScanGeometry, path: &Path, found: &mut Findings) {
+    let Some(corners) = layout::corners(&FacetShape::Rectangle(shape.clone()), scan) else {
         let path = path.key("normal");
         found.add(
             &path,
@@ -220,7 +226,7 @@ fn check_rectangle(shape: &RectangleShape, path: &Path, found: &mut Findings) {
         );
         return;
     };
-    let help = "turn the normal round: it points from the mirror towards the scanner's side";
+    let help = "reverse the normal: it points from the mirror toward the scanner's side";
     check_side(&corners, &path.key("normal"), help, found);
 }
 
@@ -232,7 +238,7 @@ fn check_polygon(corners: &[Point3<f64>], path: &Path, found: &mut Findings) {
     check_side(corners, path, help, found);
 }
 
-/// Whether corners go round a convex plane polygon.
+/// Checks that corners outline a convex plane polygon, and returns whether they do.
 pub(super) fn check_outline(corners: &[Point3<f64>], path: &Path, found: &mut Findings) -> bool {
     let count = distinct_points(corners);
     if count < 3 {
@@ -254,8 +260,8 @@ pub(super) fn check_outline(corners: &[Point3<f64>], path: &Path, found: &mut Fi
         );
         return false;
     }
-    let area = layout::area_vector(corners);
-    // The two lobes of a bow tie cancel; what rounding leaves of them has no direction.
+    let area = catoptric_cast::area_vector(corners);
+    // The two lobes of a bow tie cancel; the rounding error that remains has no direction.
     let Some(normal) = Unit::try_new(area, CUTTING_ERROR_M * spread(corners)) else {
         found.add(
             path,
@@ -275,23 +281,23 @@ pub(super) fn check_outline(corners: &[Point3<f64>], path: &Path, found: &mut Fi
                 rounded(worst * 1e3),
                 CUTTING_ERROR_M * 1e3
             ),
-            "mirrors are plane; three corners always are".to_owned(),
+            "mirrors are flat; three corners always lie in a plane".to_owned(),
         );
         return false;
     }
     if let Some(corner) = outside_corner(corners, &normal) {
         found.add(
             &path.index(corner),
-            "makes the outline concave, or it is out of order; corners go round a convex polygon",
-            "a concave mirror is two convex facets".to_owned(),
+            "makes the outline concave, or is out of order; the corners must form a convex polygon",
+            "describe a concave mirror as two convex facets".to_owned(),
         );
         return false;
     }
     true
 }
 
-/// A corner that makes the outline other than convex: one at which it turns the wrong way, or else one that is on the
-/// wrong side of some edge. There is neither in a convex polygon that goes round once.
+/// A corner at which the outline is not convex: one where it turns in the wrong direction, or else one on the wrong
+/// side of some edge. A convex polygon that winds around once has neither.
 fn outside_corner(corners: &[Point3<f64>], normal: &Unit<Vector3<f64>>) -> Option<usize> {
     let n = corners.len();
     let outside = |corner: usize, edge: usize| {
@@ -305,7 +311,7 @@ fn outside_corner(corners: &[Point3<f64>], normal: &Unit<Vector3<f64>>) -> Optio
         .or_else(|| (0..n).find(|c| (0..n).any(|edge| outside(*c, edge))))
 }
 
-/// The scanner must be on the reflecting side.
+/// Checks that the scanner is on the reflecting side.
 fn check_side(corners: &[Point3<f64>], path: &Path, help: &str, found: &mut Findings) {
     let Some(face) = Face::new(corners.to_vec()) else {
         return;
@@ -325,14 +331,21 @@ fn check_side(corners: &[Point3<f64>], path: &Path, help: &str, found: &mut Find
     }
 }
 
-fn check_reach(scene: &Scene, index: usize, face: &Face, met: &[Option<Meets>], found: &mut Findings) {
+fn check_reach(
+    scene: &Scene,
+    scan: &ScanGeometry,
+    index: usize,
+    face: &Face,
+    met: &[Option<Meets>],
+    found: &mut Findings,
+) {
     if met.contains(&Some(Meets::Facet(index))) {
         return;
     }
     let path = Path::of("superstructure").key("facet").index(index);
     let name = |facet: &Facet| format!("{:?}", facet.name);
-    let reached: Vec<usize> = (0..beam::COUNT)
-        .filter(|i| face.distance(&beam::direction(beam::azimuth(*i))).is_some())
+    let reached: Vec<usize> = (0..scan.beams())
+        .filter(|i| face.distance(&beam::direction(scan.azimuth(*i))).is_some())
         .collect();
     if let Some(hider) = reached.iter().find_map(|i| met[*i]) {
         let hider = match hider {
@@ -362,11 +375,11 @@ fn check_reach(scene: &Scene, index: usize, face: &Face, met: &[Option<Meets>], 
     found.add(
         &path,
         format_args!(
-            "is not reached by any beam: its corners are at azimuths {}° to {}°, the scan reaches from \
-             -{SCAN_HALF_DEG}° to {SCAN_HALF_DEG}° in steps of {}°",
+            "is not reached by any beam: its corners are at azimuths {}° to {}°, {} in steps of {}°",
             rounded(low),
             rounded(high),
-            beam::STEP.to_degrees()
+            reach(scan),
+            rounded(scan.angles().step_deg)
         ),
         None,
     );
@@ -388,7 +401,7 @@ fn check_markers(markers: &[Marker], path: &Path, body: &str, found: &mut Findin
         found.add(
             path,
             format_args!(
-                "puts all markers of {body} within {} mm of one line; its turn about that line would not show",
+                "puts all markers of {body} within {} mm of one line; its rotation about that line cannot be determined",
                 MARKER_SPREAD_M * 1e3
             ),
             "move at least one marker off the line".to_owned(),
@@ -406,7 +419,7 @@ fn distinct_points(points: &[Point3<f64>]) -> usize {
     seen.len()
 }
 
-/// Greatest distance of a point from the line through the two that are farthest apart, in metres.
+/// Largest distance of a point from the line through the two that are farthest apart, in meters.
 fn spread(points: &[Point3<f64>]) -> f64 {
     let pairs = points
         .iter()
@@ -427,6 +440,19 @@ fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
         (low.min(v), high.max(v))
     })
+}
+
+/// Whether a scan sees everything from one azimuth to another, in degrees, the smaller first.
+fn covers(scan: &ScanGeometry, first: f64, last: f64) -> bool {
+    let [low, high] = scan.range_deg();
+    let around = |turn: f64| low <= first + turn && last + turn <= high;
+    scan.closes() || [-360.0, 0.0, 360.0].into_iter().any(around)
+}
+
+/// The extent of a scan as text.
+pub(super) fn reach(scan: &ScanGeometry) -> String {
+    let [low, high] = scan.range_deg().map(rounded);
+    format!("the scan reaches from {low}° to {high}°")
 }
 
 /// Three decimals: as much as a message needs.

@@ -1,9 +1,10 @@
-//! Names, colors, tables and pairs of limits.
+//! Checks of names, colors, tables and pairs of limits.
 
-use super::{Findings, Path, suggestion};
-use crate::color;
+use super::findings::{Findings, suggestion};
+use crate::build::color;
 use crate::scene::{Detector, EchoChoice, MocapProfile, NoiseTable, Preset, Principle, Scene};
 use catoptric_model::dataset::RIG_SUBJECT;
+use catoptric_model::place::Path;
 
 pub(super) fn check(scene: &Scene, found: &mut Findings) {
     names(scene, found);
@@ -22,7 +23,7 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
     order(&scene.experiment.range_m, &experiment.key("range_m"), " m", found);
 }
 
-/// A name that is used twice says nothing about which one is meant.
+/// Checks that names are not empty and not used twice, which would be ambiguous.
 pub(super) fn distinct<'a>(list: &Path, names: impl Iterator<Item = &'a str>, found: &mut Findings) {
     let mut seen: Vec<&str> = Vec::new();
     for (i, name) in names.enumerate() {
@@ -32,22 +33,22 @@ pub(super) fn distinct<'a>(list: &Path, names: impl Iterator<Item = &'a str>, fo
         } else if let Some(first) = seen.iter().position(|s| *s == name) {
             found.add(
                 &path,
-                format_args!("is {name:?}, the name that `{list}[{first}]` has already"),
-                "every name may be used once".to_owned(),
+                format_args!("is {name:?}, already the name of `{list}[{first}]`"),
+                "names must be unique".to_owned(),
             );
         }
         seen.push(name);
     }
 }
 
-/// A search goes from one limit to the other.
+/// Checks the limits between which a parameter is searched.
 fn parameters(scene: &Scene, found: &mut Findings) {
     for (name, parameter) in &scene.parameters {
         let path = Path::of("parameters").key(name);
         match (parameter.low, parameter.high) {
             (Some(low), Some(high)) if low >= high => found.add(
                 &path,
-                format_args!("reaches from {low} to {high}; the smaller limit is `low`"),
+                format_args!("ranges from {low} to {high}; the smaller limit is `low`"),
                 (low > high).then(|| format!("write low = {high}, high = {low}")),
             ),
             (Some(low), Some(high)) if !(low..=high).contains(&parameter.value) => found.add(
@@ -58,7 +59,7 @@ fn parameters(scene: &Scene, found: &mut Findings) {
             (Some(_), None) | (None, Some(_)) => found.add(
                 &path,
                 "has one limit; a search needs both `low` and `high`",
-                "give it the other, or none".to_owned(),
+                "add the other, or delete this one".to_owned(),
             ),
             _ => {}
         }
@@ -98,11 +99,11 @@ fn names(scene: &Scene, found: &mut Findings) {
                 "the name becomes a topic of the recording, /mocap/NAME".to_owned(),
             );
         }
-        // "markers" is the topic of the labelled markers of all bodies.
+        // "markers" is the topic of the labeled markers of all bodies.
         if board.name == RIG_SUBJECT || board.name == "markers" {
             found.add(
                 &path,
-                format_args!("is {:?}, which the recording needs for itself", board.name),
+                format_args!("is {:?}, which the recording reserves", board.name),
                 "choose another name".to_owned(),
             );
         }
@@ -134,8 +135,8 @@ fn colors(scene: &Scene, found: &mut Findings) {
             let help = suggestion(name, "colors", known.iter().copied());
             found.add(
                 &path,
-                format_args!("names the color {name:?}, which is neither built in nor under `color`"),
-                format!("{help}; a new one is a table [color.{name}] with its reflectivity"),
+                format_args!("names the color {name:?}, which is neither built in nor defined under `color`"),
+                format!("{help}; define a new one as a table [color.{name}] with its reflectivity"),
             );
         }
     }
@@ -167,7 +168,7 @@ fn tables(scene: &Scene, found: &mut Findings) {
     }
 }
 
-/// What only pulsed light has, what only a scanner of one's own has, and limits in their order.
+/// Checks settings that only pulsed light or only a custom scanner has, and the order of limits.
 fn detection(scene: &Scene, found: &mut Findings) {
     let detection = &scene.detection;
     let path = Path::of("detection");
@@ -183,8 +184,8 @@ fn detection(scene: &Scene, found: &mut Findings) {
         for (key, _) in pulsed.iter().filter(|(_, set)| *set) {
             found.add(
                 &path.key(key),
-                "is set, and a phase has neither pulses nor echoes",
-                "leave it out, or set `detection.principle` to \"pulsed\"".to_owned(),
+                "is set, but a phase has neither pulses nor echoes",
+                "omit it, or set `detection.principle` to \"pulsed\"".to_owned(),
             );
         }
     }
@@ -201,7 +202,7 @@ fn detection(scene: &Scene, found: &mut Findings) {
         found.add(
             &path.key("echo"),
             format_args!(
-                "is \"all\", and the scanner {:?} reports one echo",
+                "is \"all\", but the scanner {:?} reports only one echo",
                 scene.scanner.preset.name()
             ),
             "use the preset \"utm-30lx-ew\", or \"custom\" with `scanner.custom.echoes`".to_owned(),
@@ -211,13 +212,13 @@ fn detection(scene: &Scene, found: &mut Findings) {
     if own_markers != scene.mocap.marker.is_some() {
         let (what, remedy) = if own_markers {
             (
-                "is \"custom\", whose errors only the scene can tell",
+                "is \"custom\", whose errors must be given in the scene",
                 "add marker = { constant_sd_mm = …, jitter_sd_mm = … } to [mocap]",
             )
         } else {
             (
-                "has errors of its own, and `mocap.marker` is given",
-                "leave `mocap.marker` out, or set the profile to \"custom\"",
+                "has its own errors, but `mocap.marker` is given",
+                "omit `mocap.marker`, or set the profile to \"custom\"",
             )
         };
         found.add(&Path::of("mocap").key("profile"), what, remedy.to_owned());
@@ -227,7 +228,7 @@ fn detection(scene: &Scene, found: &mut Findings) {
     if custom && scene.scanner.beam.is_none() {
         found.add(
             &path.key("preset"),
-            "is \"custom\", whose beam only the scene can describe",
+            "is \"custom\", whose beam must be given in the scene",
             "add a table [scanner.beam] with wide_full_mrad and narrow_full_mrad".to_owned(),
         );
     }
@@ -235,10 +236,10 @@ fn detection(scene: &Scene, found: &mut Findings) {
         found.add(
             &path.key("custom"),
             format_args!(
-                "is given, and the preset {:?} has limits of its own",
+                "is given, but the preset {:?} has its own limits",
                 scene.scanner.preset.name()
             ),
-            "leave it out, or set `scanner.preset` to \"custom\"".to_owned(),
+            "omit it, or set `scanner.preset` to \"custom\"".to_owned(),
         );
     }
     if limits.range_min_m >= limits.range_max_m {
@@ -259,13 +260,14 @@ fn columns(range_m: &[f64], values: &[f64], path: &Path, column: &str, found: &m
     if let Some(first) = range_m.first().filter(|r| **r < 0.0) {
         found.add(
             &path.index(0),
-            format_args!("is {first} m; a distance is 0 or more"),
+            format_args!("is {first} m; a distance must be 0 or more"),
             None,
         );
     }
 }
 
-/// A column of nodes (its name, its unit, its values) and one of values: as many, and strictly increasing.
+/// Checks a column of nodes (its name, unit and values) and a column of values: equally long, the nodes strictly
+/// increasing.
 fn increasing(
     (name, unit, nodes): (&str, &str, &[f64]),
     values: &[f64],
@@ -300,7 +302,7 @@ fn increasing(
     }
 }
 
-/// Shares of which none at all would leave nothing to detect.
+/// Checks shares that must not be zero, which would leave nothing to detect.
 fn shares(scene: &Scene, found: &mut Findings) {
     let light = Path::of("light");
     for (path, value) in [
@@ -322,12 +324,12 @@ fn shares(scene: &Scene, found: &mut Findings) {
 }
 
 fn order(limits: &[f64; 2], path: &Path, unit: &str, found: &mut Findings) {
-    let [least, greatest] = limits;
-    if least > greatest {
+    let [low, high] = limits;
+    if low > high {
         found.add(
             path,
-            format_args!("runs from {least}{unit} down to {greatest}{unit}"),
-            format!("write the smaller one first: [{greatest}, {least}]"),
+            format_args!("runs from {low}{unit} down to {high}{unit}"),
+            format!("write the smaller one first: [{high}, {low}]"),
         );
     }
 }

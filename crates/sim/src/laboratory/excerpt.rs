@@ -1,36 +1,37 @@
-//! A stretch recorded excerpt by excerpt, so that it never is in memory as a whole.
+//! Records a stretch excerpt by excerpt, so that it is never in memory as a whole.
 //!
-//! Excerpts are drawn and recorded on any thread and in any order. Correlated noise alone runs through a stretch; its
-//! innovations are drawn with the excerpt, and between drawing and recording the excerpts of a stretch are linked in
-//! order, which is one multiplication and one addition for a reading.
+//! Excerpts are drawn and recorded on any thread and in any order. Only correlated noise extends over a whole stretch:
+//! its innovations are drawn with each excerpt, and the excerpts of a stretch are linked in order between drawing and
+//! recording, which costs one multiplication and one addition per reading.
 
-use super::chance::{Luck, Memory, ScanLuck};
+use super::effects::{EffectSource, Memory, ScanEffects};
 use super::recorder::{Digest, Readings};
-use super::{Laboratory, Returns};
+use super::setup::Laboratory;
+use super::sight::Returns;
 use crate::noise::Columns;
-use crate::reading::Chance;
+use crate::receive::reading::RandomEffects;
 use catoptric_model::dataset::nanoseconds;
-use catoptric_model::{Excerpt, Pose, beam};
+use catoptric_model::{Excerpt, Pose};
 use std::ops::Range;
 
-/// Some scans of a stretch with their correlated noise.
+/// Some scans of a stretch, with their correlated noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drawn {
     number: usize,
     scans: Range<usize>,
-    /// Innovations, once linked states, scan after scan; none without correlated noise.
+    /// Innovations, or states once they are linked, scan by scan; empty without correlated noise.
     states: Vec<Vec<f64>>,
 }
 
-/// Some scans of a stretch being recorded.
+/// Some scans of a stretch while they are being recorded.
 pub struct ExcerptRecorder<'a> {
     laboratory: &'a Laboratory,
     drawn: &'a Drawn,
-    luck: Luck<'a>,
+    source: EffectSource<'a>,
     readings: Readings,
     digest: Digest,
-    scan_luck: ScanLuck,
-    /// The scan that is added next.
+    scan_effects: ScanEffects,
+    /// The next scan to add.
     next: usize,
 }
 
@@ -40,7 +41,7 @@ impl Drawn {
         self.number
     }
 
-    /// Which of its scans these are.
+    /// The range of its scans within the stretch.
     pub fn scans(&self) -> Range<usize> {
         self.scans.clone()
     }
@@ -51,23 +52,23 @@ impl Drawn {
 }
 
 impl ExcerptRecorder<'_> {
-    /// Adds the next scan from what every beam met; `changed` if that may be something else than for the scan before. Its
-    /// readings, in metres.
+    /// Adds the next scan, given the returns of every beam, and returns its readings, in meters. `changed` says that
+    /// the returns may differ from those of the previous scan.
     pub fn add(&mut self, returns: &Returns, changed: bool) -> &[f64] {
         if changed || self.next == self.drawn.scans.start {
             self.digest.take(returns, self.readings.echoes.is_some());
         }
         let states = self.drawn.states(self.next);
-        let asked = Some(self.digest.by_chance());
-        self.luck.draw(self.next, states, asked, &mut self.scan_luck);
+        let asked = Some(self.digest.at_random());
+        self.source.draw(self.next, states, asked, &mut self.scan_effects);
         let known = self.readings.ranges.len();
         self.readings
-            .add(self.laboratory, returns, &self.digest, &self.scan_luck);
+            .add(self.laboratory, returns, &self.digest, &self.scan_effects);
         self.next += 1;
         &self.readings.ranges[known..]
     }
 
-    /// The excerpt; `first_seen` is the stretch's.
+    /// The excerpt; `first_seen` is that of the stretch.
     pub fn finish(self, first_seen: &[Option<(f64, Pose)>]) -> Excerpt {
         let (laboratory, number, scans) = (self.laboratory, self.drawn.number, self.drawn.scans());
         let before = |scan| laboratory.frames_before(number, scan);
@@ -83,13 +84,13 @@ impl ExcerptRecorder<'_> {
 impl Laboratory {
     /// Draws the innovations of some scans of a stretch.
     pub fn draw(&self, number: usize, scans: Range<usize>) -> Drawn {
-        let luck = self.luck(number);
+        let source = self.effect_source(number);
         let mut columns = Columns::default();
         let states = scans
             .clone()
             .map(|scan| {
                 let mut innovations = Vec::new();
-                luck.innovations(scan, &mut columns, &mut innovations);
+                source.innovations(scan, &mut columns, &mut innovations);
                 innovations
             })
             .collect();
@@ -100,41 +101,43 @@ impl Laboratory {
         }
     }
 
-    /// Carries the memory of correlated noise through scans; those before have been linked with the same memory, which
-    /// before the first scan of a stretch may be any.
+    /// Carries the state of correlated noise through scans. Earlier scans must have been linked with the same memory;
+    /// before the first scan of a stretch its content is ignored.
     pub fn link(&self, drawn: &mut Drawn, memory: &mut Memory) {
-        let luck = self.luck(drawn.number);
+        let source = self.effect_source(drawn.number);
         for (scan, states) in drawn.scans.clone().zip(&mut drawn.states) {
-            luck.remember(scan, memory, states);
+            source.remember(scan, memory, states);
         }
     }
 
-    /// Begins to record scans that were linked: all of them are to be added, one after the other.
+    /// Starts recording linked scans, all of which are to be added in order.
     pub fn excerpt_recorder<'a>(&'a self, drawn: &'a Drawn) -> ExcerptRecorder<'a> {
         ExcerptRecorder {
             laboratory: self,
             drawn,
-            luck: self.luck(drawn.number),
+            source: self.effect_source(drawn.number),
             readings: self.readings(drawn.scans.len()),
             digest: Digest::default(),
-            scan_luck: ScanLuck::default(),
+            scan_effects: ScanEffects::default(),
             next: drawn.scans.start,
         }
     }
 
-    /// What is by chance in a scan of those that were linked: one for every beam.
-    pub fn scan_chances(&self, drawn: &Drawn, scan: usize) -> Vec<Chance> {
-        let mut scan_luck = ScanLuck::default();
-        self.luck(drawn.number)
-            .draw(scan, drawn.states(scan), None, &mut scan_luck);
-        (0..beam::COUNT).map(|beam| scan_luck.of(beam)).collect()
+    /// Random effects of one of the linked scans, one per beam.
+    pub fn scan_effects(&self, drawn: &Drawn, scan: usize) -> Vec<RandomEffects> {
+        let mut scan_effects = ScanEffects::default();
+        self.effect_source(drawn.number)
+            .draw(scan, drawn.states(scan), None, &mut scan_effects);
+        (0..self.sensor.scan().beams())
+            .map(|beam| scan_effects.of(beam))
+            .collect()
     }
 
-    /// When and where each body of a stretch is solved for the first time.
+    /// Time and pose at which each body of a stretch is solved for the first time.
     pub fn first_seen(&self, number: usize) -> Vec<Option<(f64, Pose)>> {
         let all = self.frames_of(number);
         let mut seen: Vec<Option<(f64, Pose)>> = Vec::new();
-        // The first frame nearly always tells.
+        // The first frame nearly always suffices.
         for frame in 0..all {
             let tracks = self.tracks(number, frame..frame + 1);
             seen.resize(tracks.len(), None);
@@ -149,7 +152,8 @@ impl Laboratory {
         seen
     }
 
-    /// Frames of a stretch before one of its scans begins; of the scan after the last, all there are.
+    /// Number of motion-capture frames of a stretch before one of its scans begins; for the scan after the last, all of
+    /// them.
     fn frames_before(&self, number: usize, scan: usize) -> u64 {
         let all = self.frames_of(number);
         if scan == 0 {
@@ -160,9 +164,9 @@ impl Laboratory {
         }
         let start_s = self.start_s(number);
         let rate = self.scene.mocap.frame_rate_hz;
-        let elapsed_s = scan as f64 * self.scene.scanner.limits().scan_period_s();
+        let elapsed_s = scan as f64 * self.sensor.scan().scan_period_s();
         let begins = nanoseconds(start_s) + nanoseconds(elapsed_s);
-        // One less than the quotient, which rounding may have moved.
+        // One less than the quotient, which rounding may have changed.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let mut frames = ((elapsed_s * rate).floor() as u64).saturating_sub(1);
         while frames < all && nanoseconds(start_s + frames as f64 / rate) < begins {

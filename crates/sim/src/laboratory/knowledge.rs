@@ -1,27 +1,28 @@
-//! What the experimenter knows: the drawing, the surveys, and what steps 1 and 3 found out.
+//! What the experimenter knows: the drawing, the surveys, and the results of steps 1 and 3.
 
-use super::{Laboratory, room};
+use super::setup::Laboratory;
+use crate::build::board::board_markers;
+use crate::build::structure::{self, Structure};
 use crate::error::SimError;
+use crate::laboratory::placement;
+use crate::light::optics::{Mirrors, Setting};
 use crate::noise::{Draws, Purpose};
-use crate::optics::{Mirrors, Setting};
-use crate::placement;
-use crate::scene::{ErrorModel, Marker, Scene};
-use crate::structure::{self, Structure};
+use crate::scene::{ErrorModel, Marker};
 use catoptric_model::session::{self, Session};
-use catoptric_model::{PoseData, PoseKind, PoseRecord, RangeBias, Summary, beam};
+use catoptric_model::{PoseData, PoseKind, PoseRecord, Summary, beam};
 use nalgebra::{Unit, Vector3};
 
-/// Bare readings beyond this are not of the structure, in metres.
+/// Bare readings beyond this do not come from the structure, in meters.
 const FARTHEST_STRUCTURE: f64 = 0.3;
 
-/// How many beams beyond the drawn ones a bare distance is still noted for: as built, the edges move.
+/// Number of beams beyond the drawn ones for which a bare distance is still recorded: as built, the edges move.
 const NEAR_FACET: usize = 12;
 
 impl Laboratory {
-    /// What the experimenter knows.
+    /// The session: everything the experimenter knows.
     ///
     /// # Errors
-    /// As [`Laboratory::returns`]: the bare structure is measured here.
+    /// As for [`Laboratory::returns`]: the bare structure is measured here.
     pub fn session(&self) -> Result<Session, SimError> {
         let scene = &self.scene;
         let mount = &scene.scanner.mount;
@@ -35,9 +36,7 @@ impl Laboratory {
             name: scene.name.clone(),
             scanner: session::ScannerSheet {
                 preset: scene.scanner.preset.name().to_owned(),
-                beams: beam::COUNT,
-                step_deg: 0.25,
-                scan_rate_hz: limits.scan_rate_hz,
+                scan: *self.sensor.scan(),
                 range_min_m: limits.range_min_m,
                 range_max_m: limits.range_max_m,
                 divergence_full_mrad: scene.scanner.beam_shape().wide_full_mrad,
@@ -64,7 +63,7 @@ impl Laboratory {
                     width_mm: b.width_mm,
                     height_mm: b.height_mm,
                     color: b.color.clone(),
-                    markers: known_markers(&room::board_markers(b)),
+                    markers: known_markers(&board_markers(b)),
                 })
                 .collect(),
         })
@@ -93,10 +92,10 @@ impl Laboratory {
     fn nominal_facets(&self) -> Result<Vec<session::NominalFacet>, SimError> {
         let nominal = Structure::nominal(&self.scene)?;
         let setting = Setting::new(&self.scene, &nominal, Mirrors::Attached, Vec::new())?;
-        let paths: Vec<_> = (0..beam::COUNT)
+        let paths: Vec<_> = (0..self.sensor.scan().beams())
             .map(|b| self.sensor.chief_path(&setting, b))
             .collect();
-        let served = placement::served_beams(&paths, nominal.facets.len());
+        let served = placement::served_beams(&paths, nominal.facets.len(), self.sensor.scan());
         Ok(nominal
             .facets
             .iter()
@@ -116,27 +115,30 @@ impl Laboratory {
             .collect())
     }
 
-    /// Step 3: mean ranges to the bare structure, corrected with the incidence that the drawing gives.
+    /// Step 3: mean ranges to the bare structure, corrected with the incidence from the drawing.
     fn bare_structure(&self) -> Result<session::BareStructure, SimError> {
         let thickness = self.scene.superstructure.mirror.thickness_mm;
         let facet_normals = self.drawn_normals()?;
         let number = self.planned.iter().position(|p| p.kind == PoseKind::Bare);
         let stretch = number.map(|number| self.stretch(number)).transpose()?;
         let record = stretch.and_then(|s| s.into_record().ok());
-        // The experimenter looks at his readings before he averages them.
+        // The experimenter examines the readings before averaging them.
         let noise_sd = self.beliefs().range_noise_sd_mm * 1e-3;
-        let looked_at = |record: &PoseRecord, beam: usize, plain: Summary| {
-            let found = Summary::of_main_body(record.readings(beam), noise_sd);
+        let examined = |record: &PoseRecord, beam: usize, plain: Summary| {
+            let ranges = record.readings.held().unwrap_or_default().iter();
+            let readings = ranges.skip(beam).step_by(record.beams()).copied();
+            let found = Summary::of_main_body(readings, noise_sd);
             found.filter(|s| s.outliers > 0).unwrap_or(plain)
         };
         let summaries: Vec<Summary> = record.map_or_else(Vec::new, |r| {
             let plain = r.summarize().into_iter().enumerate();
-            plain.map(|(beam, plain)| looked_at(&r, beam, plain)).collect()
+            plain.map(|(beam, plain)| examined(&r, beam, plain)).collect()
         });
         if let Some(sd_mm) = self.scene.experiment.bare_distance_sd_mm {
             return self.measured_bare(sd_mm);
         }
-        let mut distance_m = vec![0.0; beam::COUNT];
+        let scan = self.sensor.scan();
+        let mut distance_m = vec![0.0; scan.beams()];
         let mut variance: f64 = 0.0;
         for (beam, summary) in summaries.iter().enumerate() {
             let Some(normal) = facet_normals[beam] else {
@@ -145,7 +147,7 @@ impl Laboratory {
             if summary.count == 0 || summary.mean > FARTHEST_STRUCTURE {
                 continue;
             }
-            let cos = normal.dot(&beam::direction(beam::azimuth(beam))).abs();
+            let cos = normal.dot(&beam::direction(scan.azimuth(beam))).abs();
             distance_m[beam] = summary.mean - self.believed.terms(summary.mean, cos, "structure").total();
             variance = variance.max(self.bare_variance(summary.count, cos));
         }
@@ -158,10 +160,11 @@ impl Laboratory {
         })
     }
 
-    /// Step 3 with another instrument: the distances of a facet's beams all share one error.
+    /// Step 3 with another instrument: the distances of all beams of a facet share one error.
     fn measured_bare(&self, sd_mm: f64) -> Result<session::BareStructure, SimError> {
         let served = self.nominal_facets()?;
-        let mut distance_m = vec![0.0; beam::COUNT];
+        let scan = self.sensor.scan();
+        let mut distance_m = vec![0.0; scan.beams()];
         for (index, built) in self.structure.facets.iter().enumerate() {
             let Some(sheet) = served.iter().find(|f| f.name == built.name) else {
                 continue;
@@ -169,18 +172,11 @@ impl Laboratory {
             let mut draws = Draws::new(self.seed, Purpose::BareDistance, index as u64);
             let error = sd_mm * 1e-3 * draws.normal();
             let normal = built.face.normal;
-            let [first, last] = sheet.beams;
-            let last = (last + NEAR_FACET).min(beam::COUNT - 1);
-            for (beam, distance) in distance_m
-                .iter_mut()
-                .enumerate()
-                .take(last + 1)
-                .skip(first.saturating_sub(NEAR_FACET))
-            {
-                let u = beam::direction(beam::azimuth(beam));
+            for beam in scan.run(scan.widened(sheet.beams, NEAR_FACET)) {
+                let u = beam::direction(scan.azimuth(beam));
                 let facing = normal.dot(&u).abs();
                 let to_face = normal.dot(&built.face.corners[0].coords) / normal.dot(&u);
-                *distance = to_face + built.thickness / facing + error;
+                distance_m[beam] = to_face + built.thickness / facing + error;
             }
         }
         let superstructure = &self.scene.superstructure;
@@ -193,29 +189,26 @@ impl Laboratory {
         })
     }
 
-    /// For every beam, the drawn normal of the facet that serves it or is nearest to it within a few beams.
+    /// For every beam, the drawn normal of the facet that serves it or, within a few beams, of the nearest facet.
     fn drawn_normals(&self) -> Result<Vec<Option<Unit<Vector3<f64>>>>, SimError> {
         let facets = self.nominal_facets()?;
-        let away = |f: &session::NominalFacet, beam: usize| {
-            f.beams[0]
-                .saturating_sub(beam)
-                .max(beam.saturating_sub(f.beams[1]))
-        };
+        let scan = self.sensor.scan();
+        let away = |f: &session::NominalFacet, beam: usize| scan.beside(f.beams, beam);
         let nearest = |beam| {
             facets
                 .iter()
                 .min_by_key(|f| away(f, beam))
                 .filter(|f| away(f, beam) <= NEAR_FACET)
         };
-        Ok((0..beam::COUNT)
+        Ok((0..scan.beams())
             .map(|beam| Some(nearest(beam)?.plane()?.normal))
             .collect())
     }
 
-    /// Variance that the experimenter ascribes to a bare distance, in square metres.
+    /// Variance that the experimenter assigns to a bare distance, in square meters.
     fn bare_variance(&self, readings: usize, cos: f64) -> f64 {
         let believed = self.beliefs();
-        // The drawing gives the incidence; facet and scanner both stand a little off it.
+        // The incidence comes from the drawing; facet and scanner are both slightly off it.
         let mount = self.scene.scanner.mount.tilt_tolerance_deg / 3.0_f64.sqrt();
         let tilt = libm::hypot(self.scene.superstructure.as_built.tilt_sd_deg, mount).to_radians();
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
@@ -226,33 +219,11 @@ impl Laboratory {
             believed.color_bias_sd_mm,
             believed.angle_gain_sd_mm * (1.0 - cos),
             believed.bias.angle.gain_mm * sin * tilt,
-            // The mirror's own thickness is added, whatever it really is.
+            // The nominal thickness of the mirror is added, whatever the true one is.
             self.scene.superstructure.as_built.thickness_sd_mm / cos.max(f64::EPSILON),
         ];
         terms.iter().map(|mm| mm * mm * 1e-6).sum()
     }
-}
-
-/// The biases as step 1 found them: the true ones, missed by the characterization's uncertainty.
-pub(super) fn believed_bias(scene: &Scene, seed: u64, truth: &RangeBias) -> RangeBias {
-    let mut believed = truth.clone();
-    if *truth == RangeBias::default() {
-        return believed;
-    }
-    let known = &scene.characterization;
-    let mut draws = Draws::new(seed, Purpose::Characterization, 0);
-    for error in &mut believed.distance.error_mm {
-        *error += known.distance_sd_mm * draws.normal();
-    }
-    draws.seek(1 << 20);
-    let gain = known.angle_gain_sd_mm * draws.normal();
-    believed.angle.gain_mm += gain;
-    believed.angle.offset_mm -= gain;
-    for (column, color) in believed.color.values_mut().enumerate() {
-        draws.seek((1 << 21) + column as u64);
-        color.offset_mm += known.color_sd_mm * draws.normal();
-    }
-    believed
 }
 
 fn known_markers(markers: &[Marker]) -> Vec<session::Marker> {

@@ -1,29 +1,30 @@
-//! Mishaps: a board that moves while it is scanned, labels that sit on the wrong markers.
+//! Mishaps: a board that moves while it is scanned, labels on the wrong markers.
 
-use super::{Laboratory, board_markers, room};
+use super::setup::Laboratory;
+use crate::build::board::{board_markers, points};
 use crate::error::SimError;
 use crate::scene::{Board, Mishap};
 use catoptric_model::tracking::solve_pose;
 use catoptric_model::{Pose, Track};
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
-/// Where a board goes, and when.
+/// Where a board moves to, and when.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Movement {
-    /// First scan that sees it there.
+    /// First scan that sees the board there.
     pub(super) scan: usize,
     /// `room_from_board` from then on.
     pub(super) room_from_board: Pose,
 }
 
 impl Laboratory {
-    /// What goes wrong in a stretch.
+    /// The mishap of a stretch, if there is one.
     pub(super) fn mishap(&self, number: usize) -> Option<&Mishap> {
         let mut mishaps = self.scene.experiment.mishap.iter();
         mishaps.find(|m| m.pose as usize == number)
     }
 
-    /// Where the board of a stretch goes, if it moves.
+    /// The movement of a stretch's board, if it moves.
     pub(super) fn movement(&self, number: usize) -> Option<Movement> {
         let mishap = self.mishap(number).filter(|m| m.moves())?;
         let shift = Vector3::from(mishap.moved_mm.unwrap_or_default()) * 1e-3;
@@ -35,7 +36,7 @@ impl Laboratory {
         })
     }
 
-    /// Puts labels where the stretch's mishap has them, and solves the poses anew from what they say.
+    /// Applies the stretch's mislabeling to its markers and solves the poses again.
     pub(super) fn mislabel(&self, number: usize, track: &mut Track) {
         let (Some(mishap), Some(board)) = (self.mishap(number), self.board_of(number)) else {
             return;
@@ -49,7 +50,7 @@ impl Laboratory {
         if swapped.is_none() && astray.is_none() {
             return;
         }
-        let template = room::points(&markers);
+        let template = points(&markers);
         for frame in &mut track.frames {
             if let Some((a, b)) = swapped {
                 frame.markers.swap(a, b);
@@ -69,7 +70,7 @@ impl Laboratory {
         Some(&self.scene.board[*board])
     }
 
-    /// Whether every mishap has its pose, board and markers.
+    /// Checks that every mishap has its pose, board and markers.
     pub(super) fn check_mishaps(&self) -> Result<(), SimError> {
         for mishap in &self.scene.experiment.mishap {
             let number = mishap.pose as usize;

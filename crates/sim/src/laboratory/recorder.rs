@@ -1,52 +1,53 @@
-//! A stretch in the making: chance is added scan by scan to what the sensor sees.
+//! Records a stretch: random effects are added, scan by scan, to what the sensor sees.
 
-use super::chance::ScanLuck;
-use super::{Chances, Laboratory, Returns};
+use super::effects::{ScanEffects, StretchEffects};
+use super::setup::Laboratory;
+use super::sight::Returns;
 use crate::scene::EchoChoice;
+use catoptric_model::Stretch;
 use catoptric_model::range::NO_RETURN;
-use catoptric_model::{Stretch, beam};
 
 /// A stretch being recorded.
 pub struct Recorder<'a> {
     laboratory: &'a Laboratory,
     number: usize,
-    chances: Chances<'a>,
+    effects: StretchEffects<'a>,
     readings: Readings,
 }
 
-/// The readings of scans in a row.
+/// Readings of consecutive scans.
 pub(super) struct Readings {
     pub(super) ranges: Vec<f64>,
     pub(super) echoes: Option<Vec<Vec<f64>>>,
 }
 
 impl Laboratory {
-    /// Begins to record a stretch; scan after scan is added, as many as [`Laboratory::scans_of`] says.
+    /// Starts to record a stretch, to which [`Laboratory::scans_of`] scans are added one by one.
     pub fn recorder(&self, number: usize) -> Recorder<'_> {
         Recorder {
             laboratory: self,
             number,
-            chances: self.chances(number),
+            effects: self.effects(number),
             readings: self.readings(self.planned[number].scans),
         }
     }
 
-    /// Room for the readings of so many scans.
+    /// Space for the readings of a given number of scans.
     pub(super) fn readings(&self, scans: usize) -> Readings {
         let all_echoes = self.scene.detection.echo == EchoChoice::All;
         Readings {
-            ranges: Vec::with_capacity(scans * beam::COUNT),
+            ranges: Vec::with_capacity(scans * self.sensor.scan().beams()),
             echoes: all_echoes.then(Vec::new),
         }
     }
 }
 
-/// What every beam met, ready to be read scan after scan.
+/// What every beam receives, prepared to be read scan after scan.
 #[derive(Default)]
 pub(super) struct Digest {
     beams: Vec<Reported>,
-    /// The beams of [`Reported::ByChance`].
-    by_chance: Vec<usize>,
+    /// The beams of [`Reported::AtRandom`].
+    at_random: Vec<usize>,
 }
 
 /// What a beam reports.
@@ -54,71 +55,77 @@ pub(super) struct Digest {
 enum Reported {
     /// No echo.
     Nothing,
-    /// One echo, which is detected whatever is drawn: its range and the standard deviation of its noise, in metres.
+    /// One echo, detected whatever is drawn: its range and the standard deviation of its noise, in meters.
     Surely { range: f64, noise_sd: f64 },
-    /// One of several, or all, or perhaps none.
-    ByChance,
+    /// One of several echoes, or all, or perhaps none, depending on what is drawn.
+    AtRandom,
 }
 
 impl Digest {
-    /// The digest of a scan; with `all_echoes` none is simple.
+    /// The digest of a scan; with `all_echoes`, no beam with an echo is [`Reported::Surely`].
     pub(super) fn of(returns: &Returns, all_echoes: bool) -> Self {
         let mut digest = Self::default();
         digest.take(returns, all_echoes);
         digest
     }
 
-    /// Becomes the digest of another scan.
+    /// Replaces the digest with that of another scan.
     pub(super) fn take(&mut self, returns: &Returns, all_echoes: bool) {
         self.beams.clear();
-        self.by_chance.clear();
+        self.at_random.clear();
         self.beams.extend(returns.iter().map(|found| match found {
             None => Reported::Nothing,
             Some(found) if found.probability >= 1.0 && !all_echoes => Reported::Surely {
                 range: found.range(),
                 noise_sd: found.noise_sd,
             },
-            Some(_) => Reported::ByChance,
+            Some(_) => Reported::AtRandom,
         }));
         let beams = self.beams.iter().enumerate();
-        let by_chance = beams.filter(|(_, reported)| matches!(reported, Reported::ByChance));
-        self.by_chance.extend(by_chance.map(|(beam, _)| beam));
+        let at_random = beams.filter(|(_, reported)| matches!(reported, Reported::AtRandom));
+        self.at_random.extend(at_random.map(|(beam, _)| beam));
     }
 
-    /// The beams whose detection is by chance.
-    pub(super) fn by_chance(&self) -> &[usize] {
-        &self.by_chance
+    /// The beams whose detection is random.
+    pub(super) fn at_random(&self) -> &[usize] {
+        &self.at_random
     }
 }
 
 impl Readings {
-    /// Adds a scan from what every beam met and the digest of it.
-    pub(super) fn add(&mut self, laboratory: &Laboratory, seen: &Returns, digest: &Digest, luck: &ScanLuck) {
+    /// Adds a scan, given what every beam receives and the digest of it.
+    pub(super) fn add(
+        &mut self,
+        laboratory: &Laboratory,
+        seen: &Returns,
+        digest: &Digest,
+        effects: &ScanEffects,
+    ) {
         let sensor = &laboratory.sensor;
         let beams = digest.beams.iter().enumerate();
         self.ranges.extend(beams.map(|(beam, reported)| match *reported {
             Reported::Nothing => NO_RETURN,
             Reported::Surely { range, noise_sd } => {
-                sensor.read_echo(range, noise_sd, &luck.but_detection(beam))
+                sensor.read_echo(range, noise_sd, &effects.without_detection(beam))
             }
-            Reported::ByChance => sensor.read(seen[beam].as_ref(), &luck.of(beam)),
+            Reported::AtRandom => sensor.read(seen[beam].as_ref(), &effects.of(beam)),
         }));
         if let Some(echoes) = &mut self.echoes {
             let beams = seen.iter().enumerate();
-            echoes.extend(beams.map(|(beam, found)| sensor.read_all(found.as_ref(), &luck.of(beam))));
+            echoes.extend(beams.map(|(beam, found)| sensor.read_all(found.as_ref(), &effects.of(beam))));
         }
     }
 }
 
 impl Recorder<'_> {
-    /// Adds a scan from what [`super::Sight::returns`] found for it.
+    /// Adds a scan, given its [`super::Sight::returns`].
     pub fn add(&mut self, returns: &Returns) {
         let digest = Digest::of(returns, self.readings.echoes.is_some());
-        let luck = self.chances.next_scan(Some(digest.by_chance()));
-        self.readings.add(self.laboratory, returns, &digest, luck);
+        let effects = self.effects.next_scan(Some(digest.at_random()));
+        self.readings.add(self.laboratory, returns, &digest, effects);
     }
 
-    /// The stretch, with what motion capture saw meanwhile.
+    /// The stretch, with what motion capture saw during it.
     pub fn finish(self) -> Stretch {
         let frames = 0..self.laboratory.frames_of(self.number);
         self.laboratory.stretch_of(self.number, self.readings, frames)
@@ -126,7 +133,7 @@ impl Recorder<'_> {
 }
 
 impl Laboratory {
-    /// Readings with frames and all that is noted of the stretch.
+    /// Combines readings with motion-capture frames and the label of the stretch.
     pub(super) fn stretch_of(
         &self,
         number: usize,
@@ -136,8 +143,8 @@ impl Laboratory {
         Stretch {
             label: self.label(number),
             start_s: self.start_s(number),
-            scan_period_s: self.scene.scanner.limits().scan_period_s(),
-            beams: beam::COUNT,
+            scan_period_s: self.sensor.scan().scan_period_s(),
+            beams: self.sensor.scan().beams(),
             ranges: readings.ranges,
             echoes: readings.echoes,
             tracks: self.tracks(number, frames),

@@ -1,43 +1,48 @@
-//! What the sensor sees during a stretch, scan by scan, free of chance.
+//! What the sensor sees during a stretch, scan by scan, before random effects.
 //!
-//! In a flight beam i of scan k is cast from where the sensor is at k·T + i·step after the first waypoint; all the rest
-//! is as where nothing moves. Every scan is a function of the scene, the seed and its number alone.
+//! In a flight, beam i of scan k is cast from where the sensor is at k·T + i·step after the first waypoint; everything
+//! else is as at rest. Every scan is a function of the scene, the seed and its number alone.
 
-use super::{Laboratory, Returns, wall_targets};
-use crate::cast::BUNDLE;
-use crate::color;
+use super::setup::Laboratory;
+use super::targets::wall_targets;
+use crate::build::color;
+use crate::build::stage::Stage;
+use crate::build::trajectory::Trajectory;
 use crate::error::SimError;
-use crate::optics::{Mirrors, Rig, Setting};
-use crate::reading::{Parts, Return, SubRayEnd};
-use crate::stage::Stage;
-use crate::trajectory::Trajectory;
-use catoptric_model::{Pose, PoseKind, beam};
+use crate::light::optics::{Mirrors, Rig, Setting};
+use crate::receive::reading::{Parts, Return, SubRayEnd};
+use catoptric_cast::BUNDLE;
+use catoptric_model::{Pose, PoseKind};
 use rayon::prelude::*;
 
-/// A stretch with an index over everything that light can meet in it.
+/// What every beam receives during a scan, before random effects; `None` without an echo.
+pub type Returns = Vec<Option<Return>>;
+
+/// A stretch with an index over everything that light can hit in it.
 pub struct Sight<'a> {
     laboratory: &'a Laboratory,
     setting: Setting<'a>,
-    /// What it is like from a scan on, after the board has moved.
+    /// After the board has moved: the first such scan, and the setting from then on.
     after: Option<(usize, Setting<'a>)>,
     trajectory: Option<&'a Trajectory>,
-    /// The structure's part in all of it.
+    /// The compiled paths via the structure.
     rig: &'a Rig,
 }
 
-/// Fewest beams of a scan that are worth another thread.
+/// Smallest number of beams of a scan that is worth another thread.
 const BEAMS_OF_A_THREAD: usize = 64;
 
-/// Bundles of rays at most that neighboring beams are cast in.
-const BUNDLES: usize = 4;
+/// Maximum number of packets in which neighboring beams are cast together.
+const PACKETS: usize = 4;
 
-/// Beams that are cast together: as many as leave the least room in the bundles that the caster makes of their rays.
+/// Number of beams that are cast together: the one that leaves the smallest share of padding in the packets of their
+/// rays.
 fn together(sub_rays: usize) -> usize {
     let filled = |beams: usize| {
         let rays = beams * sub_rays;
         rays as f64 / rays.next_multiple_of(BUNDLE) as f64
     };
-    let most = (BUNDLES * BUNDLE / sub_rays.max(1)).clamp(1, BEAMS_OF_A_THREAD);
+    let most = (PACKETS * BUNDLE / sub_rays.max(1)).clamp(1, BEAMS_OF_A_THREAD);
     (1..=most).fold(
         1,
         |best, beams| if filled(beams) > filled(best) { beams } else { best },
@@ -105,7 +110,7 @@ impl Laboratory {
         )
     }
 
-    /// The structure's part in what the sensor sees, with or without its mirrors; compiled when it is first asked for.
+    /// The compiled paths via the structure, with or without its mirrors; compiled on first use.
     fn rig(&self, mirrors: Mirrors) -> Result<&Rig, SimError> {
         let kept = match mirrors {
             Mirrors::Attached => &self.rigs[0],
@@ -115,47 +120,47 @@ impl Laboratory {
             return Ok(rig);
         }
         let bare = Setting::new(&self.scene, &self.structure, mirrors, Vec::new())?;
-        // Outside of the lock: a thread that waits for others to compile may take up another stretch and come here again.
+        // Outside the lock: a thread that waits for others to compile may take up another stretch and get here again.
         let rig = self.sensor.compile(&bare);
         Ok(kept.get_or_init(|| rig))
     }
 
     /// Time at which a beam of a scan is read, in seconds since its stretch began.
     pub(super) fn elapsed_s(&self, scan: usize, beam: usize) -> f64 {
-        let limits = self.scene.scanner.limits();
-        scan as f64 * limits.scan_period_s() + beam as f64 * limits.step_period_s()
+        let geometry = self.sensor.scan();
+        scan as f64 * geometry.scan_period_s() + geometry.time_of(beam)
     }
 }
 
 impl Sight<'_> {
-    /// Whether something moves, so that not all scans are alike.
+    /// Whether anything moves, so that scans differ.
     pub fn moves(&self) -> bool {
         self.trajectory.is_some() || self.after.is_some()
     }
 
-    /// Whether the sensor itself moves, so that no two scans are alike.
+    /// Whether the sensor itself moves, so that no two scans are the same.
     pub fn flies(&self) -> bool {
         self.trajectory.is_some()
     }
 
-    /// Whether a scan may see something else than the one before it; the first has none.
+    /// Whether a scan may see something other than the one before it; false for the first.
     pub fn changes_at(&self, scan: usize) -> bool {
         scan > 0 && (self.trajectory.is_some() || self.after.as_ref().is_some_and(|(from, _)| *from == scan))
     }
 
-    /// Everything that light can meet, as the sensor has it around itself at the start.
+    /// Everything that light can hit, as it is around the sensor at the start.
     pub fn setting(&self) -> &Setting<'_> {
         &self.setting
     }
 
-    /// What every beam of a scan meets; the same as for the scan before unless [`Sight::changes_at`] says otherwise.
+    /// What every beam of a scan receives; the same as for the scan before unless [`Sight::changes_at`].
     pub fn returns(&self, scan: usize) -> Returns {
         let mut returns = Vec::new();
         self.look(scan, &mut returns);
         returns
     }
 
-    /// The same, in the place of what another scan met.
+    /// As [`Sight::returns`], overwriting the returns of another scan.
     pub fn look(&self, scan: usize, returns: &mut Returns) {
         let sensor = &self.laboratory.sensor;
         let together = together(sensor.sub_rays());
@@ -170,7 +175,7 @@ impl Sight<'_> {
                 }
             }
         };
-        returns.resize_with(beam::COUNT, || None);
+        returns.resize_with(sensor.scan().beams(), || None);
         returns
             .par_chunks_mut(together)
             .enumerate()
@@ -180,7 +185,7 @@ impl Sight<'_> {
             });
     }
 
-    /// The ways of a beam's sub-rays in a scan, in the sensor frame of its time.
+    /// Paths of a beam's sub-rays in a scan, in the sensor frame at the time of the beam.
     pub fn sub_ray_ends(&self, scan: usize, beam: usize) -> Vec<SubRayEnd> {
         let around = self.around(scan, beam);
         self.laboratory.sensor.sub_ray_ends(&around, beam)
@@ -198,7 +203,7 @@ impl Sight<'_> {
         .seen_from(&moved)
     }
 
-    /// Where the sensor is in the frame that it had at the start; exactly there while the rig has not moved.
+    /// Pose of the sensor relative to its pose at the start; exactly the identity while the rig has not moved.
     fn start_from_sensor(&self, trajectory: &Trajectory, elapsed_s: f64) -> Pose {
         let first_from_rig = trajectory.first_from_rig(elapsed_s);
         if first_from_rig == Pose::identity() {
@@ -214,14 +219,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn beams_that_go_together_fill_bundles() {
+    fn beams_cast_together_fill_packets() {
         for sub_rays in 1..=200 {
             let beams = together(sub_rays);
             assert!((1..=BEAMS_OF_A_THREAD).contains(&beams), "{beams} of {sub_rays}");
             let rays = beams * sub_rays;
-            assert!(beams == 1 || rays <= BUNDLES * BUNDLE, "{rays} rays");
+            assert!(beams == 1 || rays <= PACKETS * BUNDLE, "{rays} rays");
         }
-        // Eight of 16 fill one; six of 19 would leave 14 rays of room in one, twenty leave 4 in three.
+        // Eight of 16 fill one packet; six of 19 would leave 14 lanes of one empty, twenty leave 4 of three.
         assert_eq!((together(16), together(19)), (8, 20));
     }
 }

@@ -1,99 +1,122 @@
-//! The truth as the laboratory knows it.
+//! The truth: what was simulated, kept apart from what was observed.
 
-use super::Laboratory;
-use crate::error::SimError;
-use crate::optics::{End, Mirrors, Setting};
-use crate::placement;
-use crate::trajectory::Trajectory;
-use crate::truth::{self, TrueBeam, TrueFacet, TruePose, Truth};
-use catoptric_model::{Deflection, PoseData, beam};
-use rayon::prelude::*;
+pub use crate::receive::reading::BeamClass;
 
-impl Laboratory {
-    /// The truth beside it all.
-    ///
-    /// # Errors
-    /// An unknown color.
-    pub fn truth(&self) -> Result<Truth, SimError> {
-        let setting = Setting::new(&self.scene, &self.structure, Mirrors::Attached, Vec::new())?;
-        let facets = &self.structure.facets;
-        let beams = (0..beam::COUNT)
-            .into_par_iter()
-            .map(|b| self.true_beam(&setting, b))
-            .collect();
-        Ok(Truth {
-            schema_version: truth::SCHEMA_VERSION,
-            name: self.scene.name.clone(),
-            seed: self.seed,
-            room_from_rig: PoseData::from(&placement::room_from_rig(&self.scene.room)),
-            rig_from_sensor: PoseData::from(&self.structure.rig_from_sensor),
-            bias: self.sensor.bias().clone(),
-            facets: facets
-                .iter()
-                .map(|f| TrueFacet {
-                    name: f.name.clone(),
-                    normal: f.face.normal.into_inner().into(),
-                    offset_m: f.face.normal.dot(&f.face.origin.coords),
-                    corners_m: f.face.corners.iter().map(|c| c.coords.into()).collect(),
-                })
-                .collect(),
-            beams,
-            poses: (0..self.planned.len())
-                .map(|number| TruePose {
-                    pose: number,
-                    kind: self.planned[number].kind,
-                    room_from_board: self.boards[number].as_ref().map(PoseData::from),
-                    room_from_board_after: self.movement(number).map(|m| PoseData::from(&m.room_from_board)),
-                    mishap: self.mishap(number).cloned(),
-                    room_from_sensor: self.flown(number),
-                    drift_m: self.drift(number),
-                    warm_up_m: self.scene.errors.warm_up.map(|_| {
-                        let last = self.planned[number].scans.saturating_sub(1) as f64;
-                        let begin = self.start_s(number);
-                        let end = begin + last * self.scene.scanner.limits().scan_period_s();
-                        [self.warm_up(begin), self.warm_up(end)]
-                    }),
-                })
-                .collect(),
+use crate::scene::Mishap;
+use catoptric_model::beam::{self, Deflection};
+use catoptric_model::{PoseData, PoseKind, RangeBias};
+use nalgebra::{Unit, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Version of `truth.json`.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// Everything that a score is computed from on the side of the truth.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Truth {
+    /// Version of this file's format.
+    pub schema_version: u32,
+    /// Name of the scene.
+    pub name: String,
+    /// Seed of the run.
+    pub seed: u64,
+    /// Pose of the rig, except in flights.
+    pub room_from_rig: PoseData,
+    /// Pose of the sensor in the rig.
+    pub rig_from_sensor: PoseData,
+    /// Biases of the sensor.
+    pub bias: RangeBias,
+    /// The mirrors as built.
+    pub facets: Vec<TrueFacet>,
+    /// What the structure does to the light of every beam, boards aside.
+    pub beams: Vec<TrueBeam>,
+    /// True values of every stretch.
+    pub poses: Vec<TruePose>,
+}
+
+/// A mirror as built, in the true sensor frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrueFacet {
+    /// Name.
+    pub name: String,
+    /// Unit normal m of its plane, on the reflecting side.
+    pub normal: [f64; 3],
+    /// h of the plane m·x = h, in meters.
+    pub offset_m: f64,
+    /// Corners, in meters.
+    pub corners_m: Vec<[f64; 3]>,
+}
+
+/// What the structure does to the light of a beam. Angles are those of the chief ray.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrueBeam {
+    /// Index of the beam.
+    pub beam: usize,
+    /// Class of the beam.
+    pub status: BeamClass,
+    /// Facets that the chief ray hits, in order.
+    pub facets: Vec<String>,
+    /// Where it hits them, in the sensor frame, in meters.
+    pub points_m: Vec<[f64; 3]>,
+    /// θ_a, in radians; absent if the chief ray does not leave.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub azimuth_rad: Option<f64>,
+    /// φ, in radians.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub elevation_rad: Option<f64>,
+    /// d: distance to the first facet, in meters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distance_m: Option<f64>,
+    /// Share of the beam's energy that takes the same path as the chief ray.
+    pub chief_energy: f64,
+}
+
+/// True values of a stretch.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TruePose {
+    /// Number of the pose.
+    pub pose: usize,
+    /// Kind of the stretch.
+    pub kind: PoseKind,
+    /// Pose of the board.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub room_from_board: Option<PoseData>,
+    /// Pose of the board after it moved during the stretch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub room_from_board_after: Option<PoseData>,
+    /// What went wrong.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mishap: Option<Mishap>,
+    /// Pose of the sensor at the start of every scan of a flight; empty for other stretches, in which the sensor rests.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub room_from_sensor: Vec<PoseData>,
+    /// Drift of all its readings, in meters.
+    pub drift_m: f64,
+    /// Warm-up error of the scanner at its first and its last scan, in meters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub warm_up_m: Option<[f64; 2]>,
+}
+
+impl TrueBeam {
+    /// θ_a, φ and d of a beam whose chief ray is deflected once.
+    pub fn deflection(&self) -> Option<Deflection> {
+        (self.facets.len() == 1).then_some(())?;
+        Some(Deflection {
+            azimuth: self.azimuth_rad?,
+            elevation: self.elevation_rad?,
+            distance: self.distance_m?,
         })
     }
 
-    /// Where the sensor was at the start of every scan of a flight.
-    fn flown(&self, number: usize) -> Vec<PoseData> {
-        let planned = &self.planned[number];
-        let trajectory = planned.flight.map(|flight| &self.trajectories[flight]);
-        let at = |trajectory: &Trajectory, scan| {
-            let room_from_rig = trajectory.room_from_rig(self.elapsed_s(scan, 0));
-            PoseData::from(&(room_from_rig * self.structure.rig_from_sensor))
-        };
-        trajectory.map_or_else(Vec::new, |t| (0..planned.scans).map(|scan| at(t, scan)).collect())
-    }
-
-    fn true_beam(&self, setting: &Setting<'_>, beam: usize) -> TrueBeam {
-        let (status, chief_energy) = self.sensor.classify(setting, beam);
-        let chief = self.sensor.chief_path(setting, beam);
-        let leaves = matches!(chief.end, End::Escaped) && !chief.facets().is_empty();
-        let distance = chief.points().first().map(|p| p.coords.norm());
-        let deflection = leaves.then(|| {
-            Deflection::from_exit(
-                beam::azimuth(beam),
-                &chief.last.direction,
-                distance.unwrap_or(0.0),
-            )
-        });
-        TrueBeam {
-            beam,
-            status,
-            facets: chief
-                .facets()
-                .iter()
-                .map(|&f| self.structure.facets[f].name.clone())
-                .collect(),
-            points_m: chief.points().iter().map(|p| p.coords.into()).collect(),
-            azimuth_rad: deflection.map(|d| d.azimuth),
-            elevation_rad: deflection.map(|d| d.elevation),
-            distance_m: distance,
-            chief_energy,
-        }
+    /// Direction in which the chief ray of a beam leaves, in the sensor frame.
+    pub fn exit_direction(&self, beam_azimuth: f64) -> Option<Unit<Vector3<f64>>> {
+        Some(beam::spherical(
+            beam_azimuth + self.azimuth_rad?,
+            self.elevation_rad?,
+        ))
     }
 }

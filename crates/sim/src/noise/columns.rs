@@ -1,12 +1,11 @@
-//! All columns of a row at once: the numbers that [`Draws`] gives one by one, to the last bit.
+//! All columns of a row at once: the numbers that [`Draws`] draws one by one, bit for bit.
 //!
-//! A column's words are one block of ChaCha, so that a row is one run of the stream.
+//! The words of a column are one block of ChaCha, so a row is one run of the stream.
 
-use super::{Draws, Purpose, WORDS_PER_COLUMN, standard_uniform};
+use super::draws::{Draws, Purpose, WORDS_PER_COLUMN, box_muller, standard_uniform};
 use crate::lanes::{LANES, cosine, logarithm};
-use rand::rand_core::Rng;
 
-/// Bytes of a column.
+/// Bytes per column.
 const BLOCK: usize = 4 * WORDS_PER_COLUMN;
 
 /// The draws of all columns of a row.
@@ -16,13 +15,13 @@ pub struct Columns {
 }
 
 impl Columns {
-    /// Draws a row of so many columns in place of what was here.
+    /// Draws a row with a given number of columns, in place of the previous one.
     pub fn draw(&mut self, columns: usize, seed: u64, purpose: Purpose, row: u64) {
         self.bytes.resize(columns * BLOCK, 0);
-        Draws::new(seed, purpose, row).rng.fill_bytes(&mut self.bytes);
+        Draws::new(seed, purpose, row).fill(&mut self.bytes);
     }
 
-    /// Forgets the row: there are no columns.
+    /// Clears the row, leaving no columns.
     pub fn clear(&mut self) {
         self.bytes.clear();
     }
@@ -32,12 +31,12 @@ impl Columns {
         self.bytes.len() / BLOCK
     }
 
-    /// Whether there is none.
+    /// Whether there are no columns.
     pub fn is_empty(&self) -> bool {
         self.bytes.is_empty()
     }
 
-    /// What [`Draws::uniform`] is after so many uniform draws of a column; a normal draw counts as two.
+    /// The result of [`Draws::uniform`] after `after` uniform draws of a column; a normal draw counts as two.
     pub fn uniform(&self, column: usize, after: usize) -> f64 {
         standard_uniform(word(&self.bytes[column * BLOCK..], after))
     }
@@ -49,7 +48,7 @@ impl Columns {
         out.extend(blocks.map(|block| standard_uniform(word(block, after))));
     }
 
-    /// What [`Draws::normal`] is in every column after so many uniform draws.
+    /// The result of [`Draws::normal`] in every column after `after` uniform draws.
     pub fn normals(&self, after: usize, out: &mut Vec<f64>) {
         out.clear();
         out.reserve(self.len());
@@ -62,25 +61,19 @@ impl Columns {
         }
         for block in groups.remainder().chunks_exact(BLOCK) {
             let uniform = |after| standard_uniform(word(block, after));
-            out.push(scalar(uniform(after), uniform(after + 1)));
+            out.push(box_muller(uniform(after), uniform(after + 1)));
         }
     }
 }
 
-/// A word of 64 bits of a block.
+/// A 64-bit word of a block.
 fn word(block: &[u8], index: usize) -> u64 {
     let mut bytes = [0; 8];
     bytes.copy_from_slice(&block[8 * index..8 * index + 8]);
     u64::from_le_bytes(bytes)
 }
 
-/// Box and Muller's transform as [`Draws::normal`] has it.
-pub(super) fn scalar(first: f64, second: f64) -> f64 {
-    let radius = (-2.0 * libm::log(first)).sqrt();
-    radius * libm::cos(std::f64::consts::TAU * second)
-}
-
-/// The same of several pairs of numbers from (0, 1].
+/// [`box_muller`] of several pairs.
 fn normal(first: &[f64; LANES], second: &[f64; LANES]) -> [f64; LANES] {
     let mut out = [0.0; LANES];
     let mut rare = false;
@@ -91,7 +84,7 @@ fn normal(first: &[f64; LANES], second: &[f64; LANES]) -> [f64; LANES] {
         out[lane] = (-2.0 * logarithm(first[lane])).sqrt() * cosine;
     }
     if rare {
-        return std::array::from_fn(|lane| scalar(first[lane], second[lane]));
+        return std::array::from_fn(|lane| box_muller(first[lane], second[lane]));
     }
     out
 }
@@ -125,9 +118,9 @@ mod tests {
         }
     }
 
-    /// Near the places where `libm` changes its way, and at the ends.
+    /// Near the values where `libm` changes its method, and at the ends.
     #[test]
-    fn deviates_are_those_of_libm_where_it_changes_its_way() {
+    fn deviates_are_those_of_libm_where_it_changes_its_method() {
         let mut edges = vec![f64::EPSILON / 4.0, 0.5, 1.0, 2e-17, 1e-9, 3e-9, 0.999_999_999];
         for k in 1..16 {
             let place = f64::from(k) / 16.0;
@@ -145,7 +138,7 @@ mod tests {
             for first in [[0.3; LANES], second] {
                 let made = normal(&first, &second);
                 for lane in 0..LANES {
-                    let exact = scalar(first[lane], second[lane]);
+                    let exact = box_muller(first[lane], second[lane]);
                     assert_eq!(
                         made[lane].to_bits(),
                         exact.to_bits(),

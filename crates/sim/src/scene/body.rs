@@ -1,68 +1,12 @@
-//! What stands in the room by itself, and the shapes of bodies.
+//! Mirrors and surfaces fixed in the room.
 
-use super::superstructure::{Glass, is_false, is_zero};
+use super::omit::{is_false, is_zero};
+use super::shape::MeshShape;
+use super::superstructure::Glass;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The unit of a mesh file's numbers, which few formats tell.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum MeshUnits {
-    /// Metres.
-    M,
-    /// Millimetres.
-    #[default]
-    Mm,
-    /// Inches.
-    Inch,
-}
-
-impl MeshUnits {
-    /// One unit, in metres.
-    pub fn in_metres(self) -> f64 {
-        match self {
-            Self::M => 1.0,
-            Self::Mm => 1e-3,
-            Self::Inch => 25.4e-3,
-        }
-    }
-}
-
-/// A triangle mesh from a file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct MeshShape {
-    /// An STL, OBJ or PLY file; a relative path starts at the folder of the scene.
-    #[schemars(length(min = 1))]
-    pub file: String,
-    /// Unit of the file's numbers.
-    #[serde(default)]
-    pub units: MeshUnits,
-}
-
-/// Shape of a post that is no box.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum PostShape {
-    /// A round rod along its own z axis.
-    Cylinder(PostCylinder),
-    /// A mesh.
-    Mesh(MeshShape),
-}
-
-/// A round rod.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct PostCylinder {
-    /// Diameter, in millimetres.
-    #[schemars(range(min = 0.01, max = 10000.0))]
-    pub diameter_mm: f64,
-    /// Extent along its own z, in millimetres.
-    #[schemars(range(min = 0.01, max = 10000.0))]
-    pub height_mm: f64,
-}
-
-/// A mirror that stands in the room by itself, in any attitude. It is exactly where it is said to be.
+/// A mirror fixed in the room, in any orientation. It is exactly at its stated pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RoomMirror {
@@ -70,7 +14,7 @@ pub struct RoomMirror {
     pub name: String,
     /// Its outline, in its own frame.
     pub shape: PlaneShape,
-    /// Origin of its own frame in the room, in metres.
+    /// Origin of its own frame in the room, in meters.
     #[serde(default)]
     pub position_m: [f64; 3],
     /// Yaw of its own frame, in degrees.
@@ -88,16 +32,16 @@ pub struct RoomMirror {
     /// Whether its back reflects too.
     #[serde(default, skip_serializing_if = "is_false")]
     pub two_sided: bool,
-    /// Thickness of its body, in millimetres: the back lies so far behind the face.
+    /// Thickness of its body, in millimeters: the distance between the face and the back.
     #[serde(default, skip_serializing_if = "is_zero")]
     #[schemars(range(min = 0.0, max = 100.0))]
     pub thickness_mm: f64,
-    /// Glass before the reflecting surface.
+    /// Glass in front of the reflecting surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub glass: Option<Glass>,
 }
 
-/// A surface that stands in the room by itself and scatters light.
+/// A surface fixed in the room that scatters light.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RoomSurface {
@@ -105,7 +49,7 @@ pub struct RoomSurface {
     pub name: String,
     /// Its shape, in its own frame.
     pub shape: SurfaceShape,
-    /// Origin of its own frame in the room, in metres.
+    /// Origin of its own frame in the room, in meters.
     #[serde(default)]
     pub position_m: [f64; 3],
     /// Yaw of its own frame, in degrees.
@@ -129,7 +73,7 @@ fn white() -> String {
     "white".to_owned()
 }
 
-/// A plane outline, in metres.
+/// A plane outline, in meters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum PlaneShape {
@@ -143,16 +87,16 @@ pub enum PlaneShape {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlaneRectangle {
-    /// Center, in metres.
+    /// Center, in meters.
     #[serde(default)]
     pub center_m: [f64; 3],
     /// Normal of its face; any length.
     #[serde(default = "up")]
     pub normal: [f64; 3],
-    /// Extent parallel to the x–y plane, along x if the normal is ±z, in metres.
+    /// Extent parallel to the x–y plane, along x if the normal is ±z, in meters.
     #[schemars(range(min = 0.0001, max = 1000.0))]
     pub width_m: f64,
-    /// Extent along the other side, in metres.
+    /// Extent along the other side, in meters.
     #[schemars(range(min = 0.0001, max = 1000.0))]
     pub height_m: f64,
 }
@@ -165,7 +109,7 @@ fn up() -> [f64; 3] {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlanePolygon {
-    /// Corners of a convex plane polygon, in metres, counter-clockwise seen from the face.
+    /// Corners of a convex plane polygon, in meters, counter-clockwise seen from the face.
     #[schemars(length(min = 3))]
     pub corners_m: Vec<[f64; 3]>,
 }
@@ -190,7 +134,7 @@ pub enum SurfaceShape {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RoomBox {
-    /// Extents along x, y and z, in metres.
+    /// Extents along x, y and z, in meters.
     #[schemars(inner(range(min = 0.0001, max = 1000.0)))]
     pub size_m: [f64; 3],
 }
@@ -199,10 +143,10 @@ pub struct RoomBox {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RoomCylinder {
-    /// Diameter, in metres.
+    /// Diameter, in meters.
     #[schemars(range(min = 0.0001, max = 1000.0))]
     pub diameter_m: f64,
-    /// Extent along z, in metres.
+    /// Extent along z, in meters.
     #[schemars(range(min = 0.0001, max = 1000.0))]
     pub height_m: f64,
 }

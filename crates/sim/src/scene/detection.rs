@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What the time of flight is measured on.
+/// What the time of flight is measured from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Principle {
@@ -14,7 +14,7 @@ pub enum Principle {
     Phase,
 }
 
-/// Which place of an echo is taken for the range.
+/// Which point of an echo is taken for the range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Detector {
@@ -23,9 +23,9 @@ pub enum Detector {
     LeadingEdge,
     /// Where it rises through a fraction of its own height.
     ConstantFraction,
-    /// Its highest point, or the middle of the top that saturation cuts flat.
+    /// Its highest point, or the middle of a top that is clipped by saturation.
     Peak,
-    /// Its center of light.
+    /// Its centroid.
     Centroid,
 }
 
@@ -40,7 +40,7 @@ pub enum EchoChoice {
     Strongest,
     /// The farthest.
     Last,
-    /// The nearest in `/scan`, and all that the scanner can report in `/echoes`.
+    /// The nearest in `/scan`, and every echo that the scanner can report in `/echoes`.
     All,
 }
 
@@ -48,11 +48,11 @@ pub enum EchoChoice {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Detection {
-    /// What the time of flight is measured on.
+    /// What the time of flight is measured from.
     pub principle: Principle,
-    /// Which place of an echo is taken for the range; pulsed light only.
+    /// Which point of an echo is taken for the range; pulsed light only.
     pub detector: Detector,
-    /// The fraction of its own height at which `constant_fraction` takes an echo (assumed).
+    /// Fraction of its own height at which `constant_fraction` takes an echo (assumed).
     #[schemars(range(min = 0.01, max = 0.99))]
     pub fraction: f64,
     /// Which echo is reported; pulsed light only.
@@ -66,13 +66,13 @@ pub struct Detection {
     /// Reflectivity of a face-on target that is just detected at `threshold_range_m` (data sheet: 0.1).
     #[schemars(range(min = 0.0, max = 1.0))]
     pub threshold_reflectivity: f64,
-    /// Range at which that target is just detected, in metres (data sheet: 8).
+    /// Range at which that target is just detected, in meters (data sheet: 8).
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub threshold_range_m: f64,
-    /// Range of the face-on white target at which the walk of the detector is calibrated out, in metres.
+    /// Range of the face-on white target at which the walk of the detector is calibrated out, in meters.
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub reference_range_m: f64,
-    /// Height above which the receiver clips an echo, in units of the threshold; 0 if it never does.
+    /// Height above which the receiver clips an echo, in units of the threshold; 0 for a receiver that never clips.
     #[schemars(range(min = 0.0, max = 1e9))]
     pub saturation_over_threshold: f64,
     /// Noise-equivalent power, 1σ, in units of the threshold: an echo of height A is detected with the probability

@@ -1,5 +1,6 @@
 //! Errors of the sensor, and how well they are known.
 
+use super::omit::is_zero;
 use catoptric_model::bias::{AngleBias, ColorBias, DistanceBias, interpolate};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -11,12 +12,12 @@ use std::collections::BTreeMap;
 pub enum ErrorModel {
     /// A perfect sensor: no bias, drift, noise, rounding or dropout.
     None,
-    /// Eqs. 3–5 and the tables; the detector shows itself only where surfaces mix.
+    /// Eqs. (3)–(5) and the tables; the detector has an effect only where surfaces mix.
     #[default]
     Empirical,
-    /// What pulse and threshold do to the range; no Eqs. 3–5.
+    /// The effect of pulse and threshold on the range, without Eqs. (3)–(5).
     Physical,
-    /// Both, one on top of the other.
+    /// Both added.
     Both,
 }
 
@@ -24,40 +25,40 @@ pub enum ErrorModel {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Errors {
-    /// Which of them act.
+    /// Which errors are simulated.
     pub model: ErrorModel,
-    /// E_r, default Table 2.
+    /// E_r; Table 2 by default.
     #[schemars(with = "DistanceBiasSchema")]
     pub distance: DistanceBias,
-    /// E_a, default Table 3's slope with no error at normal incidence, since E_r already holds that.
+    /// E_a; by default the slope of Table 3 with no error at normal incidence, which E_r already contains.
     #[schemars(with = "AngleBiasSchema")]
     pub angle: AngleBias,
-    /// E_c per color, default none.
+    /// E_c per color; none by default.
     #[schemars(with = "BTreeMap<String, ColorBiasSchema>")]
     pub color: BTreeMap<String, ColorBias>,
-    /// White noise of a reading, default Table 2.
+    /// White noise of a reading; Table 2 by default.
     pub noise: NoiseTable,
-    /// Constant error of all readings of a pose, 1σ, in millimetres (trial scatter in Table 2).
+    /// Constant error of all readings of a pose, 1σ, in millimeters (trial scatter in Table 2).
     #[schemars(range(min = 0.0, max = 100.0))]
     pub drift_sd_mm: f64,
-    /// Constant error of each beam in each pose, 1σ, in millimetres: what more scans do not average out, as an uneven
-    /// board or speckle; none by default.
+    /// Constant error of each beam in each pose, 1σ, in millimeters: what more scans do not average out, such as
+    /// speckle or an irregular board; none by default.
     #[schemars(range(min = 0.0, max = 100.0))]
     #[serde(skip_serializing_if = "is_zero")]
     pub element_sd_mm: f64,
-    /// A scanner that is still getting warm; none by default.
+    /// Error of a scanner that is still warming up; none by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub warm_up: Option<WarmUp>,
-    /// Noise that a beam's successive readings share; none by default.
+    /// Noise correlated between successive readings of a beam; none by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correlated: Option<Correlated>,
     /// Rare steps of single readings; none by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interference: Option<Interference>,
-    /// Step of the reported ranges, in millimetres; 0 for none.
+    /// Step of the reported ranges, in millimeters; 0 for none.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub quantization_mm: f64,
-    /// Chance that a reading is lost.
+    /// Probability that a reading is lost.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub dropout: f64,
 }
@@ -91,16 +92,11 @@ impl Default for Errors {
     }
 }
 
-/// What is not there keeps out of files.
-fn is_zero(sd: &f64) -> bool {
-    *sd == 0.0
-}
-
-/// An error that dies away while the scanner gets warm: a·exp(−t/τ), t since the recording began.
+/// An error that decays while the scanner warms up: a·exp(−t/τ), t since the recording began.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WarmUp {
-    /// Error at the beginning a, in millimetres.
+    /// Initial error a, in millimeters.
     #[schemars(range(min = -1000.0, max = 1000.0))]
     pub amplitude_mm: f64,
     /// Time constant τ, in seconds.
@@ -108,13 +104,13 @@ pub struct WarmUp {
     pub time_constant_s: f64,
 }
 
-/// Noise that forgets slowly, an AR(1) process of every beam by itself: x₀ = ε₀, xₖ = φ·xₖ₋₁ + √(1 − φ²)·εₖ.
+/// Noise that changes slowly, an AR(1) process for every beam individually: x₀ = ε₀, xₖ = φ·xₖ₋₁ + √(1 − φ²)·εₖ.
 ///
-/// φ = exp(−T/τ) for scans T apart. It begins anew, in its stationary distribution, with every stretch.
+/// φ = exp(−T/τ) for scans T apart. It starts anew, in its stationary distribution, with every stretch.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Correlated {
-    /// Standard deviation, in millimetres.
+    /// Standard deviation, in millimeters.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub sd_mm: f64,
     /// Correlation time τ, in seconds.
@@ -122,41 +118,41 @@ pub struct Correlated {
     pub time_constant_s: f64,
 }
 
-/// Steps of single readings, as another scanner's pulses cause them.
+/// Steps of single readings, as caused by another scanner's pulses.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Interference {
-    /// Size of a step, in millimetres; forward and backward are equally likely.
+    /// Size of a step, in millimeters; forward and backward are equally likely.
     #[schemars(range(min = 0.0, max = 100000.0))]
     pub step_mm: f64,
-    /// Chance of a step in a reading.
+    /// Probability of a step in a reading.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub probability: f64,
 }
 
-/// Standard deviation of a reading over distance, interpolated linearly and constant outside.
+/// Standard deviation of a reading as a function of distance, interpolated linearly and constant outside.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseTable {
-    /// Distances in metres, strictly increasing.
+    /// Distances in meters, strictly increasing.
     #[schemars(length(min = 1))]
     pub range_m: Vec<f64>,
-    /// Standard deviations in millimetres at those distances.
+    /// Standard deviations in millimeters at those distances.
     #[schemars(inner(range(min = 0.0, max = 1000.0)))]
     pub sd_mm: Vec<f64>,
 }
 
-/// How well step 1 knows the errors: what the experimenter believes differs from the truth by these, 1σ (assumed).
+/// How well step 1 knows the errors: the beliefs differ from the truth by these standard deviations (assumed).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Characterization {
-    /// E_r at each node of its table, in millimetres (0.88 mm of drift, averaged over three trials).
+    /// E_r at each node of its table, in millimeters (0.88 mm of drift, averaged over three trials).
     #[schemars(range(min = 0.0, max = 100.0))]
     pub distance_sd_mm: f64,
-    /// A_a, in millimetres, with the error at normal incidence held.
+    /// A_a, in millimeters, with the error at normal incidence held.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub angle_gain_sd_mm: f64,
-    /// E_c, in millimetres.
+    /// E_c, in millimeters.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub color_sd_mm: f64,
 }
@@ -171,7 +167,7 @@ impl Default for Characterization {
     }
 }
 
-// The model crate knows no schemas; these say what its types look like in a scene.
+// The model crate has no schemas; these describe how its types appear in a scene.
 
 /// E_r as a table over distance, interpolated linearly and constant outside (Table 2).
 #[derive(JsonSchema)]
@@ -179,23 +175,23 @@ impl Default for Characterization {
 #[schemars(rename = "DistanceBias")]
 #[allow(dead_code)] // Read by the schema generator alone.
 struct DistanceBiasSchema {
-    /// Distances in metres, strictly increasing.
+    /// Distances in meters, strictly increasing.
     range_m: Vec<f64>,
-    /// Errors in millimetres at those distances.
+    /// Errors in millimeters at those distances.
     error_mm: Vec<f64>,
 }
 
-/// E_a = A_a·cos θ_N + B_a (Eq. 4).
+/// E_a = A_a·cos θ_N + B_a, Eq. (4).
 #[derive(JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "AngleBias")]
 #[allow(dead_code)]
 struct AngleBiasSchema {
-    /// A_a, in millimetres.
+    /// A_a, in millimeters.
     gain_mm: f64,
-    /// B_a, in millimetres.
+    /// B_a, in millimeters.
     offset_mm: f64,
-    /// What is added to the law.
+    /// A table that is added to the law.
     table: Option<AngleTableSchema>,
 }
 
@@ -208,24 +204,24 @@ struct AngleTableSchema {
     /// Incidences in degrees, strictly increasing.
     #[schemars(length(min = 1), inner(range(min = 0.0, max = 90.0)))]
     incidence_deg: Vec<f64>,
-    /// Errors in millimetres at those incidences.
+    /// Errors in millimeters at those incidences.
     error_mm: Vec<f64>,
 }
 
-/// E_c = A_c·R + B_c (Eq. 5).
+/// E_c = A_c·R + B_c, Eq. (5).
 #[derive(JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(rename = "ColorBias")]
 #[allow(dead_code)]
 struct ColorBiasSchema {
-    /// A_c, in millimetres per metre.
+    /// A_c, in millimeters per meter.
     slope_mm_per_m: f64,
-    /// B_c, in millimetres.
+    /// B_c, in millimeters.
     offset_mm: f64,
 }
 
 impl NoiseTable {
-    /// Standard deviation at a range, in metres.
+    /// Standard deviation at a range, in meters.
     pub fn sd(&self, range: f64) -> f64 {
         interpolate(&self.range_m, &self.sd_mm, range) * 1e-3
     }

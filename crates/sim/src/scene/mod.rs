@@ -1,39 +1,43 @@
 //! The scene: everything that is simulated, as a person writes it in TOML.
 //!
-//! Every key carries its unit. Values that nobody published are defaults marked *assumed*. The checks that need more
-//! than one value are in [`crate::check`].
+//! Every key carries its unit. Unpublished values are defaults marked *assumed*. The checks that need more than one
+//! value are in [`crate::check`].
 
 mod body;
 mod detection;
 mod errors;
 mod flight;
+mod meshes;
 mod mishap;
+mod omit;
 mod parameter;
 mod pattern;
+mod preset;
 mod room;
 mod scanner;
+mod shape;
 mod superstructure;
 mod test;
 
 pub use body::{
-    MeshShape, MeshUnits, PlanePolygon, PlaneRectangle, PlaneShape, PostCylinder, PostShape, RoomBox,
-    RoomCylinder, RoomMirror, RoomSurface, SurfaceShape,
+    PlanePolygon, PlaneRectangle, PlaneShape, RoomBox, RoomCylinder, RoomMirror, RoomSurface, SurfaceShape,
 };
 pub use detection::{Detection, Detector, EchoChoice, Principle};
 pub use errors::{Characterization, Correlated, ErrorModel, Errors, Interference, NoiseTable, WarmUp};
 pub use flight::{Attitude, Flight, Waypoint};
+pub use meshes::Meshes;
 pub use mishap::{Mishap, Mislabelled};
 pub use parameter::Parameter;
 pub use pattern::{CopyList, Exchange, FacetCopy, MirrorImage, Pattern, Ring};
 pub use room::{Board, BoardPose, Color, Design, Experiment, MarkerNoise, Mocap, MocapProfile, Room};
 pub use scanner::{BeamShape, HousingBox, Light, Limits, Mount, Preset, Scanner};
+pub use shape::{MeshShape, MeshUnits, PostCylinder, PostShape};
 pub use superstructure::{
     AsBuilt, Facet, FacetShape, Glass, Marker, Mirror, Plate, PolygonShape, Post, RectangleShape,
     Superstructure, Wedge,
 };
 pub use test::SensorTest;
 
-use crate::mesh::Meshes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -53,13 +57,13 @@ pub struct Scene {
     /// Seed of every random draw; `--seed` overrides it.
     #[serde(default = "one")]
     pub seed: u64,
-    /// Numbers of the design with names and bounds, for expressions and searches.
+    /// Named numbers of the design with limits, for expressions and searches.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub parameters: BTreeMap<String, Parameter>,
     /// The scanner.
     #[serde(default = "ust_20lx")]
     pub scanner: Scanner,
-    /// Terms of Eq. 1.
+    /// Terms of Eq. (1).
     #[serde(default)]
     pub light: Light,
     /// From received light to a range.
@@ -68,10 +72,10 @@ pub struct Scene {
     /// Mirrors, posts and markers.
     #[serde(default)]
     pub superstructure: Superstructure,
-    /// Surface colors beside the built-in ones.
+    /// Surface colors in addition to the built-in ones.
     #[serde(default)]
     pub color: BTreeMap<String, Color>,
-    /// The target boards; poses take them in turn.
+    /// The target boards, which poses use in turn.
     #[serde(default)]
     pub board: Vec<Board>,
     /// The room.
@@ -92,7 +96,7 @@ pub struct Scene {
     /// How well step 1 knows those errors.
     #[serde(default)]
     pub characterization: Characterization,
-    /// The meshes that the scene names, as whoever read it has read them too. No part of the file.
+    /// The meshes that the scene names, supplied by the caller who read them. Not part of the file.
     #[serde(skip)]
     pub meshes: Meshes,
 }
@@ -101,7 +105,7 @@ fn one() -> u64 {
     1
 }
 
-/// A UST-20LX as its data sheet and the other defaults have it.
+/// A UST-20LX as given by its data sheet and the other defaults.
 fn ust_20lx() -> Scanner {
     Scanner {
         preset: Preset::Ust20lx,
@@ -115,7 +119,7 @@ fn ust_20lx() -> Scanner {
 }
 
 impl Scene {
-    /// Whether it holds nothing but what stands in the room, so that rays can be traced and nothing be recorded.
+    /// Whether the scene holds only what is fixed in the room, so that rays can be traced but nothing recorded.
     pub fn has_no_laboratory(&self) -> bool {
         let structure = &self.superstructure;
         let nothing_around =
@@ -123,12 +127,12 @@ impl Scene {
         nothing_around && self.board.is_empty() && self.flight.is_empty() && !self.room.has_walls()
     }
 
-    /// Whether flights are all that can be recorded, so that no walls are needed.
+    /// Whether only flights can be recorded, so that no walls are needed.
     pub fn only_flies(&self) -> bool {
         !self.flight.is_empty() && self.board.is_empty() && self.experiment.pose.is_empty()
     }
 
-    /// Every mesh that it names, with the key that does.
+    /// Every mesh that the scene names, with the key that names it.
     pub fn mesh_shapes(&self) -> Vec<(String, &MeshShape)> {
         let posts = self.superstructure.post.iter().enumerate();
         let posts = posts.filter_map(|(i, post)| match &post.shape {
@@ -143,7 +147,7 @@ impl Scene {
         posts.chain(surfaces).collect()
     }
 
-    /// The same meshes, to give them other files.
+    /// The same meshes, mutable, so that their files can be replaced.
     pub fn mesh_shapes_mut(&mut self) -> impl Iterator<Item = &mut MeshShape> {
         let posts = self.superstructure.post.iter_mut();
         let posts = posts.filter_map(|post| match &mut post.shape {

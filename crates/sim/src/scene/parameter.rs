@@ -1,20 +1,20 @@
-//! Numbers of a design with names and bounds.
+//! Named numbers of a design, with limits.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A number that other values of the scene are made from, and the limits within which it may be chosen. Its name says
-/// its unit: `reach_mm`. In a file `reach_mm = 64` is short for `reach_mm = { value = 64 }`, and any number of the scene
-/// may be an expression: `"= reach_mm + 5"`.
+/// A named number from which other values of the scene are computed, and the limits within which it may be chosen. Its
+/// name carries its unit: `reach_mm`. In a file, `reach_mm = 64` is short for `reach_mm = { value = 64 }`, and any
+/// number of the scene may be an expression: `"= reach_mm + 5"`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Parameter {
     /// The number.
     pub value: f64,
-    /// The least that it may be; only a parameter with both limits is searched.
+    /// Its minimum; only a parameter with both limits is searched.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub low: Option<f64>,
-    /// The most that it may be.
+    /// Its maximum.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub high: Option<f64>,
 }

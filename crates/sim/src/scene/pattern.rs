@@ -3,25 +3,25 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Copies of facets: each becomes a facet like any other before the scene is used ([`crate::pattern::expand`]).
+/// Copies of facets. Each becomes an ordinary facet before the scene is used ([`crate::build::pattern::expand`]).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Pattern {
-    /// One facet again and again around the scanner's axis.
+    /// One facet, repeated around the scanner's axis.
     Ring(Ring),
-    /// Facets as seen in a mirror.
+    /// Mirror images of facets.
     MirrorImage(MirrorImage),
-    /// Copies of one facet, one by one.
+    /// Copies of one facet, given one by one.
     List(CopyList),
 }
 
-/// A facet and its copies around the scanner's axis, each turned by one step more.
+/// A facet and its copies around the scanner's axis, each rotated by one more step.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Ring {
-    /// The facet that is copied; it is the first of the ring. The others are called NAME-2, NAME-3 …
+    /// The facet that is copied; it is the first of the ring. The others are named NAME-2, NAME-3 …
     pub of: String,
-    /// How many facets there are in the ring, the first among them.
+    /// Number of facets in the ring, including the first.
     #[schemars(range(min = 2, max = 360))]
     pub count: u32,
     /// Angle from one to the next, in degrees, counter-clockwise; 360°/count by default.
@@ -37,7 +37,7 @@ pub struct MirrorImage {
     /// The facets.
     #[schemars(length(min = 1))]
     pub of: Vec<String>,
-    /// What is exchanged; both one after the other is half a turn about x.
+    /// What is exchanged; both in succession are half a turn about x.
     #[schemars(length(min = 1, max = 2))]
     pub across: Vec<Exchange>,
     /// Names of the images in the same order; NAME-image by default.
@@ -55,7 +55,7 @@ pub enum Exchange {
     UpDown,
 }
 
-/// Copies of one facet, each with a name and a place of its own.
+/// Copies of one facet, each with its own name and pose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CopyList {
@@ -66,17 +66,17 @@ pub struct CopyList {
     pub copy: Vec<FacetCopy>,
 }
 
-/// A copy of a facet: first mirrored, then turned.
+/// A copy of a facet: first mirrored, then rotated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FacetCopy {
     /// Its name.
     pub name: String,
-    /// Turn about the scanner's axis, in degrees, counter-clockwise.
-    #[serde(default, skip_serializing_if = "super::superstructure::is_zero")]
+    /// Rotation about the scanner's axis, in degrees, counter-clockwise.
+    #[serde(default, skip_serializing_if = "super::omit::is_zero")]
     #[schemars(range(min = -360.0, max = 360.0))]
     pub turn_deg: f64,
-    /// What is exchanged before that.
+    /// What is exchanged before the rotation.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub across: Vec<Exchange>,
 }

@@ -8,14 +8,14 @@ use super::test::SensorTest;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A surface color as the scanner's light sees it.
+/// A surface color at the wavelength of the scanner.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Color {
     /// Share of the light that is scattered back, ρ_t.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub reflectivity: f64,
-    /// Noise of readings from it, instead of `errors.noise`.
+    /// Noise of readings of this color, instead of `errors.noise`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<NoiseTable>,
 }
@@ -26,16 +26,16 @@ pub struct Color {
 pub struct Board {
     /// Name, also its motion-capture subject.
     pub name: String,
-    /// Extent along its x axis, in millimetres.
+    /// Extent along its x axis, in millimeters.
     #[schemars(range(min = 10.0, max = 10000.0))]
     pub width_mm: f64,
-    /// Extent along its y axis, in millimetres.
+    /// Extent along its y axis, in millimeters.
     #[schemars(range(min = 10.0, max = 10000.0))]
     pub height_mm: f64,
     /// Color.
     #[serde(default = "white")]
     pub color: String,
-    /// Markers on its face; the first three are P_p1…P_p3. Without any, five are put near the edges.
+    /// Markers on its face; the first three are P_p1…P_p3. Without any, five are placed near the edges.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub marker: Vec<Marker>,
 }
@@ -44,30 +44,30 @@ fn white() -> String {
     "white".to_owned()
 }
 
-/// A box-shaped room and what stands in it; the room frame stands on the middle of the floor.
+/// A box-shaped room and its contents; the origin of the room frame is the center of the floor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Room {
-    /// Extents along x, y and z, in metres. Left out, as `trace` and flights allow, there are no walls.
+    /// Extents along x, y and z, in meters. If omitted, which `trace` and flights allow, there are no walls.
     #[serde(skip_serializing_if = "has_no_walls")]
     #[schemars(inner(range(min = 0.5, max = 100.0)))]
     pub size_m: [f64; 3],
     /// Color of walls, floor and ceiling.
     pub color: String,
-    /// Origin of the rig in the room, in metres.
+    /// Origin of the rig in the room, in meters.
     pub rig_position_m: [f64; 3],
     /// Yaw of the rig in the room, in degrees.
     #[schemars(range(min = -360.0, max = 360.0))]
     pub rig_yaw_deg: f64,
-    /// Mirrors that stand in the room by themselves.
+    /// Mirrors fixed in the room.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub mirror: Vec<RoomMirror>,
-    /// Surfaces that stand in the room by themselves.
+    /// Surfaces fixed in the room.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub surface: Vec<RoomSurface>,
 }
 
-/// A room of no size has no walls.
+/// A room without size has no walls.
 fn has_no_walls(size_m: &[f64; 3]) -> bool {
     *size_m == [0.0; 3]
 }
@@ -92,7 +92,7 @@ impl Default for Room {
     }
 }
 
-/// How good motion capture is.
+/// How accurate motion capture is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MocapProfile {
@@ -103,7 +103,7 @@ pub enum MocapProfile {
     Cooper,
     /// Exact.
     Ideal,
-    /// One's own: `mocap.marker`.
+    /// User-supplied: `mocap.marker`.
     Custom,
 }
 
@@ -111,10 +111,10 @@ pub enum MocapProfile {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MarkerNoise {
-    /// Constant while its body stays where it is, in millimetres.
+    /// Constant while its body does not move, in millimeters.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub constant_sd_mm: f64,
-    /// New in every frame, in millimetres.
+    /// Drawn anew in every motion-capture frame, in millimeters.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 100.0))]
     pub jitter_sd_mm: f64,
@@ -124,18 +124,18 @@ pub struct MarkerNoise {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mocap {
-    /// How good it is.
+    /// How accurate it is.
     pub profile: MocapProfile,
-    /// Errors of a marker, with the profile "custom".
+    /// Errors of a marker, for the profile "custom".
     #[serde(skip_serializing_if = "Option::is_none")]
     pub marker: Option<MarkerNoise>,
-    /// Whether the rig's markers are seen without any error: its place was surveyed by better means.
+    /// Whether the rig's markers are seen without any error, as if its pose had been surveyed by better means.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub rig_exact: bool,
     /// Frames per second.
     #[schemars(range(min = 1.0, max = 1000.0))]
     pub frame_rate_hz: f64,
-    /// Chance that a marker is not seen in a frame.
+    /// Probability that a marker is not seen in a frame.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub dropout: f64,
 }
@@ -156,71 +156,71 @@ impl Default for Mocap {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Experiment {
-    /// Board poses for every group of beams.
+    /// Number of board poses for every group of beams.
     #[schemars(range(min = 1, max = 1000))]
     pub poses_per_group: u32,
-    /// Scans at every pose.
+    /// Number of scans at every pose.
     #[schemars(range(min = 1, max = 1000000))]
     pub scans_per_pose: u32,
-    /// Widest group of beams that one board is set up for, in degrees of base azimuth.
+    /// Widest group of beams for which one board is set up, in degrees of base azimuth.
     #[schemars(range(min = 0.25, max = 270.0))]
     pub group_span_deg: f64,
-    /// Least and greatest tilt of a board against the beam it is set up for, in degrees.
+    /// Minimum and maximum tilt of a board against the beam for which it is set up, in degrees.
     #[schemars(inner(range(min = 0.0, max = 80.0)))]
     pub tilt_deg: [f64; 2],
-    /// Least and greatest distance of a board from the mirror, in metres; what the room allows.
+    /// Minimum and maximum distance of a board from the mirror, in meters, as far as the room allows.
     #[schemars(inner(range(min = 0.05, max = 100.0)))]
     pub range_m: [f64; 2],
-    /// Board poses before beams that no mirror deflects.
+    /// Number of board poses in front of beams that no mirror deflects.
     #[schemars(range(min = 0, max = 1000))]
     pub direct_poses: u32,
-    /// How board poses before facets are chosen.
+    /// How board poses in front of facets are chosen.
     #[serde(skip_serializing_if = "Design::is_even")]
     pub design: Design,
-    /// How well the distances to the bare structure are known, 1σ, in millimetres, if they are measured by other means
+    /// How well the distances to the bare structure are known, 1σ, in millimeters, if they are measured by means other
     /// than the scanner: one error for all beams of a facet. The bare structure is then not scanned.
     #[schemars(range(min = 0.0, max = 100.0))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bare_distance_sd_mm: Option<f64>,
-    /// Scans of the empty room.
+    /// Number of scans of the empty room.
     #[schemars(range(min = 1, max = 1000000))]
     pub room_scans: u32,
-    /// Scans of the bare structure.
+    /// Number of scans of the bare structure.
     #[schemars(range(min = 1, max = 1000000))]
     pub bare_scans: u32,
-    /// How far a person misses the place meant for a board, per axis, 1σ, in millimetres.
+    /// Error of a person in positioning a board, per axis, 1σ, in millimeters.
     #[schemars(range(min = 0.0, max = 500.0))]
     pub placement_sd_mm: f64,
-    /// How far a person misses the attitude meant for a board, per axis, 1σ, in degrees.
+    /// Error of a person in orienting a board, per axis, 1σ, in degrees.
     #[schemars(range(min = 0.0, max = 30.0))]
     pub placement_sd_deg: f64,
     /// Time between two stretches, in seconds.
     #[schemars(range(min = 0.0, max = 3600.0))]
     pub pause_s: f64,
-    /// Board poses given one by one. With any, none are chosen by the rules above.
+    /// Board poses given individually. If there are any, none are chosen by the rules above.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub pose: Vec<BoardPose>,
-    /// What goes wrong during the recording, which a calibration has to find out.
+    /// What goes wrong during the recording, which a calibration has to detect.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub mishap: Vec<Mishap>,
     /// Tests of the bare sensor: Cooper, step 1.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub test: Vec<SensorTest>,
-    /// How far a person misreads the edge of a spot on a board, 1σ, in millimetres (assumed); he notes whole tenths.
+    /// Error of a person in reading the edge of a spot on a board, 1σ, in millimeters (assumed); noted in whole tenths.
     #[schemars(range(min = 0.0, max = 100.0))]
     #[serde(skip_serializing_if = "is_default_spot_reading")]
     pub spot_sd_mm: f64,
 }
 
-/// How board poses before facets are chosen.
+/// How board poses in front of facets are chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Design {
-    /// As a careful person does: the direction of tilt goes round evenly, every board catches its whole group.
+    /// As a careful person does: the direction of tilt rotates evenly, and every board catches its whole group.
     #[default]
     Even,
-    /// By chance: a board is aimed at any beam of its group, with any direction of tilt, and any tilt and distance
-    /// within their bounds; it catches what it catches.
+    /// At random: a board is aimed at any beam of its group, with any direction of tilt, and any tilt and distance
+    /// within their bounds; it catches whatever beams hit it.
     Random,
 }
 
@@ -230,7 +230,7 @@ impl Design {
     }
 }
 
-/// The default keeps out of files: a scene without tests has no use for it.
+/// The default is omitted from files: a scene without tests does not need it.
 fn is_default_spot_reading(sd: &f64) -> bool {
     *sd == SPOT_SD_MM
 }
@@ -244,14 +244,14 @@ const SPOT_SD_MM: f64 = 0.25;
 pub struct BoardPose {
     /// The board.
     pub board: String,
-    /// Facet in whose fan it stands; none for a board before undeflected beams.
+    /// Facet in whose fan it is; none for a board in front of undeflected beams.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub facet: Option<String>,
-    /// Center of its face, in metres.
+    /// Center of its face, in meters.
     pub center_m: [f64; 3],
     /// Normal of its face; any length.
     pub normal: [f64; 3],
-    /// Turn about the normal, in degrees; at 0 the board's x axis is horizontal.
+    /// Rotation about the normal, in degrees; at 0 the board's x axis is horizontal.
     #[serde(default)]
     #[schemars(range(min = -360.0, max = 360.0))]
     pub turn_deg: f64,

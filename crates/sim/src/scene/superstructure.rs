@@ -1,7 +1,8 @@
-//! What is built around the scanner: mirrors, posts, markers, and how far they are from the drawing.
+//! What is built around the scanner: mirrors, posts, markers, and their deviations from the drawing.
 
-use super::body::PostShape;
+use super::omit::{is_false, is_zero};
 use super::pattern::Pattern;
+use super::shape::PostShape;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -24,10 +25,10 @@ pub struct Superstructure {
     /// The mirror material.
     #[serde(default)]
     pub mirror: Mirror,
-    /// How far the structure as built departs from the drawing.
+    /// Deviations of the structure as built from the drawing.
     #[serde(default)]
     pub as_built: AsBuilt,
-    /// Mirrors that a beam may meet in a row.
+    /// Maximum number of mirrors that a beam may hit in succession.
     #[serde(default = "four")]
     #[schemars(range(min = 1, max = 8))]
     pub max_bounces: u32,
@@ -51,14 +52,6 @@ impl Default for Superstructure {
     }
 }
 
-pub(super) fn is_false(value: &bool) -> bool {
-    !value
-}
-
-pub(super) fn is_zero(value: &f64) -> bool {
-    *value == 0.0
-}
-
 /// A plane mirror.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -76,9 +69,9 @@ pub struct Facet {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum FacetShape {
-    /// Cut by two azimuths and two heights, and turned so that its middle beam leaves in a wanted direction.
+    /// Bounded by two azimuths and two heights, and oriented so that its middle beam leaves in a given direction.
     Wedge(Wedge),
-    /// A rectangle about one beam, turned so that it leaves in a wanted direction, or with a given normal.
+    /// A rectangle around one beam, oriented so that the beam leaves in a given direction, or with a given normal.
     Plate(Plate),
     /// A rectangle with a given center and normal.
     Rectangle(RectangleShape),
@@ -91,9 +84,9 @@ pub enum FacetShape {
 #[serde(deny_unknown_fields)]
 pub struct Wedge {
     /// First and last azimuth, in degrees, the smaller first.
-    #[schemars(inner(range(min = -180.0, max = 180.0)))]
+    #[schemars(inner(range(min = -360.0, max = 360.0)))]
     pub azimuth_deg: [f64; 2],
-    /// Distance from the sensor origin along the middle azimuth, in millimetres.
+    /// Distance from the sensor origin along the middle azimuth, in millimeters.
     #[schemars(range(min = 1.0, max = 10000.0))]
     pub distance_mm: f64,
     /// Azimuth in which the middle beam leaves, in degrees.
@@ -102,24 +95,24 @@ pub struct Wedge {
     /// Elevation in which the middle beam leaves, in degrees.
     #[schemars(range(min = -90.0, max = 90.0))]
     pub exit_elevation_deg: f64,
-    /// Height over which the facet reaches, centered on the scan plane, in millimetres.
+    /// Height of the facet, centered on the scan plane, in millimeters.
     #[schemars(range(min = 0.1, max = 10000.0))]
     pub height_mm: f64,
 }
 
-/// A rectangle about one beam: `azimuth_deg` or `beam`, and either both `exit_` or both `normal_` angles.
+/// A rectangle around one beam: `azimuth_deg` or `beam`, and either both `exit_` or both `normal_` angles.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Plate {
-    /// Azimuth of the beam that meets its center, in degrees.
+    /// Azimuth of the beam that hits its center, in degrees.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -180.0, max = 180.0))]
     pub azimuth_deg: Option<f64>,
     /// The same beam by its index.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = 0, max = 1080))]
+    #[schemars(range(min = 0, max = 35999))]
     pub beam: Option<u32>,
-    /// Distance from the sensor origin to its center, in millimetres.
+    /// Distance from the sensor origin to its center, in millimeters.
     #[schemars(range(min = 1.0, max = 10000.0))]
     pub distance_mm: f64,
     /// Azimuth in which that beam leaves, in degrees.
@@ -138,10 +131,10 @@ pub struct Plate {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -90.0, max = 90.0))]
     pub normal_elevation_deg: Option<f64>,
-    /// Extent parallel to the scan plane, in millimetres.
+    /// Extent parallel to the scan plane, in millimeters.
     #[schemars(range(min = 0.1, max = 10000.0))]
     pub width_mm: f64,
-    /// Extent along the other side, in millimetres.
+    /// Extent along the other side, in millimeters.
     #[schemars(range(min = 0.1, max = 10000.0))]
     pub height_mm: f64,
 }
@@ -150,14 +143,14 @@ pub struct Plate {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RectangleShape {
-    /// Center, in millimetres.
+    /// Center, in millimeters.
     pub center_mm: [f64; 3],
     /// Normal of the reflecting side; any length.
     pub normal: [f64; 3],
-    /// Extent parallel to the scan plane, in millimetres.
+    /// Extent parallel to the scan plane, in millimeters.
     #[schemars(range(min = 0.1, max = 10000.0))]
     pub width_mm: f64,
-    /// Extent along the other side, in millimetres.
+    /// Extent along the other side, in millimeters.
     #[schemars(range(min = 0.1, max = 10000.0))]
     pub height_mm: f64,
 }
@@ -166,7 +159,7 @@ pub struct RectangleShape {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PolygonShape {
-    /// Corners of a convex plane polygon, in millimetres, counter-clockwise seen from the reflecting side.
+    /// Corners of a convex plane polygon, in millimeters, counter-clockwise seen from the reflecting side.
     #[schemars(length(min = 3))]
     pub corners_mm: Vec<[f64; 3]>,
 }
@@ -177,20 +170,20 @@ pub struct PolygonShape {
 pub struct Post {
     /// Name.
     pub name: String,
-    /// Origin of its own frame, in millimetres; the center of a box or cylinder.
+    /// Origin of its own frame, in millimeters; the center of a box or cylinder.
     pub center_mm: [f64; 3],
-    /// Extents of a box along its own x, y and z, in millimetres.
+    /// Extents of a box along its own x, y and z, in millimeters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(inner(inner(range(min = 0.01, max = 10000.0))))]
     pub size_mm: Option<[f64; 3]>,
-    /// What it is instead of a box.
+    /// Its shape, if it is not a box.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape: Option<PostShape>,
-    /// Turn about z, in degrees.
+    /// Rotation about z, in degrees.
     #[serde(default)]
     #[schemars(range(min = -360.0, max = 360.0))]
     pub yaw_deg: f64,
-    /// Pitch, in degrees: yaw, pitch and roll follow one another about the body's own z, y and x.
+    /// Pitch, in degrees: yaw, pitch and roll are applied in succession about the body's own z, y and x.
     #[serde(default, skip_serializing_if = "is_zero")]
     #[schemars(range(min = -360.0, max = 360.0))]
     pub pitch_deg: f64,
@@ -207,13 +200,13 @@ fn structure() -> String {
     "structure".to_owned()
 }
 
-/// A labelled marker.
+/// A labeled marker.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Marker {
     /// Label.
     pub name: String,
-    /// Place in its body's frame, in millimetres.
+    /// Position in the frame of its body, in millimeters.
     pub position_mm: [f64; 3],
 }
 
@@ -221,23 +214,23 @@ pub struct Marker {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mirror {
-    /// Share of the light that is reflected, paid on the way out and on the way back.
+    /// Share of the light that is reflected; it applies to the outgoing and again to the returning light.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub reflectivity: f64,
-    /// Thickness between the bare structure and the reflecting face, in millimetres.
+    /// Thickness between the bare structure and the reflecting face, in millimeters.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub thickness_mm: f64,
-    /// Glass before the reflecting surface; without it, the mirrors are front-surface mirrors. The drawing then shows
-    /// the front of the glass.
+    /// Glass in front of the reflecting surface; without it, the mirrors are front-surface mirrors. The drawing then
+    /// shows the front of the glass.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub glass: Option<Glass>,
-    /// Share of the light that dust and scratches of a mirror scatter, as a Lambertian surface in its place would.
+    /// Share of the light that dust and scratches on a mirror scatter, as a Lambertian surface in its place would.
     #[serde(skip_serializing_if = "is_zero")]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub diffuse_reflectivity: f64,
 }
 
-/// Glass before the reflecting surface of a mirror.
+/// Glass in front of the reflecting surface of a mirror.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Glass {
@@ -245,10 +238,10 @@ pub struct Glass {
     #[serde(default = "float_glass")]
     #[schemars(range(min = 1.0, max = 4.0))]
     pub index: f64,
-    /// Thickness, in millimetres.
+    /// Thickness, in millimeters.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub thickness_mm: f64,
-    /// Whether the front of the glass reflects too: Fresnel's share, a second and weaker way of the light.
+    /// Whether the front of the glass reflects too: the Fresnel share, along a second, weaker path.
     #[serde(default, skip_serializing_if = "is_false")]
     pub ghost: bool,
 }
@@ -268,20 +261,20 @@ impl Default for Mirror {
     }
 }
 
-/// How far the structure as built departs from the drawing, 1σ.
+/// Deviations of the structure as built from the drawing, 1σ.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AsBuilt {
-    /// Turn of a facet about each axis, in degrees.
+    /// Rotation of a facet about each axis, in degrees.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub tilt_sd_deg: f64,
-    /// Shift of a facet along each axis, in millimetres.
+    /// Shift of a facet along each axis, in millimeters.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub shift_sd_mm: f64,
-    /// Root mean square of the slope of a facet's surface about its plane, in milliradians (assumed).
+    /// Root mean square of the slope of a facet's surface relative to its plane, in milliradians (assumed).
     #[schemars(range(min = 0.0, max = 50.0))]
     pub slope_rms_mrad: f64,
-    /// Departure of a mirror's thickness from `mirror.thickness_mm`, in millimetres: its face is then that much farther
+    /// Deviation of a mirror's thickness from `mirror.thickness_mm`, in millimeters: its face is then that much farther
     /// from the bare structure.
     #[serde(skip_serializing_if = "is_zero")]
     #[schemars(range(min = 0.0, max = 20.0))]

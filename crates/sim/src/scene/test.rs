@@ -4,32 +4,33 @@ use catoptric_model::TestKind;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Boards before one undeflected beam: every board at every distance under every incidence, several times over.
+/// Boards in front of one undeflected beam: every board at every distance and every incidence, several times.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SensorTest {
-    /// What it is for.
+    /// Purpose of the test.
     #[schemars(with = "TestKindSchema")]
     pub kind: TestKind,
-    /// The boards, one after the other.
+    /// The boards, one after another.
     #[schemars(length(min = 1))]
     pub board: Vec<String>,
-    /// Distances from the drawn sensor to the center of the board, in metres.
+    /// Distances from the sensor as drawn to the center of the board, in meters.
     #[schemars(length(min = 1), inner(range(min = 0.05, max = 100.0)))]
     pub range_m: Vec<f64>,
-    /// Angles between the board's normal and the beam, in degrees; negative ones turn it the other way.
+    /// Angles between the board's normal and the beam, in degrees; negative ones turn it in the opposite direction.
     #[serde(default = "face_on")]
     #[schemars(length(min = 1), inner(range(min = -80.0, max = 80.0)))]
     pub incidence_deg: Vec<f64>,
-    /// Where to a positive incidence turns the normal, seen along the beam: 0 to growing azimuth, 90 up.
+    /// Direction in which a positive incidence turns the normal, seen along the beam: 0 toward increasing azimuth, 90
+    /// up.
     #[serde(default)]
     #[schemars(range(min = -180.0, max = 180.0))]
     pub direction_deg: f64,
     /// Azimuth of the beam, in degrees.
     #[serde(default)]
-    #[schemars(range(min = -135.0, max = 135.0))]
+    #[schemars(range(min = -360.0, max = 360.0))]
     pub azimuth_deg: f64,
-    /// How often each setting is set up and recorded.
+    /// Number of times that each setting is set up and recorded.
     #[serde(default = "once")]
     #[schemars(range(min = 1, max = 1000))]
     pub trials: u32,
@@ -43,18 +44,18 @@ fn once() -> u32 {
     1
 }
 
-/// What is tested of the bare sensor.
+/// What is tested on the bare sensor.
 #[derive(JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(rename = "TestKind")]
-#[allow(dead_code)] // Read by the schema generator alone: the model crate knows no schemas.
+#[allow(dead_code)] // Read by the schema generator alone: the model crate has no schemas.
 enum TestKindSchema {
-    /// Size of the spot over the distance: Figures 2 and 3, Table 1.
+    /// Size of the spot as a function of distance: Figures 2 and 3, Table 1.
     Spot,
-    /// Mean error and spread over the distance: Table 2.
+    /// Mean error and spread as a function of distance: Table 2.
     Distance,
-    /// Error over the incidence: Figure 4, Table 3.
+    /// Error as a function of incidence: Figure 4, Table 3.
     Angle,
-    /// Error and spread over color and distance: Table 4.
+    /// Error and spread as a function of color and distance: Table 4.
     Color,
 }

@@ -1,0 +1,445 @@
+//! Tests of scores: the truth has no error, known errors yield the expected figures, and every element is counted once.
+
+use super::element::wrap;
+use super::*;
+use catoptric_fixtures::{noisy, perfect, sample, turned};
+use catoptric_model::{BeamEstimate, Status};
+use nalgebra::Vector3;
+
+fn estimate(calibration: &mut Calibration, beam: usize) -> &mut BeamEstimate {
+    &mut calibration.beams[beam]
+}
+
+/// The first deflected, unsplit beams.
+fn deflected(truth: &Truth) -> Vec<usize> {
+    let of = |b: &&catoptric_sim::truth::TrueBeam| b.status == BeamClass::Deflected;
+    truth.beams.iter().filter(of).map(|b| b.beam).collect()
+}
+
+#[test]
+fn the_truth_itself_has_no_error_and_passes() {
+    let s = sample();
+    let score = score(&s.dataset, &perfect(&s.truth), Some(&s.truth)).expect("in memory");
+    assert_eq!(score.verdict, Verdict::Pass, "{:?}", score.warnings);
+    let deflected = deflected(&s.truth).len();
+    assert!(deflected > 300);
+    assert_eq!(
+        score.beams,
+        BeamCounts {
+            deflected: Some(deflected),
+            solved: deflected,
+            abstained: 0,
+            missed: Some(0),
+            wrong: Some(0)
+        }
+    );
+    assert_eq!(score.direction_deg.max, 0.0);
+    assert_eq!(score.per_axis_rms_deg, 0.0);
+    assert_eq!(score.distance_mm.max, 0.0);
+    assert_eq!(score.point_mm.at_10m, 0.0);
+    assert_eq!((score.nees_mean, score.coverage_95), (0.0, 1.0));
+    assert!(score.common_mode_deg < 1e-12);
+    // The mean of the tracked poses is rounded, so the room frame agrees only up to rounding.
+    assert!(score.per_axis_rms_room_deg < 1e-12 && score.point_room_mm.at_10m < 1e-10);
+    assert!(score.crlb_per_axis_deg > 0.001 && score.crlb_per_axis_deg < 1.0);
+    // Readings are exact, so points are on boards and walls.
+    assert!(score.boards_mm.stretches == 48 && score.boards_mm.rms < 1e-9);
+    assert!(score.walls_mm.elements == deflected && score.walls_mm.rms < 1e-9);
+}
+
+#[test]
+fn a_common_rotation_appears_only_in_the_common_mode() {
+    let s = sample();
+    let angle = 0.5_f64.to_radians();
+    let score = score(&s.dataset, &turned(perfect(&s.truth), angle), Some(&s.truth)).expect("in memory");
+    assert!((score.common_mode_deg - 0.5).abs() < 1e-12);
+    assert!(score.differential_per_axis_rms_deg < 1e-12);
+    assert!(score.per_axis_rms_deg > 0.1);
+    assert!(score.direction_deg.max <= 0.5 + 1e-12);
+    assert!(
+        score
+            .warnings
+            .iter()
+            .any(|w| w.starts_with("common mode dominates"))
+    );
+}
+
+#[test]
+fn a_wrong_mounting_shows_in_the_room_only() {
+    let s = sample();
+    let mut calibration = perfect(&s.truth);
+    let mount = calibration.rig_from_sensor.as_mut().expect("it has one");
+    let off = mount.pose()
+        * Pose::from_parts(
+            nalgebra::Translation3::new(0.0, 0.0, 0.003),
+            nalgebra::UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 0.01),
+        );
+    let data = catoptric_model::PoseData::from(&off);
+    mount.translation_m = data.translation_m;
+    mount.rotation_xyzw = data.rotation_xyzw;
+    let with = score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory");
+    assert_eq!(with.per_axis_rms_deg, 0.0);
+    assert!((with.common_mode_room_deg - 0.01_f64.to_degrees()).abs() < 1e-10);
+    assert!(with.point_room_mm.at_1m > 3.0);
+
+    calibration.rig_from_sensor = None;
+    let without = score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory");
+    assert!(without.per_axis_rms_room_deg.is_nan());
+    assert_eq!(
+        without.nulls["per_axis_rms_room_deg"],
+        "the calibration has no rig_from_sensor"
+    );
+}
+
+#[test]
+fn figures_follow_the_formulas() {
+    // Two elements with given errors.
+    let s = sample();
+    let mut calibration = perfect(&s.truth);
+    let beams = deflected(&s.truth);
+    for &b in &beams[2..] {
+        *estimate(&mut calibration, b) =
+            BeamEstimate::without_angles(b, Status::Rejected, Some("left out".to_owned()));
+    }
+    let [a, b] = [beams[0], beams[1]];
+    let error = [[3e-4, 0.0], [0.0, 4e-4]];
+    let covariance = [[1e-8, 0.0], [0.0, 4e-8]];
+    let mut squares = 0.0;
+    for (beam, [theta, phi]) in [a, b].into_iter().zip(error) {
+        let e = estimate(&mut calibration, beam);
+        squares += (theta * e.elevation_rad.expect("solved").cos()).powi(2) + phi * phi;
+        e.azimuth_rad = e.azimuth_rad.map(|x| x + theta);
+        e.elevation_rad = e.elevation_rad.map(|x| x + phi);
+        e.covariance_rad2 = Some(covariance);
+    }
+    estimate(&mut calibration, a).distance_m = s.truth.beams[a].distance_m.map(|d| d + 3e-3);
+    estimate(&mut calibration, b).distance_m = s.truth.beams[b].distance_m.map(|d| d - 4e-3);
+    let score = score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory");
+    let per_axis = (squares / 4.0).sqrt().to_degrees();
+    assert!((score.per_axis_rms_deg - per_axis).abs() < 1e-12);
+    assert!((score.direction_deg.rms - per_axis * 2.0_f64.sqrt()).abs() < 1e-7);
+    // eᵀP⁻¹e is 9 for the first and 4 for the second: the mean over two dimensions is (9 + 4)/4, one of two is inside.
+    assert!((score.nees_mean - 13.0 / 4.0).abs() < 1e-9);
+    assert_eq!(score.coverage_95, 0.5);
+    assert!((score.distance_mm.rms - 12.5_f64.sqrt()).abs() < 1e-9);
+    assert!((score.distance_mm.max - 4.0).abs() < 1e-9);
+    assert_eq!(score.beams.abstained, beams.len() - 2);
+    // ‖δP + s·δv‖² is quadratic in s: mean δd², 2s times a cross term, s² times the mean squared chord.
+    let p = &score.point_mm;
+    let chord = squares / 2.0 * 1e6;
+    let cross = p.at_1m.powi(2) - 12.5 - chord;
+    for (s, found) in [(4.0, p.at_4m), (10.0, p.at_10m)] {
+        let expected = 12.5 + s * cross + s * s * chord;
+        assert!((found.powi(2) - expected).abs() < 1e-3 * expected, "{s} m");
+    }
+    let bounds = bound::knowable(&s.dataset, &s.truth).expect("in memory").limits;
+    let trace = mean([a, b].iter().map(|beam| {
+        let c = s.truth.beams[*beam].elevation_rad.expect("deflected").cos();
+        bounds[beam][(0, 0)] * c * c + bounds[beam][(1, 1)]
+    }));
+    assert!((score.efficiency - trace / (squares / 2.0)).abs() < 1e-12 * score.efficiency);
+}
+
+#[test]
+fn an_honest_covariance_is_judged_honest() {
+    let s = sample();
+    let score = score(&s.dataset, &noisy(&s.truth, 1e-3, 3), Some(&s.truth)).expect("in memory");
+    // About 450 independent elements: the mean of χ²₂/2 scatters by 1/√450 = 0.05; four of those.
+    assert!((score.nees_mean - 1.0).abs() < 0.2, "{}", score.nees_mean);
+    assert!((score.coverage_95 - 0.95).abs() < 0.05, "{}", score.coverage_95);
+    assert!((score.per_axis_rms_deg - 1e-3_f64.to_degrees()).abs() < 0.1 * 1e-3_f64.to_degrees());
+    assert!(score.common_mode_deg < 0.3 * score.per_axis_rms_deg);
+    assert_eq!(score.verdict, Verdict::Pass, "{:?}", score.warnings);
+    assert!(score.boards_mm.rms > 0.1 && score.walls_mm.rms > 0.1);
+}
+
+#[test]
+fn a_covariance_a_tenth_too_small_per_axis_fails() {
+    let s = sample();
+    let mut calibration = noisy(&s.truth, 1e-3, 3);
+    for b in &mut calibration.beams {
+        b.covariance_rad2 = b.covariance_rad2.map(|c| c.map(|row| row.map(|x| x / 100.0)));
+    }
+    let score = score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory");
+    assert_eq!(score.verdict, Verdict::Fail);
+    assert!(score.warnings[0].starts_with("fails: over-confident: errors are "));
+    assert!((score.nees_mean - 100.0).abs() < 20.0);
+}
+
+/// A calibration with known errors whose covariance is `factor` times what it should be.
+fn stated(truth: &Truth, factor: f64) -> Calibration {
+    let mut calibration = noisy(truth, 1e-3, 3);
+    for b in &mut calibration.beams {
+        b.covariance_rad2 = b.covariance_rad2.map(|c| c.map(|row| row.map(|x| x * factor)));
+    }
+    calibration
+}
+
+#[test]
+fn honesty_is_reported_with_its_size() {
+    let s = sample();
+    let of = |calibration: &Calibration, truth| score(&s.dataset, calibration, truth).expect("in memory");
+    let honest = of(&stated(&s.truth, 1.0), Some(&s.truth));
+    assert_eq!(honest.honesty, Some(Honesty::Honest));
+    assert!(!honest.warnings.iter().any(|w| w.contains("-confident")));
+    let under = of(&stated(&s.truth, 25.0), Some(&s.truth));
+    assert_eq!(under.honesty, Some(Honesty::UnderConfident));
+    assert!(
+        under
+            .warnings
+            .iter()
+            .any(|w| w.starts_with("under-confident: errors are 0.2"))
+    );
+    // Errors of 1 under a covariance of (1/8)², with the scatter of some 400 elements.
+    let over = of(&stated(&s.truth, 1.0 / 64.0), Some(&s.truth));
+    assert_eq!(
+        (over.honesty, over.verdict),
+        (Some(Honesty::OverConfident), Verdict::Fail)
+    );
+    let times: f64 = over.warnings[0]
+        .split("errors are ")
+        .nth(1)
+        .and_then(|rest| rest.split(' ').next()?.parse().ok())
+        .expect("the warning states a factor");
+    assert!((times - 8.0).abs() < 0.5, "{}", over.warnings[0]);
+    assert_eq!(
+        over.warnings
+            .iter()
+            .filter(|w| w.contains("over-confident"))
+            .count(),
+        1
+    );
+    assert_eq!(
+        of(&stated(&s.truth, 1.0 / 4.0), Some(&s.truth)).verdict,
+        Verdict::Pass
+    );
+    for (not_judged, reason) in [
+        (of(&stated(&s.truth, 1.0), None), "there is no truth"),
+        (
+            of(&perfect(&s.truth), Some(&s.truth)),
+            "the errors are only numerical",
+        ),
+    ] {
+        assert_eq!(not_judged.honesty, None);
+        assert_eq!(not_judged.nulls["honesty"], reason);
+    }
+}
+
+#[test]
+fn abstaining_is_correct_where_the_boards_leave_elements_open() {
+    let s = sample();
+    let mut dataset = s.dataset.clone();
+    // No board in front of any mirror.
+    dataset
+        .poses
+        .retain(|p| p.label.kind != catoptric_model::PoseKind::Facet);
+    let all = deflected(&s.truth).len();
+    let mut abstaining = perfect(&s.truth);
+    for b in abstaining.beams.iter_mut().filter(|b| b.status == Status::Solved) {
+        *b = BeamEstimate::without_angles(b.beam, Status::TooFewPoses, Some("no board".to_owned()));
+    }
+    let right = score(&dataset, &abstaining, Some(&s.truth))
+        .expect("in memory")
+        .with_limit(0.1);
+    let counts = |abstained, solved, wrong| {
+        Some(OpenCounts {
+            elements: all,
+            abstained,
+            solved,
+            wrong,
+        })
+    };
+    assert_eq!((right.verdict, right.open), (Verdict::Pass, counts(all, 0, 0)));
+    assert!(
+        right
+            .warnings
+            .iter()
+            .any(|w| w.starts_with("the limit of 0.1° was not tested"))
+    );
+    // Where nothing is open the same abstentions do not reach the limit.
+    let needless = score(&s.dataset, &abstaining, Some(&s.truth))
+        .expect("in memory")
+        .with_limit(0.1);
+    assert_eq!(
+        (needless.verdict, needless.open.map(|o| o.elements)),
+        (Verdict::Fail, Some(0))
+    );
+    // Who knows more than the boards may solve; who claims more than he knows is wrong.
+    let knows = score(&dataset, &noisy(&s.truth, 1e-3, 3), Some(&s.truth)).expect("in memory");
+    assert_eq!(knows.verdict, Verdict::Pass, "{:?}", knows.warnings);
+    assert!(knows.open.is_some_and(|o| o.solved == all && o.wrong <= 3));
+    let claims = score(&dataset, &stated(&s.truth, 1e-4), Some(&s.truth)).expect("in memory");
+    assert!(claims.open.is_some_and(|o| 2 * o.wrong > o.solved));
+    assert!(
+        claims
+            .warnings
+            .iter()
+            .any(|w| w.starts_with("fails: ") && w.contains("left open by the boards")),
+        "{:?}",
+        claims.warnings
+    );
+}
+
+#[test]
+fn without_a_mirror_there_is_nothing_to_judge() {
+    let s = sample();
+    let mut truth = s.truth.clone();
+    for b in &mut truth.beams {
+        b.status = BeamClass::Direct;
+    }
+    let nothing_solved = Calibration {
+        beams: Vec::new(),
+        ..perfect(&s.truth)
+    };
+    let score_of =
+        |calibration: &Calibration| score(&s.dataset, calibration, Some(&truth)).expect("in memory");
+    let nothing = score_of(&nothing_solved);
+    assert_eq!(
+        (nothing.verdict, nothing.beams.deflected),
+        (Verdict::Blind, Some(0))
+    );
+    assert!(nothing.warnings[0].ends_with("there is nothing to judge"));
+    // A direction for a beam that no mirror deflects is false.
+    let solved = perfect(&s.truth);
+    assert_eq!(score_of(&solved).verdict, Verdict::Fail);
+}
+
+#[test]
+fn a_covariance_of_zero_is_infinitely_dishonest() {
+    let s = sample();
+    let mut calibration = noisy(&s.truth, 1e-3, 3);
+    let beam = deflected(&s.truth)[0];
+    estimate(&mut calibration, beam).covariance_rad2 = Some([[0.0; 2]; 2]);
+    let score = score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory");
+    assert_eq!(score.verdict, Verdict::Fail);
+    let json = serde_json::to_value(&score).expect("it is JSON");
+    assert!(json["nees_mean"].is_null());
+    assert!(
+        json["nulls"]["nees_mean"]
+            .as_str()
+            .is_some_and(|r| r.starts_with("infinite"))
+    );
+}
+
+#[test]
+fn every_deflected_element_is_solved_abstained_or_missed() {
+    let s = sample();
+    let beams = deflected(&s.truth);
+    let mut calibration = perfect(&s.truth);
+    let without =
+        |b, status, reason: Option<&str>| BeamEstimate::without_angles(b, status, reason.map(str::to_owned));
+    *estimate(&mut calibration, beams[0]) = without(beams[0], Status::Unobservable, Some("one tilt axis"));
+    *estimate(&mut calibration, beams[1]) = without(beams[1], Status::Unobservable, None);
+    *estimate(&mut calibration, beams[2]) = without(beams[2], Status::Direct, None);
+    estimate(&mut calibration, beams[3]).azimuth_rad = Some(f64::NAN);
+    // As the entry of another beam, this element is absent and the direct beam 540 is called solved.
+    estimate(&mut calibration, beams[4]).beam = 540;
+    calibration.beams.remove(540);
+    let score = score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory");
+    let counts = score.beams;
+    assert_eq!(counts.deflected, Some(beams.len()));
+    assert_eq!(
+        (counts.abstained, counts.missed, counts.wrong),
+        (1, Some(4), Some(1))
+    );
+    assert_eq!(counts.solved, beams.len() - 5);
+    assert_eq!(score.verdict, Verdict::Fail);
+    assert_eq!(score.statuses["absent"], 1);
+    assert_eq!(score.statuses["unobservable"], 2);
+    assert!(score.scored().all(|e| !beams[..5].contains(&e.beam)));
+}
+
+#[test]
+fn split_elements_are_reported_separately() {
+    let s = sample();
+    let mut calibration = perfect(&s.truth);
+    let split = s
+        .truth
+        .beams
+        .iter()
+        .find(|b| b.status == BeamClass::Split)
+        .expect("there are edges");
+    *estimate(&mut calibration, split.beam) = BeamEstimate {
+        azimuth_rad: split.azimuth_rad,
+        elevation_rad: split.elevation_rad.map(|e| e + 0.1),
+        ..BeamEstimate::without_angles(split.beam, Status::Solved, None)
+    };
+    let score = score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory");
+    assert_eq!(score.per_axis_rms_deg, 0.0);
+    assert_eq!((score.verdict, score.split.solved), (Verdict::Pass, 1));
+    assert!((score.split.per_axis_rms_deg - (0.1_f64 / 2.0_f64.sqrt()).to_degrees()).abs() < 1e-9);
+}
+
+#[test]
+fn without_truth_the_score_is_blind() {
+    let s = sample();
+    let score = score(&s.dataset, &noisy(&s.truth, 1e-3, 5), None)
+        .expect("in memory")
+        .with_limit(0.1);
+    assert_eq!(score.verdict, Verdict::Blind);
+    assert!(score.boards_mm.rms > 0.1);
+    let json = serde_json::to_value(&score).expect("it is JSON");
+    assert!(json["beams"]["missed"].is_null() && json["per_axis_rms_deg"].is_null());
+    assert_eq!(json["nulls"]["per_axis_rms_deg"], "there is no truth");
+    assert_eq!(json["verdict"], "blind");
+}
+
+#[test]
+fn the_limit_decides() {
+    let s = sample();
+    let calibration = noisy(&s.truth, 1e-3, 3);
+    let verdict = |limit| {
+        score(&s.dataset, &calibration, Some(&s.truth))
+            .expect("in memory")
+            .with_limit(limit)
+            .verdict
+    };
+    assert_eq!(verdict(0.07), Verdict::Pass);
+    assert_eq!(verdict(0.04), Verdict::Fail);
+}
+
+#[test]
+fn json_has_the_keys_of_the_interface() {
+    let s = sample();
+    let score = score(&s.dataset, &noisy(&s.truth, 1e-3, 3), Some(&s.truth)).expect("in memory");
+    let json = serde_json::to_value(&score).expect("it is JSON");
+    for (key, inner) in [
+        ("schema_version", &[][..]),
+        ("verdict", &[]),
+        ("beams", &["deflected", "solved", "abstained", "missed", "false"]),
+        ("direction_deg", &["rms", "median", "p95", "max"]),
+        ("direction_room_deg", &["rms", "median", "p95", "max"]),
+        ("per_axis_rms_deg", &[]),
+        ("per_axis_rms_room_deg", &[]),
+        ("common_mode_deg", &[]),
+        ("distance_mm", &["rms", "max"]),
+        ("point_mm", &["at_1m", "at_4m", "at_10m"]),
+        ("nees_mean", &[]),
+        ("coverage_95", &[]),
+        ("crlb_per_axis_deg", &[]),
+        ("efficiency", &[]),
+        ("warnings", &[]),
+    ] {
+        assert!(!json[key].is_null(), "{key}");
+        for inner in inner {
+            assert!(json[key][inner].is_number(), "{key}.{inner}");
+        }
+    }
+    assert!(json.get("elements").is_none());
+    assert_eq!(json["honesty"], "honest");
+    assert_eq!(json["open"]["elements"], 0);
+    assert_eq!(
+        json["nulls"].as_object().map(serde_json::Map::len),
+        Some(2),
+        "{}",
+        json["nulls"]
+    );
+}
+
+#[test]
+fn azimuth_differences_wrap_around_the_circle() {
+    use std::f64::consts::PI;
+    assert_eq!(wrap(0.3), 0.3);
+    assert!((wrap(2.0 * PI - 1e-3) + 1e-3).abs() < 1e-15);
+    assert!((wrap(-2.0 * PI + 1e-3) - 1e-3).abs() < 1e-15);
+}

@@ -1,0 +1,126 @@
+//! Validation of a `calibration.json` from any source: whether it is well formed and physically plausible.
+
+mod element;
+mod problem;
+mod sane;
+mod shared;
+
+use catoptric_model::ScanGeometry;
+use catoptric_model::calibration::{self, Calibration};
+use element::check_element;
+use problem::Problems;
+use shared::{check_bias, check_facet, check_mount};
+use std::collections::BTreeSet;
+use std::f64::consts::PI;
+
+pub use problem::{Problem, Severity};
+
+/// Maximum distance of a mirror from the scanner, in meters; larger values are probably millimeters.
+pub const MIRROR_DISTANCE_M: f64 = 10.0;
+
+/// Minimum and maximum plausible standard deviation of an angle, in radians: a millionth of the smallest ever measured,
+/// and half a turn, which is no information at all.
+pub const ANGLE_SD_RAD: [f64; 2] = [1e-10, PI];
+
+/// Hexadecimal digits of a SHA-256.
+const SHA256_DIGITS: usize = 64;
+
+/// Everything wrong with a calibration, in the order of the file; nothing if it is sound.
+///
+/// ```
+/// use catoptric_model::Calibration;
+/// let calibration = Calibration {
+///     schema_version: 1,
+///     method: "mine".to_owned(),
+///     frame: "room".to_owned(),
+///     scanner: None,
+///     dataset: None,
+///     beams: Vec::new(),
+///     facets: Vec::new(),
+///     rig_from_sensor: None,
+///     bias: None,
+///     warnings: Vec::new(),
+///     assessment: None,
+/// };
+/// let problems = catoptric_assess::validate(&calibration);
+/// assert_eq!(problems[0].key, "frame");
+/// ```
+pub fn validate(calibration: &Calibration) -> Vec<Problem> {
+    let mut problems = Problems::default();
+    if !(1..=calibration::SCHEMA_VERSION).contains(&calibration.schema_version) {
+        problems.error(
+            "schema_version",
+            format!(
+                "is {}, but this program reads 1 to {}",
+                calibration.schema_version,
+                calibration::SCHEMA_VERSION
+            ),
+        );
+    }
+    if calibration.method.trim().is_empty() {
+        problems.error("method", "is empty; name the method".to_owned());
+    }
+    if calibration.frame != "sensor" {
+        problems.error(
+            "frame",
+            format!("is {:?}, but angles are given in \"sensor\"", calibration.frame),
+        );
+    }
+    if let Some(Err(wrong)) = calibration.scanner.map(|angles| angles.check()) {
+        problems.error(&format!("scanner.{}", wrong.key), wrong.problem);
+    }
+    // Who does not say which scanner it is has the usual one.
+    let beams = calibration
+        .scanner
+        .map_or(ScanGeometry::default().beams(), |angles| angles.beams);
+    if let Some(id) = &calibration.dataset
+        && !(id.len() == SHA256_DIGITS && id.chars().all(|c| c.is_ascii_hexdigit()))
+    {
+        problems.error(
+            "dataset",
+            format!("is {id:?}; the SHA-256 of observations.mcap has {SHA256_DIGITS} hexadecimal digits"),
+        );
+    }
+    if calibration.beams.is_empty() {
+        problems.error("beams", "lists no element".to_owned());
+    }
+    let mut seen = BTreeSet::new();
+    for (place, estimate) in calibration.beams.iter().enumerate() {
+        let mut at = problems.of_beam(place, estimate.beam);
+        if estimate.beam >= beams {
+            let which = match calibration.scanner {
+                Some(_) => "of `scanner`",
+                None => "of the UST-20LX; name another `scanner`",
+            };
+            at.error(
+                "beam",
+                format!("is not among the beams 0…{} {which}", beams.saturating_sub(1)),
+            );
+        }
+        if !seen.insert(estimate.beam) {
+            at.error("beam", "is listed more than once".to_owned());
+        }
+        check_element(&mut at, estimate);
+    }
+    let mut names = BTreeSet::new();
+    for (place, facet) in calibration.facets.iter().enumerate() {
+        let key = format!("facets[{place}]");
+        if !names.insert(&facet.facet) {
+            problems.error(
+                &format!("{key}.facet"),
+                format!("{:?} is listed more than once", facet.facet),
+            );
+        }
+        check_facet(&mut problems, &key, facet);
+    }
+    if let Some(mount) = &calibration.rig_from_sensor {
+        check_mount(&mut problems, mount);
+    }
+    if let Some(bias) = &calibration.bias {
+        check_bias(&mut problems, bias);
+    }
+    problems.list
+}
+
+#[cfg(test)]
+mod tests;

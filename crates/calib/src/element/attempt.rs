@@ -1,0 +1,185 @@
+//! The state of an element while it is being estimated: its readings, its boards and its error budgets.
+
+use crate::element::solve::{BareDistance, Element, Solution};
+use crate::judge::covariance::{self, Budget, MountUncertainty};
+use crate::judge::observability::{self, Weakness};
+use crate::options::Options;
+use crate::readings::bare::Bare;
+use crate::readings::columns::Columns;
+use crate::readings::locate;
+use crate::readings::observations::{BoardInSensor, BoardView, Observation, azimuth};
+use crate::readings::spread;
+use catoptric_model::session::NominalFacet;
+use catoptric_model::{Dataset, Deflection, Pose, PoseKind, PoseRecord, Session, Status, Summary};
+
+/// Number of boards that a solution needs (steps 7–10).
+pub const MIN_BOARDS: usize = 3;
+
+/// Inputs shared by all elements.
+pub(crate) struct Workspace<'a> {
+    pub(crate) dataset: &'a Dataset,
+    pub(crate) summaries: &'a [Vec<Summary>],
+    pub(crate) bare: &'a Bare,
+    /// Each pose's board in the sensor frame.
+    pub(crate) boards: &'a [Option<BoardInSensor>],
+    pub(crate) rig_from_sensor: Pose,
+    pub(crate) mount: &'a MountUncertainty,
+    pub(crate) options: &'a Options,
+    /// Single readings, for the method that goes through them one by one.
+    pub(crate) columns: Option<&'a Columns>,
+}
+
+/// An element being estimated.
+pub(crate) struct Attempt<'a> {
+    pub(crate) work: &'a Workspace<'a>,
+    pub(crate) session: &'a Session,
+    pub(crate) beam: usize,
+    pub(crate) azimuth: f64,
+    pub(crate) facet: &'a NominalFacet,
+    /// The deflection by the believed plane of its facet.
+    pub(crate) nominal: Deflection,
+    pub(crate) distance: BareDistance,
+    /// Believed noise of one reading, in meters.
+    pub(crate) noise: f64,
+    /// Number of poses recorded for its facet.
+    pub(crate) recorded: usize,
+    /// Poses whose readings are ranges with an ordinary spread.
+    pub(crate) usable: Vec<usize>,
+}
+
+impl<'a> Attempt<'a> {
+    pub(crate) fn new(
+        work: &'a Workspace<'a>,
+        session: &'a Session,
+        beam: usize,
+        facet: &'a NominalFacet,
+        nominal: &Deflection,
+    ) -> Self {
+        let noise = session.believed.range_noise_sd_mm * 1e-3;
+        let distance = work.bare.distance(session, &facet.name, beam).map_or(
+            // Not measured: the mirror as drawn, whose face is the distance itself.
+            BareDistance {
+                distance: nominal.distance,
+                thickness: 0.0,
+            },
+            |distance| BareDistance {
+                distance,
+                thickness: session.bare_structure.mirror_thickness_mm * 1e-3,
+            },
+        );
+        let of_facet = |record: &PoseRecord| {
+            record.label.kind == PoseKind::Facet
+                && record.label.facet.as_ref().is_none_or(|name| *name == facet.name)
+        };
+        let recorded: Vec<usize> = (0..work.dataset.poses.len())
+            .filter(|p| of_facet(&work.dataset.poses[*p]) && work.boards[*p].is_some())
+            .collect();
+        let usable = |p: &usize| {
+            let summary = &work.summaries[*p][beam];
+            summary.count > summary.missing && !spread::is_abnormal(summary, noise)
+        };
+        Self {
+            work,
+            session,
+            beam,
+            azimuth: azimuth(session, beam),
+            facet,
+            nominal: *nominal,
+            distance,
+            noise,
+            recorded: recorded.len(),
+            usable: recorded.into_iter().filter(usable).collect(),
+        }
+    }
+
+    pub(crate) fn summary(&self, pose: usize) -> &'a Summary {
+        &self.work.summaries[pose][self.beam]
+    }
+
+    pub(crate) fn observations(&self, poses: &[usize]) -> Vec<Observation<'a>> {
+        let boards = self.work.boards;
+        poses
+            .iter()
+            .filter_map(|p| {
+                let summary = self.summary(*p);
+                Some(
+                    boards[*p]
+                        .as_ref()?
+                        .observation(spread::noise_sd(summary, self.noise), summary),
+                )
+            })
+            .collect()
+    }
+
+    /// The readings of a stretch without outliers, one by one.
+    pub(crate) fn single_readings(&self, pose: usize) -> Vec<f64> {
+        let columns = self.work.columns.map(|c| c.of(pose, self.beam));
+        locate::kept(columns.unwrap_or_default(), self.summary(pose), self.noise)
+    }
+
+    pub(crate) fn element<'o>(&self, observations: &'o [Observation<'o>]) -> Element<'o>
+    where
+        'a: 'o,
+    {
+        Element {
+            azimuth: self.azimuth,
+            observations,
+            distance: self.distance,
+            bias: &self.session.believed.bias,
+        }
+    }
+
+    /// The budget as if the mounting were known: what the boards alone determine.
+    pub(crate) fn boards_alone(&self, at: &Deflection, observations: &[Observation]) -> Option<Budget> {
+        let views: Vec<BoardView> = observations.iter().map(|o| o.board).collect();
+        covariance::budget(self.session, &MountUncertainty::none(), self.azimuth, at, &views)
+    }
+
+    pub(crate) fn budget(&self, at: &Deflection, observations: &[Observation]) -> Option<Budget> {
+        let views: Vec<BoardView> = observations.iter().map(|o| o.board).collect();
+        covariance::budget(self.session, self.work.mount, self.azimuth, at, &views)
+    }
+
+    /// The direction that boards leave open, if any.
+    pub(crate) fn weakness(&self, at: &Deflection, poses: &[usize]) -> Option<Weakness> {
+        let budget = self.boards_alone(at, &self.observations(poses))?;
+        observability::weakness(&budget, at.elevation)
+    }
+}
+
+/// A solution and the boards used for it.
+pub(crate) struct Fit {
+    pub(crate) poses: Vec<usize>,
+    pub(crate) solution: Solution,
+    pub(crate) start: Deflection,
+}
+
+/// Why there is no solution.
+pub(crate) struct Failure {
+    pub(crate) status: Status,
+    pub(crate) reason: String,
+}
+
+impl Fit {
+    /// Root-mean-square residual over the boards, in meters.
+    pub(crate) fn rms(&self) -> f64 {
+        let sum: f64 = self.solution.residuals.iter().map(|r| r * r).sum();
+        (sum / self.solution.residuals.len() as f64).sqrt()
+    }
+}
+
+/// The iteration reached a direction in which some board is no longer ahead.
+pub(crate) fn lost() -> Failure {
+    Failure {
+        status: Status::NotConverged,
+        reason: "the estimate left the boards".to_owned(),
+    }
+}
+
+/// The readings cannot be those of one beam on the boards.
+pub(crate) fn rejected(reason: String) -> Failure {
+    Failure {
+        status: Status::Rejected,
+        reason,
+    }
+}

@@ -1,0 +1,14 @@
+//! Triangle meshes: as data, and placed in a frame with an index over their triangles.
+
+pub(crate) mod beam;
+pub(crate) mod data;
+pub(crate) mod each;
+pub(crate) mod exact;
+pub(crate) mod finish;
+pub(crate) mod pending;
+pub(crate) mod single;
+pub(crate) mod triangles;
+
+pub use data::{Mesh, MeshError};
+pub use exact::Met;
+pub use triangles::Triangles;

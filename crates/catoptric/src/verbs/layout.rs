@@ -1,0 +1,103 @@
+//! Analysis of a mirror layout: coverage, losses and attainable accuracy, as values or as files.
+
+use crate::{Control, Error, Scene};
+use catoptric_design::layout::{self, Analysis, Detail};
+use serde::Serialize;
+use std::path::Path;
+
+/// Options of the analysis of a layout.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct LayoutOptions {
+    /// Analyze the structure as built under the seed instead of the drawing.
+    pub as_built: bool,
+    /// Seed of the structure as built and of the predicted accuracy; the scene's own by default.
+    pub seed: Option<u64>,
+    /// Use one ray per beam and predict no accuracy: takes milliseconds.
+    pub coarse: bool,
+}
+
+/// Analyzes the mirror layout of a scene, without noise: the class of every element, field of regard, margins, sizes, and
+/// the accuracy that a calibration with the boards of the scene can attain.
+///
+/// ```
+/// use catoptric::{LayoutOptions, Scene, Template, layout};
+///
+/// # fn main() -> Result<(), catoptric::Error> {
+/// let scene = Scene::template(Template::Prototype);
+/// let coarse = LayoutOptions { coarse: true, ..LayoutOptions::default() };
+/// assert_eq!(layout(&scene, &coarse)?.facets.len(), 8);
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # Errors
+/// [`Error::Setup`] if the scene cannot be set up.
+pub fn layout(scene: &Scene, options: &LayoutOptions) -> Result<Analysis, Error> {
+    let scene = scene.resolved();
+    let seed = options.seed.unwrap_or(scene.seed);
+    let detail = if options.coarse {
+        Detail::Coarse
+    } else {
+        Detail::Full
+    };
+    let mut analysis = layout::analyze(scene, options.as_built.then_some(seed), detail)?;
+    if !options.coarse {
+        analysis.accuracy = Some(layout::predict(scene, seed));
+    }
+    Ok(analysis)
+}
+
+/// JSON form of several analyses.
+#[derive(Serialize)]
+struct SideBySide<'a> {
+    schema_version: u32,
+    layouts: &'a [Analysis],
+}
+
+/// Returns analyses as `layout --json` prints them: a single one as an object, several in a list.
+///
+/// # Errors
+/// [`Error::Invalid`] if an analysis has no JSON form.
+pub fn layout_json(analyses: &[Analysis]) -> Result<String, Error> {
+    let text = match analyses {
+        [one] => serde_json::to_string(one),
+        several => serde_json::to_string(&SideBySide {
+            schema_version: layout::SCHEMA_VERSION,
+            layouts: several,
+        }),
+    };
+    text.map(|t| t + "\n")
+        .map_err(|e| Error::invalid(e.to_string(), None))
+}
+
+/// File name of the page about layouts.
+pub const LAYOUT_PAGE: &str = "report.html";
+
+/// Writes analyses of layouts to a folder: `layout.json`, the pictures and a page.
+///
+/// # Errors
+/// [`Error::Setup`] if a scene cannot be set up, [`Error::File`] if writing fails, [`Error::Stopped`].
+#[cfg(feature = "report")]
+pub fn write_layouts(
+    layouts: &[(&Scene, &Analysis)],
+    out: impl AsRef<Path>,
+    control: &Control,
+) -> Result<(), Error> {
+    use catoptric_files::{IoError, write_file};
+    use catoptric_report::Drawn;
+    let out = out.as_ref();
+    let drawn: Vec<Drawn> = layouts
+        .iter()
+        .map(|(scene, analysis)| Drawn::new(scene.resolved(), analysis))
+        .collect::<Result<_, _>>()?;
+    let analyses: Vec<Analysis> = layouts.iter().map(|(_, analysis)| (*analysis).clone()).collect();
+    let json = layout_json(&analyses)?;
+    std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
+    for (name, bytes) in catoptric_report::layout_pictures(&drawn) {
+        control.check()?;
+        write_file(out.join(name), &bytes)?;
+    }
+    write_file(out.join(LAYOUT_PAGE), catoptric_report::layout(&drawn).as_bytes())?;
+    write_file(out.join("layout.json"), json.as_bytes())?;
+    Ok(())
+}

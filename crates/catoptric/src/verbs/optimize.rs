@@ -1,0 +1,142 @@
+//! Search of a scene's parameters for better layouts, and its results as files.
+
+use crate::{Control, Error, Scene};
+use catoptric_design::optimize::{Candidate, Optimum, Options};
+use catoptric_files::parametric::ParametricScene;
+use catoptric_files::{IoError, scene as scenes, write_file};
+use std::path::Path;
+
+/// Maximum number of layouts of the front that are shown and written.
+const SHOWN: usize = 12;
+
+/// Searches those parameters of a scene that have both limits for layouts that are better with respect to some goals.
+///
+/// Stopping is not an error: the search ends early, sets `interrupted`, and returns what it has found so far.
+///
+/// # Errors
+/// [`Error::Optimize`] if there is no parameter to vary, no goal, or a goal or requirement that no layout has.
+pub fn optimize(scene: &Scene, options: &Options, control: &Control) -> Result<Optimum, Error> {
+    let template = parametric(scene)?;
+    control.run(|| {
+        control.report("searching", 0, options.evaluations);
+        Ok(catoptric_design::optimize::optimize(
+            &template,
+            options,
+            &mut |progress| {
+                control.report("searching", progress.more, options.evaluations);
+                !control.stop.is_requested()
+            },
+        )?)
+    })
+}
+
+fn parametric(scene: &Scene) -> Result<ParametricScene, Error> {
+    Ok(ParametricScene::of(
+        scene.text(),
+        scene.name(),
+        scene.settings(),
+        scene.resolved(),
+    )?)
+}
+
+/// Returns the front, or a selection of it from one end to the other.
+pub fn shown_of_front(found: &Optimum) -> Vec<&Candidate> {
+    let count = found.front.len();
+    if count <= SHOWN {
+        return found.front.iter().collect();
+    }
+    (0..SHOWN)
+        .map(|k| &found.front[k * (count - 1) / (SHOWN - 1)])
+        .collect()
+}
+
+/// File name of the page about a search.
+pub const OPTIMUM_PAGE: &str = "report.html";
+/// File name of the scene of the best layout.
+pub const BEST_SCENE: &str = "best.toml";
+
+/// Writes the result of a search to a folder: `optimum.json`, the front as a table and a picture, a page, and the best
+/// layouts as scenes.
+///
+/// # Errors
+/// [`Error::File`] if writing fails.
+#[cfg(feature = "report")]
+pub fn write_optimum(scene: &Scene, found: &Optimum, out: impl AsRef<Path>) -> Result<(), Error> {
+    let out = out.as_ref();
+    let template = parametric(scene)?;
+    let json = serde_json::to_string(found).map_err(|e| Error::invalid(e.to_string(), None))? + "\n";
+    std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
+    if let Some(best) = &found.best {
+        write_scene(&out.join(BEST_SCENE), &template, best)?;
+    }
+    for (number, candidate) in shown_of_front(found).into_iter().enumerate() {
+        let name = format!("front-{:02}.toml", number + 1);
+        write_scene(&out.join(name), &template, candidate)?;
+    }
+    write_file(out.join("front.csv"), table(found)?.as_slice())?;
+    if let Some(picture) = catoptric_report::front_picture(found) {
+        write_file(out.join("front.svg"), picture.as_bytes())?;
+    }
+    write_file(
+        out.join(OPTIMUM_PAGE),
+        catoptric_report::optimum(found).as_bytes(),
+    )?;
+    write_file(out.join("optimum.json"), json.as_bytes())?;
+    Ok(())
+}
+
+/// Writes a layout as a scene, along with the meshes it refers to.
+fn write_scene(path: &Path, template: &ParametricScene, candidate: &Candidate) -> Result<(), Error> {
+    let choice = candidate.choice();
+    let refused = |problems: Vec<String>| IoError::content(path, problems.join("; "));
+    let found = template.with(&choice).map_err(refused)?;
+    let (kept, meshes) = scenes::kept(&found);
+    let folder = path.parent().unwrap_or(Path::new("."));
+    for (name, bytes) in meshes {
+        let mesh = folder.join(name);
+        if let Some(parent) = mesh.parent() {
+            std::fs::create_dir_all(parent).map_err(|e| IoError::write(parent, e))?;
+        }
+        write_file(mesh, &bytes)?;
+    }
+    let text = template
+        .text_with(&choice, &kept)
+        .ok_or_else(|| refused(vec!["a number that TOML cannot hold".to_owned()]))?;
+    let goals: Vec<String> = candidate
+        .goals
+        .iter()
+        .map(|(name, value)| format!("{name} {value:.6}"))
+        .collect();
+    let text = format!(
+        "# Found by catoptric optimize in {}: {}.\n{text}",
+        template.name(),
+        goals.join(", ")
+    );
+    write_file(path, text.as_bytes())?;
+    Ok(())
+}
+
+/// Returns the whole front as CSV.
+fn table(found: &Optimum) -> Result<Vec<u8>, Error> {
+    let failed = |e: csv::Error| Error::invalid(format!("the front cannot be written: {e}"), None);
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let goals = || found.goals.iter().map(|g| g.name.clone());
+    let parameters = || found.parameters.iter().map(|p| p.name.clone());
+    let heading: Vec<String> = std::iter::once("number".to_owned())
+        .chain(goals())
+        .chain(parameters())
+        .collect();
+    writer.write_record(heading).map_err(failed)?;
+    for candidate in &found.front {
+        let values = goals().map(|g| candidate.goals.get(&g).copied());
+        let values = values.chain(parameters().map(|p| candidate.parameters.get(&p).copied()));
+        let values = values.map(|v| v.map_or_else(String::new, |v| v.to_string()));
+        let row: Vec<String> = std::iter::once(candidate.number.to_string())
+            .chain(values)
+            .collect();
+        writer.write_record(row).map_err(failed)?;
+    }
+    writer
+        .into_inner()
+        .map_err(|e| Error::invalid(format!("the front cannot be written: {e}"), None))
+}

@@ -1,0 +1,57 @@
+//! A study in a folder, from which it resumes if it was stopped, and in shards that merge to the same bytes.
+
+use super::stoppable;
+use crate::{Control, Error};
+use catoptric_assess::study::folder::{self, Found};
+use catoptric_assess::study::{Part, Plan, Study, Summary, gather};
+use std::path::{Path, PathBuf};
+
+/// Name of the page of a study.
+pub const STUDY_PAGE: &str = "report.html";
+
+/// Runs a part of a study in a folder; called again, it resumes where it was stopped.
+///
+/// With `elements`, the angles of every element are listed as well. The folder contains the tables, `study.json` and a
+/// page.
+///
+/// # Errors
+/// [`Error::Study`] if the folder contains another study, [`Error::Setup`] if a scene cannot be set up, [`Error::File`]
+/// if writing fails, [`Error::Stopped`]; finished experiments are kept.
+pub fn study_into(
+    study: &Study,
+    part: Part,
+    elements: bool,
+    out: impl AsRef<Path>,
+    control: &Control,
+) -> Result<Summary, Error> {
+    let (study, out) = (stoppable(study, control), out.as_ref());
+    control.run(|| {
+        let done = |more, of| control.report("experiments", more, of);
+        let (plan, found) = folder::run_in(out, &study, part, elements, &done)?;
+        finish(out, &plan, &study, &found)
+    })
+}
+
+/// Merges the shards of a study, to the same bytes as the study in one piece.
+///
+/// # Errors
+/// [`Error::Study`] if the folders are not all the shards of one study, each finished; [`Error::File`] if reading or
+/// writing fails.
+pub fn merge_studies(shards: &[PathBuf], out: impl AsRef<Path>) -> Result<Summary, Error> {
+    let (plan, study, found) = gather(shards)?;
+    plan.claim(out.as_ref())?;
+    finish(out.as_ref(), &plan, &study, &found)
+}
+
+fn finish(out: &Path, plan: &Plan, study: &Study, found: &Found) -> Result<Summary, Error> {
+    #[cfg(feature = "report")]
+    {
+        let elements = found.elements.as_deref().unwrap_or_default();
+        let summary = catoptric_assess::study::summarize(study, &found.runs);
+        let page = catoptric_report::study(&plan.name, study, &summary, elements);
+        catoptric_files::write_file(out.join(STUDY_PAGE), page.as_bytes())?;
+    }
+    #[cfg(not(feature = "report"))]
+    let _ = plan;
+    Ok(folder::finish(out, study, found)?)
+}

@@ -1,0 +1,82 @@
+//! Export of the drawing as a table: one row for every corner of every mirror, with the mirror's angles and tolerances.
+
+use crate::layout::{Drawing, plate_thickness};
+use catoptric_cast::area_vector;
+use catoptric_sim::Scene;
+
+/// Columns of the table; tolerances are 1σ.
+const HEADER: [&str; 20] = [
+    "facet",
+    "corner",
+    "x_mm",
+    "y_mm",
+    "z_mm",
+    "edge_to_next_mm",
+    "corner_angle_deg",
+    "normal_x",
+    "normal_y",
+    "normal_z",
+    "normal_azimuth_deg",
+    "normal_elevation_deg",
+    "plane_offset_mm",
+    "area_mm2",
+    "thickness_mm",
+    "tilt_tolerance_sd_deg",
+    "shift_tolerance_sd_mm",
+    "thickness_tolerance_sd_mm",
+    "slope_tolerance_rms_mrad",
+    "reflectivity",
+];
+
+/// Returns the drawing table as CSV, in the sensor frame; corners are counterclockwise seen from the reflecting side.
+///
+/// # Errors
+/// An error of the CSV writer; writing to memory causes none.
+pub fn drawing_table(scene: &Scene, drawing: &Drawing) -> Result<Vec<u8>, csv::Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(HEADER)?;
+    let superstructure = &scene.superstructure;
+    let as_built = &superstructure.as_built;
+    for facet in &drawing.facets {
+        let corners = &facet.face.corners;
+        let m = facet.face.normal;
+        let count = corners.len();
+        for (number, corner) in corners.iter().enumerate() {
+            let (next, before) = (
+                corners[(number + 1) % count],
+                corners[(number + count - 1) % count],
+            );
+            let (ahead, behind) = (next - corner, before - corner);
+            let angle = libm::atan2(ahead.cross(&behind).norm(), ahead.dot(&behind));
+            let numbers = [
+                1e3 * corner.x,
+                1e3 * corner.y,
+                1e3 * corner.z,
+                1e3 * ahead.norm(),
+                angle.to_degrees(),
+                m.x,
+                m.y,
+                m.z,
+                libm::atan2(m.y, m.x).to_degrees(),
+                libm::atan2(m.z, libm::hypot(m.x, m.y)).to_degrees(),
+                1e3 * m.dot(&facet.face.origin.coords),
+                0.5e6 * area_vector(corners).norm(),
+                1e3 * plate_thickness(scene),
+                as_built.tilt_sd_deg,
+                as_built.shift_sd_mm,
+                as_built.thickness_sd_mm,
+                as_built.slope_rms_mrad,
+                superstructure.mirror.reflectivity,
+            ];
+            let mut row = vec![facet.name.clone(), (number + 1).to_string()];
+            row.extend(numbers.map(|n| rounded(n).to_string()));
+            writer.write_record(&row)?;
+        }
+    }
+    writer.into_inner().map_err(|e| e.into_error().into())
+}
+
+/// Rounds to the nearest 10⁻⁶, a nanometer or a microdegree, without a negative zero.
+fn rounded(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6 + 0.0
+}

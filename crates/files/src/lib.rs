@@ -1,0 +1,86 @@
+//! File formats: the only part of the library that reads or writes files.
+//!
+//! A dataset is a folder ([`dataset`]) whose observations are a recording in the Robot Operating System's
+//! format ([`recording`], [`playback`]), readable by third-party tools. Every output is written completely or not
+//! at all ([`file`](mod@file), [`folder`]); every error names the file ([`error`]).
+
+#[cfg(feature = "recording")]
+mod blocks;
+#[cfg(feature = "recording")]
+mod bodies;
+#[cfg(feature = "recording")]
+mod capture;
+#[cfg(feature = "recording")]
+mod container;
+pub mod error;
+#[cfg(feature = "recording")]
+pub mod file;
+#[cfg(feature = "recording")]
+pub mod folder;
+pub mod json;
+pub mod paths;
+
+#[cfg(feature = "recording")]
+pub mod cdr;
+#[cfg(feature = "recording")]
+pub mod definitions;
+#[cfg(feature = "recording")]
+mod gathering;
+#[cfg(feature = "recording")]
+pub mod messages;
+#[cfg(feature = "recording")]
+pub mod playback;
+#[cfg(feature = "recording")]
+pub mod recording;
+#[cfg(feature = "recording")]
+mod schedule;
+#[cfg(feature = "recording")]
+mod source;
+#[cfg(feature = "recording")]
+mod survey;
+
+#[cfg(feature = "scene")]
+pub mod diagnostic;
+#[cfg(feature = "scene")]
+mod expression;
+#[cfg(feature = "scene")]
+mod format;
+#[cfg(feature = "scene")]
+mod parameters;
+#[cfg(feature = "scene")]
+pub mod parametric;
+#[cfg(feature = "scene")]
+pub mod scene;
+#[cfg(feature = "scene")]
+mod tree;
+
+pub mod cloud;
+#[cfg(feature = "recording")]
+pub mod dataset;
+#[cfg(feature = "recording")]
+pub mod manifest;
+#[cfg(feature = "scene")]
+pub mod mesh;
+pub mod npy;
+#[cfg(all(feature = "recording", feature = "scene"))]
+pub mod rays;
+pub mod results;
+
+#[cfg(feature = "recording")]
+pub use dataset::{DatasetWriter, read_dataset, read_session};
+pub use error::IoError;
+#[cfg(feature = "recording")]
+pub use file::{StagedOutput, write_file, write_json};
+pub use json::read_json;
+#[cfg(feature = "recording")]
+pub use manifest::{Manifest, Provenance};
+#[cfg(feature = "recording")]
+pub use playback::read_recording;
+#[cfg(feature = "recording")]
+pub use recording::RecordingWriter;
+#[cfg(all(feature = "recording", feature = "scene"))]
+pub use results::read_truth;
+pub use results::{read_calibration, read_calibration_for, read_characterization};
+
+#[cfg(all(test, feature = "recording", feature = "scene"))]
+mod tests;

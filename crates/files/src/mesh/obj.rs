@@ -1,0 +1,48 @@
+//! OBJ: the vertices and faces of a text file; everything else is ignored.
+
+use super::{Fault, Parsed, fan, finish, lines, triple};
+
+/// Reads a file.
+pub(super) fn parse(bytes: &[u8]) -> Parsed {
+    let text = String::from_utf8_lossy(bytes);
+    let mut vertices = Vec::new();
+    let mut triangles = Vec::new();
+    for (line, content) in lines(&text) {
+        let content = content.split('#').next().unwrap_or_default();
+        let mut words = content.split_whitespace();
+        match words.next() {
+            Some("v") => vertices.push(triple(&mut words, line, "a vertex")?),
+            Some("f") => {
+                let corners = words
+                    .map(|word| index(word, vertices.len()).map_err(|m| Fault::Line(line, m)))
+                    .collect::<Result<Vec<u32>, _>>()?;
+                if corners.len() < 3 {
+                    let message = format!("a face has {} corners; 3 at least are needed", corners.len());
+                    return Err(Fault::Line(line, message));
+                }
+                triangles.extend(fan(&corners));
+            }
+            // Normals, textures, groups, materials, lines and curves do not affect the surface.
+            _ => {}
+        }
+    }
+    finish(vertices, triangles)
+}
+
+/// A corner such as `7`, `7/1/3` or `-1` (the last vertex so far), as an index from 0.
+fn index(word: &str, count: usize) -> Result<u32, String> {
+    let number = word.split('/').next().unwrap_or_default();
+    let value: i64 = number
+        .parse()
+        .map_err(|_| format!("{word:?} is not the number of a vertex"))?;
+    let count = i64::try_from(count).unwrap_or(i64::MAX);
+    let index = if value < 0 {
+        count.checked_add(value)
+    } else {
+        value.checked_sub(1)
+    };
+    index
+        .filter(|i| (0..count).contains(i))
+        .and_then(|i| u32::try_from(i).ok())
+        .ok_or_else(|| format!("there is no vertex {value} yet; there are {count}"))
+}

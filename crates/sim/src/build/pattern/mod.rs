@@ -1,0 +1,256 @@
+//! Expands patterns into facets: rings, mirror images, lists of copies.
+//!
+//! A copy has the same kind of shape as its original, with other numbers, so that the mirror image of a wedge is a
+//! readable wedge:
+//!
+//! ```text
+//! left and right:  y → −y      azimuths α → −α, in reverse order
+//! up and down:     z → −z      elevations ε → −ε
+//! rotation by τ:                azimuths α → α + τ
+//! ```
+
+use crate::build::layout::plate_azimuth_deg;
+use crate::scene::{Exchange, Facet, FacetShape, Pattern, Scene};
+use catoptric_model::ScanGeometry;
+use catoptric_model::place::{Path, Problem, Segment, nearest};
+
+/// Part of a step within which a beam is another one's mirror image: what rounding leaves.
+const SAME_PART_OF_STEP: f64 = 1e-6;
+
+/// A scene with its patterns expanded, and the origin of its facets.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Expanded {
+    /// The scene, with a facet for every copy.
+    pub scene: Scene,
+    /// Number of facets drawn in the scene itself.
+    pub drawn: usize,
+    /// The pattern that made each of the facets after those.
+    pub made_by: Vec<usize>,
+}
+
+impl Expanded {
+    /// The pattern that made the facet to which a path leads, and the name of the copy.
+    pub fn origin(&self, path: &Path) -> Option<(Path, &str)> {
+        let [Segment::Key(a), Segment::Key(b), Segment::Index(i), ..] = path.0.as_slice() else {
+            return None;
+        };
+        if (a.as_str(), b.as_str()) != ("superstructure", "facet") {
+            return None;
+        }
+        let pattern = *self.made_by.get(i.checked_sub(self.drawn)?)?;
+        let name = &self.scene.superstructure.facet.get(*i)?.name;
+        Some((pattern_path(pattern), name))
+    }
+}
+
+/// Expands the patterns into facets, in order; a pattern may copy what an earlier one made.
+///
+/// # Errors
+/// A pattern of a facet that does not exist; a list of names whose length differs from the number of copies.
+pub fn expand(scene: &Scene) -> Result<Expanded, Vec<Problem>> {
+    let mut scene = scene.clone();
+    let patterns = std::mem::take(&mut scene.superstructure.pattern);
+    let drawn = scene.superstructure.facet.len();
+    // Of a scanner that cannot be, whoever checks the scene says so.
+    let scan = scene.scanner.scan().unwrap_or_default();
+    let (mut made_by, mut problems) = (Vec::new(), Vec::new());
+    for (number, pattern) in patterns.iter().enumerate() {
+        match copies(&scene.superstructure.facet, pattern, &scan, &pattern_path(number)) {
+            Ok(copies) => {
+                made_by.extend(std::iter::repeat_n(number, copies.len()));
+                scene.superstructure.facet.extend(copies);
+            }
+            Err(problem) => problems.push(problem),
+        }
+    }
+    if problems.is_empty() {
+        Ok(Expanded {
+            scene,
+            drawn,
+            made_by,
+        })
+    } else {
+        Err(problems)
+    }
+}
+
+fn pattern_path(number: usize) -> Path {
+    Path::of("superstructure").key("pattern").index(number)
+}
+
+fn copies(
+    facets: &[Facet],
+    pattern: &Pattern,
+    scan: &ScanGeometry,
+    path: &Path,
+) -> Result<Vec<Facet>, Problem> {
+    match pattern {
+        Pattern::Ring(ring) => {
+            let original = find(facets, &ring.of, &path.key("ring").key("of"))?;
+            let step = ring.step_deg.unwrap_or(360.0 / f64::from(ring.count));
+            let copy = |k: u32| {
+                let name = format!("{}-{}", original.name, k + 1);
+                turned(original, name, f64::from(k) * step, scan)
+            };
+            Ok((1..ring.count).map(copy).collect())
+        }
+        Pattern::MirrorImage(image) => {
+            let path = path.key("mirror_image");
+            let count = image.of.len();
+            if let Some(names) = image.names.as_ref().filter(|n| n.len() != count) {
+                let key = path.key("names");
+                return Err(Problem {
+                    message: format!("`{key}` lists {} names for {count} images", names.len()),
+                    path: key,
+                    help: Some("name every image, or omit `names`".to_owned()),
+                });
+            }
+            let one = |(i, of): (usize, &String)| {
+                let original = find(facets, of, &path.key("of").index(i))?;
+                let given = image.names.as_ref().and_then(|n| n.get(i)).cloned();
+                let name = given.unwrap_or_else(|| format!("{of}-image"));
+                Ok(mirrored(original, name, &image.across, scan))
+            };
+            image.of.iter().enumerate().map(one).collect()
+        }
+        Pattern::List(list) => {
+            let original = find(facets, &list.of, &path.key("list").key("of"))?;
+            let one = |c: &crate::scene::FacetCopy| {
+                let image = mirrored(original, c.name.clone(), &c.across, scan);
+                turned(&image, c.name.clone(), c.turn_deg, scan)
+            };
+            Ok(list.copy.iter().map(one).collect())
+        }
+    }
+}
+
+fn find<'a>(facets: &'a [Facet], name: &str, path: &Path) -> Result<&'a Facet, Problem> {
+    facets.iter().find(|f| f.name == name).ok_or_else(|| {
+        let help = match nearest(name, facets.iter().map(|f| f.name.as_str())) {
+            Some(near) => format!("did you mean {near:?}?"),
+            None => "a pattern copies facets of the scene or of an earlier pattern".to_owned(),
+        };
+        Problem {
+            path: path.clone(),
+            message: format!("`{path}` is {name:?}, but no facet before this pattern has that name"),
+            help: Some(help),
+        }
+    })
+}
+
+/// A facet seen in a mirror, or in two one after the other.
+pub fn mirrored(facet: &Facet, name: String, across: &[Exchange], scan: &ScanGeometry) -> Facet {
+    let image = |shape: FacetShape, exchange: &Exchange| match exchange {
+        Exchange::LeftRight => left_right(shape, scan),
+        Exchange::UpDown => up_down(shape),
+    };
+    Facet {
+        name,
+        shape: across.iter().fold(facet.shape.clone(), image),
+        two_sided: facet.two_sided,
+    }
+}
+
+/// A facet turned about the scanner's axis, counter-clockwise, by an angle in degrees.
+pub fn turned(facet: &Facet, name: String, turn_deg: f64, scan: &ScanGeometry) -> Facet {
+    let (sin, cos) = libm::sincos(turn_deg.to_radians());
+    let turn = |[x, y, z]: [f64; 3]| [cos * x - sin * y, sin * x + cos * y, z];
+    let around = |azimuth: f64| {
+        let azimuth = azimuth + turn_deg;
+        azimuth - 360.0 * (azimuth / 360.0).round()
+    };
+    let mut shape = facet.shape.clone();
+    match &mut shape {
+        FacetShape::Wedge(wedge) => {
+            let middle = 0.5 * (wedge.azimuth_deg[0] + wedge.azimuth_deg[1]);
+            // Both by the same amount, which keeps the width of the wedge.
+            let by = around(middle) - middle;
+            wedge.azimuth_deg = wedge.azimuth_deg.map(|a| a + by);
+            wedge.exit_azimuth_deg = around(wedge.exit_azimuth_deg);
+        }
+        FacetShape::Plate(plate) => {
+            if let Some(azimuth) = plate_azimuth_deg(plate, scan) {
+                plate.azimuth_deg = Some(around(azimuth));
+                plate.beam = None;
+            }
+            plate.exit_azimuth_deg = plate.exit_azimuth_deg.map(around);
+            plate.normal_azimuth_deg = plate.normal_azimuth_deg.map(around);
+        }
+        FacetShape::Rectangle(rectangle) => {
+            rectangle.center_mm = turn(rectangle.center_mm);
+            rectangle.normal = turn(rectangle.normal);
+        }
+        FacetShape::Polygon(polygon) => {
+            for corner in &mut polygon.corners_mm {
+                *corner = turn(*corner);
+            }
+        }
+    }
+    Facet {
+        name,
+        shape,
+        two_sided: facet.two_sided,
+    }
+}
+
+fn left_right(mut shape: FacetShape, scan: &ScanGeometry) -> FacetShape {
+    match &mut shape {
+        FacetShape::Wedge(wedge) => {
+            let [first, last] = wedge.azimuth_deg;
+            wedge.azimuth_deg = [-last, -first];
+            wedge.exit_azimuth_deg = -wedge.exit_azimuth_deg;
+        }
+        FacetShape::Plate(plate) => {
+            plate.azimuth_deg = plate.azimuth_deg.map(|a| -a);
+            if let Some(beam) = plate.beam {
+                plate.beam = opposite(beam, scan);
+                if plate.beam.is_none() {
+                    plate.azimuth_deg = Some(-scan.azimuth_deg(beam as usize));
+                }
+            }
+            plate.exit_azimuth_deg = plate.exit_azimuth_deg.map(|a| -a);
+            plate.normal_azimuth_deg = plate.normal_azimuth_deg.map(|a| -a);
+        }
+        FacetShape::Rectangle(rectangle) => {
+            rectangle.center_mm[1] = -rectangle.center_mm[1];
+            rectangle.normal[1] = -rectangle.normal[1];
+        }
+        FacetShape::Polygon(polygon) => reflect_corners(&mut polygon.corners_mm, 1),
+    }
+    shape
+}
+
+/// The beam whose azimuth is the opposite of another one's, if the scan has it.
+fn opposite(beam: u32, scan: &ScanGeometry) -> Option<u32> {
+    let azimuth = -scan.azimuth(beam as usize);
+    let found = scan.nearest(azimuth)?;
+    let off = (scan.place(azimuth) - found as f64).abs();
+    u32::try_from(found).ok().filter(|_| off < SAME_PART_OF_STEP)
+}
+
+fn up_down(mut shape: FacetShape) -> FacetShape {
+    match &mut shape {
+        FacetShape::Wedge(wedge) => wedge.exit_elevation_deg = -wedge.exit_elevation_deg,
+        FacetShape::Plate(plate) => {
+            plate.exit_elevation_deg = plate.exit_elevation_deg.map(|e| -e);
+            plate.normal_elevation_deg = plate.normal_elevation_deg.map(|e| -e);
+        }
+        FacetShape::Rectangle(rectangle) => {
+            rectangle.center_mm[2] = -rectangle.center_mm[2];
+            rectangle.normal[2] = -rectangle.normal[2];
+        }
+        FacetShape::Polygon(polygon) => reflect_corners(&mut polygon.corners_mm, 2),
+    }
+    shape
+}
+
+/// Reflects the corners and reverses their order, since a reflection reverses the orientation.
+fn reflect_corners(corners: &mut [[f64; 3]], axis: usize) {
+    for corner in corners.iter_mut() {
+        corner[axis] = -corner[axis];
+    }
+    corners.reverse();
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,46 @@
+//! Checks of scenes: everything that needs more than one value, or some geometry.
+//!
+//! The format itself (types, ranges of single values, unknown keys) is up to the schema. All problems are found in one
+//! pass, each with the path of the key it concerns. Geometry is that of the drawing: errors of the structure as built
+//! are small compared with everything that is rejected here.
+
+mod experiment;
+mod findings;
+mod flight;
+mod mishap;
+mod outline;
+mod stage;
+mod structure;
+mod values;
+
+pub use outline::{Outline, ServedFacet, outline};
+
+use crate::scene::Scene;
+use catoptric_model::place::{Path, Problem};
+use findings::Findings;
+
+/// All problems of a scene.
+pub fn problems(scene: &Scene) -> Vec<Problem> {
+    let mut found = Findings(Vec::new());
+    values::check(scene, &mut found);
+    stage::check(scene, &mut found);
+    let scan = match scene.scanner.scan() {
+        Ok(scan) => scan,
+        Err(error) => {
+            let path = Path::of("scanner").key("custom").key(error.key);
+            found.add(&path, error.problem, None);
+            // Nothing can be said of beams that there are not.
+            return found.0;
+        }
+    };
+    // Where there is no laboratory, structure and procedure have nothing to be checked against.
+    if !scene.has_no_laboratory() {
+        structure::check(scene, &scan, &mut found);
+        if scene.room.has_walls() {
+            experiment::check(scene, &scan, &mut found);
+            mishap::check(scene, &mut found);
+        }
+        flight::check(scene, &scan, &mut found);
+    }
+    found.0
+}

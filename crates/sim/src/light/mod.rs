@@ -1,0 +1,10 @@
+//! Paths of light: the footprint of a beam, its path via mirrors and through glass, and the power that returns.
+
+pub mod footprint;
+pub mod glass;
+pub(crate) mod optics;
+pub mod power;
+
+pub use optics::{
+    Bounce, Course, Edit, End, MAX_BOUNCES, Meeting, Mirrors, Path, Rig, Role, Setting, Target, Trail,
+};

@@ -1,0 +1,149 @@
+//! What the scanner reports in one scan: random effects, then rounding and codes.
+
+use super::returned::{MAX_ECHOES, Return};
+use super::sensor::Sensor;
+use crate::scene::ErrorModel;
+
+/// The random effects in one reading, each contribution separately.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RandomEffects {
+    /// Constant of the pose, in meters.
+    pub drift: f64,
+    /// Constant of the beam in the pose, in meters.
+    pub element: f64,
+    /// Warm-up error of the scanner, in meters.
+    pub warm_up: f64,
+    /// Noise correlated with that of earlier readings, in meters.
+    pub correlated: f64,
+    /// Step due to interference, in meters.
+    pub interference: f64,
+    /// White noise: a standard normal deviate, to be multiplied by [`Return::noise_sd`].
+    pub noise: f64,
+    /// Whether the reading is lost: a uniform deviate; lost if below `errors.dropout`.
+    pub dropout: f64,
+    /// Whether each echo is detected: uniform deviates; detected if below [`Return::probability`].
+    pub detection: [f64; MAX_ECHOES],
+}
+
+/// [`f64::round`] without a call into the system's library.
+fn rounded(x: f64) -> f64 {
+    /// From here on every number is an integer.
+    const WHOLE: f64 = 4_503_599_627_370_496.0;
+    if x.is_nan() || x.abs() >= WHOLE {
+        return x;
+    }
+    // The fraction is truncated, and the truncated part is exact.
+    #[allow(clippy::cast_possible_truncation)]
+    let whole = x as i64 as f64;
+    let rest = x - whole;
+    if rest >= 0.5 {
+        whole + 1.0
+    } else if rest <= -0.5 {
+        whole - 1.0
+    } else {
+        whole
+    }
+}
+
+impl Sensor {
+    /// A reading of one scan, in meters: the beam's range with its random effects, rounded, or a code.
+    ///
+    /// Noise is never applied to a code.
+    pub fn read(&self, found: Option<&Return>, effects: &RandomEffects) -> f64 {
+        use catoptric_model::range::NO_RETURN;
+        let detected = self.detected(found, effects).next();
+        detected.map_or(NO_RETURN, |found| {
+            self.read_echo(found.range(), found.noise_sd, effects)
+        })
+    }
+
+    /// The reading of an echo that is detected, by its [`Return::range`] and the standard deviation of its noise, in
+    /// meters.
+    #[inline]
+    pub fn read_echo(&self, range: f64, noise_sd: f64, effects: &RandomEffects) -> f64 {
+        use catoptric_model::range::INVALID;
+        if self.errors.model != ErrorModel::None && effects.dropout < self.errors.dropout {
+            return INVALID;
+        }
+        self.report(range, noise_sd, effects)
+    }
+
+    /// All echoes of a reading that are reported, in meters, nearest first; none if the reading is lost.
+    ///
+    /// The random effects of a reading are common to its echoes.
+    pub fn read_all(&self, found: Option<&Return>, effects: &RandomEffects) -> Vec<f64> {
+        if self.errors.model != ErrorModel::None && effects.dropout < self.errors.dropout {
+            return Vec::new();
+        }
+        self.detected(found, effects)
+            .take(self.limits.echoes as usize)
+            .map(|echo| self.report(echo.range(), echo.noise_sd, effects))
+            .collect()
+    }
+
+    /// The echoes of a reading that are detected, in the order in which they are reported.
+    fn detected<'a>(
+        &self,
+        found: Option<&'a Return>,
+        effects: &'a RandomEffects,
+    ) -> impl Iterator<Item = &'a Return> + use<'a> {
+        let echoes = found.into_iter().flat_map(Return::echoes);
+        echoes
+            .zip(effects.detection)
+            .filter(|(echo, draw)| *draw < echo.probability)
+            .map(|(echo, _)| echo)
+    }
+
+    /// The range of an echo as reported, in meters, or the code of one that cannot be reported.
+    #[inline]
+    fn report(&self, range: f64, noise_sd: f64, effects: &RandomEffects) -> f64 {
+        use catoptric_model::range::{NO_RETURN, TOO_CLOSE};
+        if self.errors.model == ErrorModel::None {
+            return if range < self.limits.range_min_m {
+                TOO_CLOSE
+            } else {
+                range
+            };
+        }
+        let white = range + effects.drift + noise_sd * effects.noise;
+        let range = white + (effects.warm_up + effects.correlated + effects.interference + effects.element);
+        let step = self.errors.quantization_mm * 1e-3;
+        let range = if step > 0.0 {
+            rounded(range / step) * step
+        } else {
+            range
+        };
+        if range < self.limits.range_min_m {
+            TOO_CLOSE
+        } else if range > self.limits.range_max_m {
+            NO_RETURN
+        } else {
+            range
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_is_that_of_the_standard_library() {
+        let edges = [
+            0.0,
+            0.49999999999999994,
+            0.5,
+            1.5,
+            2.5,
+            4503599627370495.5,
+            9e15,
+            f64::INFINITY,
+        ];
+        let between = (0..100_000).map(|i| f64::from(i) * 0.0173);
+        for x in edges.into_iter().chain(between) {
+            assert_eq!(rounded(x), x.round(), "{x}");
+            assert_eq!(rounded(-x), (-x).round(), "{}", -x);
+        }
+        assert!(rounded(f64::NAN).is_nan());
+    }
+}

@@ -1,0 +1,157 @@
+//! The scanner with everything resolved that does not depend on its surroundings.
+
+use crate::build::color;
+use crate::error::SimError;
+use crate::light::footprint::{self, SubRay};
+use crate::light::optics::{MAX_BOUNCES, Path, Setting};
+use crate::light::power::{self, Illumination};
+use crate::receive::detect;
+use crate::receive::echo::Receiver;
+use crate::scene::{BeamShape, Detection, ErrorModel, Errors, Light, Limits, Scene};
+use catoptric_cast::Ray;
+use catoptric_model::{RangeBias, ScanGeometry};
+
+/// The scanner with everything resolved that does not depend on its surroundings.
+pub struct Sensor {
+    pub(super) scan: ScanGeometry,
+    pub(super) shape: BeamShape,
+    pub(super) sub_rays: Vec<SubRay>,
+    pub(super) light: Light,
+    /// Share of the light that is left after a number of reflections by silver.
+    pub(super) mirrors: [f64; MAX_BOUNCES + 1],
+    pub(super) limits: Limits,
+    pub(super) detection: Detection,
+    pub(super) receiver: Receiver,
+    pub(super) reference_walk: f64,
+    pub(super) bias: RangeBias,
+    pub(super) errors: Errors,
+}
+
+impl Sensor {
+    /// Resolves a scene's scanner.
+    ///
+    /// # Errors
+    /// [`SimError::UnknownColor`], which cannot happen: the walk is relative to the built-in white.
+    pub fn new(scene: &Scene) -> Result<Self, SimError> {
+        let pulse_sd = detect::pulse_sd(scene.detection.pulse_fwhm_ns);
+        let face_on = |reflectivity: f64, range: f64| {
+            let on = Illumination {
+                reflectivity,
+                cos_incidence: 1.0,
+                share: 1.0,
+                range,
+                mirrors: 1.0,
+            };
+            power::received(&scene.light, &on)
+        };
+        let threshold = face_on(
+            scene.detection.threshold_reflectivity,
+            scene.detection.threshold_range_m,
+        );
+        let white = color::paint(scene, "white")?.reflectivity;
+        let reference = face_on(white, scene.detection.reference_range_m);
+        let receiver = Receiver {
+            detector: scene.detection.detector,
+            fraction: scene.detection.fraction,
+            sd: pulse_sd,
+            threshold,
+            saturation: if scene.detection.saturation_over_threshold > 0.0 {
+                scene.detection.saturation_over_threshold * threshold
+            } else {
+                f64::INFINITY
+            },
+        };
+        let biased = matches!(scene.errors.model, ErrorModel::Empirical | ErrorModel::Both);
+        Ok(Self {
+            scan: scene.scanner.scan()?,
+            shape: scene.scanner.beam_shape(),
+            sub_rays: footprint::sub_rays(scene.scanner.sub_rays as usize),
+            light: scene.light.clone(),
+            mirrors: std::array::from_fn(|count| {
+                libm::pow(scene.superstructure.mirror.reflectivity, count as f64)
+            }),
+            limits: scene.scanner.limits(),
+            detection: scene.detection.clone(),
+            receiver,
+            reference_walk: receiver.lead(reference),
+            bias: if biased {
+                RangeBias {
+                    distance: scene.errors.distance.clone(),
+                    angle: scene.errors.angle.clone(),
+                    color: scene.errors.color.clone(),
+                }
+            } else {
+                RangeBias::default()
+            },
+            errors: scene.errors.clone(),
+        })
+    }
+
+    /// How it scans.
+    pub fn scan(&self) -> &ScanGeometry {
+        &self.scan
+    }
+
+    /// The biases that act.
+    pub fn bias(&self) -> &RangeBias {
+        &self.bias
+    }
+
+    /// Number of sub-rays of a beam.
+    pub fn sub_rays(&self) -> usize {
+        self.sub_rays.len()
+    }
+
+    /// Shape of a beam.
+    pub fn shape(&self) -> &BeamShape {
+        &self.shape
+    }
+
+    /// The sub-rays of a beam.
+    pub fn sub_ray_list(&self) -> &[SubRay] {
+        &self.sub_rays
+    }
+
+    /// The paths of a beam's sub-rays, in the order in which they are cast.
+    pub fn paths<'a>(
+        &'a self,
+        setting: &'a Setting<'_>,
+        beam: usize,
+    ) -> impl Iterator<Item = (&'a SubRay, Path)> {
+        let rays: Vec<Ray> = self.rays(beam).collect();
+        self.sub_rays.iter().zip(setting.trace_beam(&rays))
+    }
+
+    /// A beam's sub-rays as they leave the scanner, in the order in which they are cast.
+    pub fn rays(&self, beam: usize) -> impl Iterator<Item = Ray> {
+        let azimuth = self.scan.azimuth(beam);
+        self.sub_rays
+            .iter()
+            .map(move |s| footprint::ray(&self.shape, azimuth, s))
+    }
+
+    /// A beam's chief ray as it leaves the scanner.
+    pub fn chief_ray(&self, beam: usize) -> Ray {
+        let chief = SubRay {
+            wide: 0.0,
+            narrow: 0.0,
+            weight: 1.0,
+        };
+        footprint::ray(&self.shape, self.scan.azimuth(beam), &chief)
+    }
+
+    /// The path of a beam's chief ray.
+    pub fn chief_path(&self, setting: &Setting<'_>, beam: usize) -> Path {
+        setting.trace(&self.chief_ray(beam))
+    }
+
+    /// Whether no sub-ray is the chief ray.
+    pub(super) fn lacks_chief(&self) -> bool {
+        !self.sub_rays.iter().any(is_chief)
+    }
+}
+
+/// Whether a sub-ray is the chief ray.
+pub(super) fn is_chief(sub_ray: &SubRay) -> bool {
+    sub_ray.wide == 0.0 && sub_ray.narrow == 0.0
+}

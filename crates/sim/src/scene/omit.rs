@@ -1,0 +1,9 @@
+//! Default values that are omitted from files.
+
+pub(super) fn is_false(value: &bool) -> bool {
+    !value
+}
+
+pub(super) fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
