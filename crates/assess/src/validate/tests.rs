@@ -155,7 +155,7 @@ fn the_rest_of_the_file_is_checked_too() {
         let problems = after(change);
         one(&problems).key.clone()
     };
-    assert_eq!(key(|c, _| c.schema_version = 2), "schema_version");
+    assert_eq!(key(|c, _| c.schema_version = 3), "schema_version");
     assert_eq!(key(|c, _| c.frame = "room".to_owned()), "frame");
     assert_eq!(key(|c, _| c.method.clear()), "method");
     assert_eq!(key(|c, _| c.beams[3].beam = 1081), "beams[3].beam");
