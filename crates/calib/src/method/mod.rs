@@ -118,7 +118,7 @@ mod tests {
         for method in Method::ALL {
             assert_eq!(method.name().parse(), Ok(method));
         }
-        let refused = "beems".parse::<Method>().expect_err("not a method");
+        let refused = "beem".parse::<Method>().expect_err("not a method");
         assert_eq!(refused.help().as_deref(), Some("did you mean \"beam\"?"));
         let refused = "annealing".parse::<Method>().expect_err("not a method");
         assert_eq!(refused.help(), None);
