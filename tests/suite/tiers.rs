@@ -10,8 +10,8 @@ use catoptric::sim::{Laboratory, Truth, noise};
 use catoptric::{Score, Verdict, score};
 use std::path::Path;
 
-/// A tier's dataset, written and read back, and its truth.
-fn tier(name: &str, sets: &[&str]) -> (catoptric::model::Dataset, Truth) {
+/// A tier's dataset, written and read back, its truth, and the folder that its readings stay in.
+fn tier(name: &str, sets: &[&str]) -> (catoptric::model::Dataset, Truth, tempfile::TempDir) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/tiers/{name}.toml"));
     let sets: Vec<String> = sets.iter().map(|s| (*s).to_owned()).collect();
     let scene = scene::load(&path, &sets).unwrap();
@@ -31,7 +31,7 @@ fn tier(name: &str, sets: &[&str]) -> (catoptric::model::Dataset, Truth) {
             rng_rule: noise::RULE.to_owned(),
         })
         .unwrap();
-    (read_dataset(&out).unwrap(), laboratory.truth().unwrap())
+    (read_dataset(&out).unwrap(), laboratory.truth().unwrap(), folder)
 }
 
 const FEW_SCANS: [&str; 3] = [
@@ -41,7 +41,7 @@ const FEW_SCANS: [&str; 3] = [
 ];
 
 fn scored(name: &str, sets: &[&str], method: Method) -> Score {
-    let (dataset, truth) = tier(name, sets);
+    let (dataset, truth, _folder) = tier(name, sets);
     let calibration = method.calibrate(&dataset).unwrap();
     score(&dataset, &calibration, Some(&truth)).expect("in memory")
 }
@@ -88,7 +88,7 @@ fn tiers_1_to_4_are_increasingly_hard_and_outliers_spoil_no_direction() {
 
 #[test]
 fn tier_5_is_not_answered_with_a_guess() {
-    let (dataset, truth) = tier("t5-degenerate", &FEW_SCANS);
+    let (dataset, truth, _folder) = tier("t5-degenerate", &FEW_SCANS);
     for method in [Method::Beam, Method::BeamGls, Method::Joint] {
         let calibration = method.calibrate(&dataset).unwrap();
         let found = score(&dataset, &calibration, Some(&truth)).expect("in memory");

@@ -6,7 +6,8 @@
 //!
 //! ```
 //! use catoptric_calib::plan::{self, Request};
-//! use catoptric::{plan as scenes, sim};
+//! use catoptric_design::plan as scenes;
+//! use catoptric_sim as sim;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let scene: sim::Scene = toml::from_str(include_str!("../../../scenes/prototype.toml"))?;

@@ -64,13 +64,15 @@ impl Trial {
     ///
     /// ```no_run
     /// use catoptric_assess::testing::Trial;
-    /// use catoptric::{io, model, sim};
+    /// use catoptric_files::{read_dataset, read_json};
+    /// use catoptric_model::Calibration;
+    /// use catoptric_sim::Truth;
     /// use std::path::Path;
     ///
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// let dataset = io::read_dataset(Path::new("data"))?;
-    /// let truth: sim::Truth = io::read_json("data/truth/truth.json")?;
-    /// let calibration: model::Calibration = io::read_json("calibration.json")?;
+    /// let dataset = read_dataset(Path::new("data"))?;
+    /// let truth: Truth = read_json("data/truth/truth.json")?;
+    /// let calibration: Calibration = read_json("calibration.json")?;
     /// let trial = Trial::of(&dataset, &truth, &calibration)?;
     /// # let _ = trial;
     /// # Ok(())

@@ -41,7 +41,8 @@ const FRAMES: [&str; 2] = ["rig", "drawn"];
 /// [`BESIDE`] more on either side. Stretches without a board have no rows.
 ///
 /// ```
-/// use catoptric::{export, sim};
+/// use catoptric_design::export;
+/// use catoptric_sim as sim;
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let mut scene: sim::Scene = toml::from_str(include_str!("../../../../scenes/two-mirror.toml"))?;

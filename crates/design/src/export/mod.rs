@@ -10,7 +10,8 @@
 //! | [`board_table`] | the readings of every beam on every board of a dataset, as CSV | meters, radians |
 //!
 //! ```
-//! use catoptric::{export, layout, sim};
+//! use catoptric_design::{export, layout};
+//! use catoptric_sim as sim;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let scene: sim::Scene = toml::from_str(include_str!("../../../../scenes/prototype.toml"))?;

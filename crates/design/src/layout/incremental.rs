@@ -17,7 +17,7 @@ use std::sync::Arc;
 ///
 /// ```
 /// use catoptric_design::layout::{Detail, Layout, analyze};
-/// use catoptric_sim;
+/// use catoptric_sim as sim;
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let mut scene: sim::Scene = toml::from_str(include_str!("../../../../scenes/two-mirror.toml"))?;

@@ -18,7 +18,8 @@
 //! move the rig or look for large objects.
 //!
 //! ```
-//! use catoptric::{layout, sim};
+//! use catoptric_design::layout;
+//! use catoptric_sim as sim;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let scene: sim::Scene = toml::from_str(include_str!("../../../../scenes/prototype.toml"))?;
