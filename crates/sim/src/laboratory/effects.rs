@@ -141,8 +141,8 @@ impl EffectSource<'_> {
         }
     }
 
-    /// Takes the AR(1) step of all beams, which turns the innovations of a scan into states: x₀ = ε₀, xₖ = φ·xₖ₋₁ + √(1
-    /// − φ²)·εₖ.
+    /// Takes the AR(1) step of all beams, which turns the innovations of a scan into states: x₀ = ε₀,
+    /// xₖ = φ·xₖ₋₁ + √(1 − φ²)·εₖ.
     pub(super) fn remember(&self, scan: usize, memory: &mut Memory, innovations: &mut [f64]) {
         let Some(law) = self.correlated() else { return };
         let period_s = self.geometry.scan_period_s();

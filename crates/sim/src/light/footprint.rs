@@ -33,7 +33,7 @@ pub const ENERGY_INSIDE: f64 = 0.864_664_716_763_387_3;
 /// Smallest number of rays of which some are placed outside the contour.
 const FEWEST_SPLIT: usize = 9;
 
-/// Number of rings outside the contour per square root of the number of rays there: two rings from 144 rays on.
+/// Square root of the number of rays outside the contour, divided by the number of rings there: two from 144 rays on.
 ///
 /// Without a second ring the tail of the beam is never resolved, however many rays there are. Fewer rays per ring would
 /// improve smaller numbers of rays too, but change what is recorded with up to a thousand rays.
@@ -177,8 +177,8 @@ fn correct_spread(rays: &mut [SubRay], inside: usize) {
 
 /// The ray of a sub-ray of the beam at a given azimuth, in the sensor frame.
 ///
-/// Behind a spinning 45° mirror the spot rotates with the azimuth θ: its long axis is along cos θ·(horizontal) + sin
-/// θ·(vertical), its short axis along −sin θ·(horizontal) + cos θ·(vertical).
+/// Behind a spinning 45° mirror the spot rotates with the azimuth θ: its long axis is along
+/// cos θ·(horizontal) + sin θ·(vertical), its short axis along −sin θ·(horizontal) + cos θ·(vertical).
 pub fn ray(shape: &BeamShape, azimuth: f64, sub_ray: &SubRay) -> Ray {
     let direction = beam::direction(azimuth);
     if sub_ray.wide == 0.0 && sub_ray.narrow == 0.0 {

@@ -6,7 +6,7 @@
 //! ```text
 //! left and right:  y → −y      azimuths α → −α, in reverse order
 //! up and down:     z → −z      elevations ε → −ε
-//! rotation by τ:                azimuths α → α + τ
+//! rotation by τ:               azimuths α → α + τ
 //! ```
 
 use crate::build::layout::plate_azimuth_deg;

@@ -38,8 +38,8 @@ pub fn is_seen(pulses: &[Pulse], sd: f64, threshold: f64) -> bool {
     is_surely_seen(pulses, sd, threshold) || bracket(pulses, sd, threshold).is_some()
 }
 
-/// Whether a bound proves that the threshold is reached: at the nearest pulse all pulses have at least exp(−δ²/2) ≥ 1 −
-/// δ²/2 of their height, with δ the distance of the farthest divided by σ.
+/// Whether a bound proves that the threshold is reached: at the nearest pulse all pulses have at least
+/// exp(−δ²/2) ≥ 1 − δ²/2 of their height, with δ the distance of the farthest divided by σ.
 fn is_surely_seen(pulses: &[Pulse], sd: f64, threshold: f64) -> bool {
     /// Far above the rounding error of the sums.
     const ROUNDING: f64 = 1e-9;
