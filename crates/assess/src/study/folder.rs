@@ -4,7 +4,7 @@
 use super::plan::Plan;
 use super::{
     ElementAngles, Job, Part, Run, Study, StudyError, Summary, elements_from_csv, elements_to_csv, from_csv,
-    in_order, merge, run_with_elements, spread, spread_to_csv, summarize, to_csv,
+    in_order, merge, run_with_elements, spread, spread_to_csv, to_csv,
 };
 use catoptric_files::{IoError, write_file, write_json};
 use rayon::prelude::*;
@@ -254,12 +254,17 @@ fn experiments(study: &Study, chunk: &[Job], with_elements: bool) -> Result<Foun
     })
 }
 
-/// Writes the tables and the result, and removes the tables of chunks; the returned summary includes the durations.
+/// Writes the tables and the result, the summary of the runs found, and removes the tables of chunks; the returned summary
+/// includes the durations.
 ///
 /// # Errors
 /// [`StudyError::File`] if writing fails.
-pub fn finish(folder: &Path, study: &Study, found: &Found) -> Result<Summary, StudyError> {
-    let mut summary = summarize(study, &found.runs);
+pub fn finish(
+    folder: &Path,
+    study: &Study,
+    found: &Found,
+    mut summary: Summary,
+) -> Result<Summary, StudyError> {
     if let Some(elements) = &found.elements {
         write_file(folder.join(SPREAD), spread_to_csv(&spread(elements)).as_bytes())?;
     }

@@ -3,7 +3,7 @@
 use super::stoppable;
 use crate::{Control, Error};
 use catoptric_assess::study::folder::{self, Found};
-use catoptric_assess::study::{Part, Plan, Study, Summary, gather};
+use catoptric_assess::study::{Part, Plan, Study, Summary, gather, summarize};
 use std::path::{Path, PathBuf};
 
 /// Name of the page of a study.
@@ -44,14 +44,14 @@ pub fn merge_studies(shards: &[PathBuf], out: impl AsRef<Path>) -> Result<Summar
 }
 
 fn finish(out: &Path, plan: &Plan, study: &Study, found: &Found) -> Result<Summary, Error> {
+    let summary = summarize(study, &found.runs);
     #[cfg(feature = "report")]
     {
         let elements = found.elements.as_deref().unwrap_or_default();
-        let summary = catoptric_assess::study::summarize(study, &found.runs);
         let page = catoptric_report::study(&plan.name, study, &summary, elements);
         catoptric_files::write_file(out.join(STUDY_PAGE), page.as_bytes())?;
     }
     #[cfg(not(feature = "report"))]
     let _ = plan;
-    Ok(folder::finish(out, study, found)?)
+    Ok(folder::finish(out, study, found, summary)?)
 }
