@@ -7,7 +7,7 @@
 
 use catoptric::cast::Mesh;
 use catoptric::cast::Ray;
-use catoptric::cast::{Contact, Met, Polygon, Rays, Shape, Triangles, World};
+use catoptric::cast::{Hit, TriangleHit, Polygon, Rays, Shape, Triangles, World};
 use catoptric::model::Pose;
 use nalgebra::{Point3, Unit, Vector3};
 use std::fs;
@@ -39,8 +39,8 @@ type Caster<'a> = Box<dyn Fn(&Rays, &mut Found, &mut [f64]) + Sync + 'a>;
 /// Buffers for their hits.
 #[derive(Default)]
 struct Found {
-    met: Vec<Option<Met>>,
-    contacts: Vec<Option<Contact>>,
+    met: Vec<Option<TriangleHit>>,
+    hits: Vec<Option<Hit>>,
 }
 
 /// A ray from its six numbers in the file.
@@ -107,14 +107,14 @@ fn main() {
     let build = start.elapsed().as_secs_f64();
     let memory = resident_mb() - before;
     let parry;
-    let distance = |met: Option<Met>| met.map_or(f64::INFINITY, |m| m.distance);
+    let distance = |met: Option<TriangleHit>| met.map_or(f64::INFINITY, |m| m.distance);
     let mut together = BLOCK;
     let cast: Caster<'_> = match engine.as_str() {
         "single" => {
             let placed = &placed;
             Box::new(move |rays, found, distances| {
                 found.met.resize(rays.len(), None);
-                placed.nearest_of_each(rays, &mut found.met);
+                placed.cast_each(rays, &mut found.met);
                 for (place, met) in distances.iter_mut().zip(&found.met) {
                     *place = distance(*met);
                 }
@@ -141,10 +141,10 @@ fn main() {
             let world = World::new(triangles.iter().map(|t| Shape::Polygon(polygon(t))).collect());
             together = count;
             Box::new(move |rays, found, distances| {
-                found.contacts.resize(rays.len(), None);
-                world.cast_beam(rays, None, &mut found.contacts);
-                for (place, contact) in distances.iter_mut().zip(&found.contacts) {
-                    *place = contact.map_or(f64::INFINITY, |c| c.distance);
+                found.hits.resize(rays.len(), None);
+                world.cast_packets(rays, None, &mut found.hits);
+                for (place, hit) in distances.iter_mut().zip(&found.hits) {
+                    *place = hit.map_or(f64::INFINITY, |c| c.distance);
                 }
             })
         }
@@ -154,7 +154,7 @@ fn main() {
             together = count;
             Box::new(move |rays, found, distances| {
                 found.met.resize(rays.len(), None);
-                placed.nearest_of_beam(rays, &mut found.met);
+                placed.cast_packets(rays, &mut found.met);
                 for (place, met) in distances.iter_mut().zip(&found.met) {
                     *place = distance(*met);
                 }

@@ -1,32 +1,33 @@
-//! Hits of rays on surfaces, and their compact record.
+//! What a ray meets, in two records: a small one for every ray that is cast, and the full one into which it is turned
+//! once, for the rays that need it.
 
 use nalgebra::{Point3, Unit, Vector3};
 
-/// Where a ray hits a surface.
-#[derive(Debug, Clone, Copy)]
+/// The nearest hit of a ray; [`World::surface_point`](crate::World::surface_point) adds where it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
+    /// Index of the surface.
+    pub surface: u32,
+    /// Index of the triangle if the surface is a mesh, otherwise [`NONE`].
+    pub(crate) triangle: u32,
+    /// Distance from the ray's origin, in meters.
+    pub distance: f64,
+    /// Dot product of the ray's direction and the normal of the surface's front, as in [`SurfacePoint`].
+    pub closing: f64,
+}
+
+/// A point of a surface where a ray hits it.
+#[derive(Debug, Clone, Copy)]
+pub struct SurfacePoint {
     /// Index of the surface.
     pub surface: usize,
     /// Distance from the ray's origin, in meters.
     pub distance: f64,
-    /// The hit point.
+    /// The point.
     pub point: Point3<f64>,
     /// Normal of the surface's front.
     pub normal: Unit<Vector3<f64>>,
     /// Dot product of the ray's direction and the normal: the cosine of the incidence, negative for a hit on the front.
-    pub closing: f64,
-}
-
-/// Compact record of a hit; [`World::hit`](crate::World::hit) completes it with the point and the normal.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Contact {
-    /// Index of the surface.
-    pub surface: u32,
-    /// Index of the triangle, if the surface is a mesh.
-    pub(crate) triangle: u32,
-    /// Distance from the ray's origin, in meters.
-    pub distance: f64,
-    /// Dot product of the ray's direction and the normal of the surface's front, as in [`Hit`].
     pub closing: f64,
 }
 
@@ -45,7 +46,7 @@ impl Hit {
     }
 }
 
-impl Contact {
+impl SurfacePoint {
     /// Whether the front was hit.
     pub fn front(&self) -> bool {
         self.closing < 0.0

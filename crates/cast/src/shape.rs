@@ -1,5 +1,6 @@
 //! The surfaces that a ray can hit: polygon, box, cylinder or mesh.
 
+use crate::hit::NONE;
 use crate::mesh::Triangles;
 use crate::ray::Ray;
 use crate::solid::block::to_glam;
@@ -35,13 +36,26 @@ impl Shape {
         }
     }
 
+    /// Returns the distance at which a ray hits the shape, and the triangle of a mesh, otherwise [`NONE`].
+    pub(crate) fn hit(&self, ray: &Ray) -> Option<(f64, u32)> {
+        match self {
+            Self::Polygon(polygon) => Some((polygon.cast(ray)?, NONE)),
+            Self::Block(block) => Some((block.cast(ray)?.0, NONE)),
+            Self::Cylinder(cylinder) => Some((cylinder.cast(ray)?.0, NONE)),
+            Self::Mesh(mesh) => {
+                let hit = mesh.cast(ray)?;
+                Some((hit.distance, hit.triangle))
+            }
+        }
+    }
+
     /// Returns the distance at which a ray hits the shape, and the normal there.
-    pub(crate) fn cast(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
+    pub(crate) fn intersect(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
         match self {
             Self::Polygon(polygon) => Some((polygon.cast(ray)?, polygon.normal)),
             Self::Block(block) => block.cast(ray),
             Self::Cylinder(cylinder) => cylinder.cast(ray),
-            Self::Mesh(mesh) => mesh.cast(ray),
+            Self::Mesh(mesh) => mesh.intersect(ray),
         }
     }
 
@@ -64,7 +78,7 @@ impl Shape {
                     && (a.radius, a.half_height) == (b.radius, b.half_height)
             }
             (Self::Mesh(a), Self::Mesh(b)) => Arc::ptr_eq(a, b),
-            _ => false,
+            (Self::Polygon(_) | Self::Block(_) | Self::Cylinder(_) | Self::Mesh(_), _) => false,
         }
     }
 
@@ -74,13 +88,13 @@ impl Shape {
             origin: *point,
             direction: Vector3::x_axis(),
         };
-        self.cast(&ray)
+        self.intersect(&ray)
             .is_some_and(|(_, normal)| normal.dot(&ray.direction) > 0.0)
     }
 
     /// Returns the distance at which a ray hits the shape.
     pub fn distance(&self, ray: &Ray) -> Option<f64> {
-        Some(self.cast(ray)?.0)
+        Some(self.hit(ray)?.0)
     }
 }
 

@@ -3,17 +3,11 @@
 //! Everything is in f32 and rounded outward: a box contains its triangles in spite of rounding. A hit found here is a
 //! candidate, decided in f64.
 
-use fearless_simd::f32x8;
-use fearless_simd::{Simd, prelude::*};
-
 /// Children per node and triangles per leaf.
 pub(crate) const WIDTH: usize = 8;
 
 /// Maximum depth that the builder reaches: below its `SORTED` levels, parts are halved by count.
 pub(crate) const DEEPEST: usize = 20;
-
-/// Maximum number of entries on the traversal stack: seven siblings on each level.
-const STACK: usize = (WIDTH - 1) * DEEPEST + 1;
 
 /// Eight child boxes and the children.
 #[derive(Debug, Clone, Copy)]
@@ -91,82 +85,6 @@ impl Node {
         Self {
             bounds: [[[FAR; WIDTH], [-FAR; WIDTH]]; 3],
             children: [Child::NONE; WIDTH],
-        }
-    }
-}
-
-/// Traversal stack: the nodes and leaves still to be visited, the nearest on top.
-pub(crate) struct Walk {
-    stack: [Entry; STACK],
-    height: usize,
-}
-
-/// A node or a leaf, with a lower bound on the distance to it.
-type Entry = (f32, Child);
-
-impl Walk {
-    #[inline(always)]
-    pub(crate) fn new() -> Self {
-        Self {
-            stack: [(f32::INFINITY, Child::NONE); STACK],
-            height: 0,
-        }
-    }
-
-    /// Clears the stack and returns the root.
-    #[inline(always)]
-    pub(crate) fn start(&mut self) -> Child {
-        self.height = 0;
-        Child::node(0)
-    }
-
-    /// Pops the nearest entry that is within `limit`.
-    #[inline(always)]
-    pub(crate) fn next(&mut self, limit: f32) -> Option<Child> {
-        loop {
-            self.height = self.height.checked_sub(1)?;
-            let (near, child) = self.stack[self.height];
-            if near <= limit {
-                return Some(child);
-            }
-        }
-    }
-
-    /// Returns the nearest of the children hit, and pushes the others.
-    #[inline(always)]
-    pub(crate) fn enter<S: Simd>(&mut self, node: &Node, mut met: u32, near: f32x8<S>) -> Option<Child> {
-        const LANE: usize = WIDTH - 1;
-        if met == 0 {
-            return None;
-        }
-        // The usual case: a single child is hit.
-        if met & (met - 1) == 0 {
-            return Some(node.children[met.trailing_zeros() as usize & LANE]);
-        }
-        let mut nears = [0.0; WIDTH];
-        near.store_slice(&mut nears);
-        let mut take = || {
-            let lane = met.trailing_zeros() as usize & LANE;
-            met &= met - 1;
-            ((nears[lane], node.children[lane]), met == 0)
-        };
-        let (mut nearest, _) = take();
-        let bottom = self.height;
-        loop {
-            let (mut entry, last) = take();
-            if entry.0 < nearest.0 {
-                std::mem::swap(&mut entry, &mut nearest);
-            }
-            let mut place = self.height;
-            while place > bottom && self.stack[place - 1].0 < entry.0 {
-                self.stack[place] = self.stack[place - 1];
-                place -= 1;
-            }
-            self.stack[place] = entry;
-            self.height += 1;
-            if last {
-                return Some(nearest.1);
-            }
         }
     }
 }

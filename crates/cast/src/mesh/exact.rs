@@ -16,7 +16,7 @@ use nalgebra::{Point3, Unit, Vector3};
 
 /// Hit of a ray on a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Met {
+pub struct TriangleHit {
     /// Index of the triangle.
     pub triangle: u32,
     /// Distance from the ray's origin, in meters.

@@ -11,7 +11,7 @@ use fearless_simd::{Simd, prelude::*};
 use fearless_simd::{f64x8, mask32x16, mask64x8, u32x16};
 
 /// Hits of one row of sixteen rays.
-pub(crate) struct MetInRow<'a> {
+pub(crate) struct RowHits<'a> {
     pub(crate) row: usize,
     /// One bit per ray, set for a hit; the numbers of the other rays are undefined.
     pub(crate) some: u64,
@@ -53,7 +53,7 @@ pub(crate) fn finish<S: Simd, const R: usize, const CLOSING: bool>(
     found: &[[u32; LANES]; R],
     rays: &InRows<'_, R>,
     judge: &Judge<'_>,
-    mut emit: impl FnMut(&MetInRow<'_>),
+    mut emit: impl FnMut(&RowHits<'_>),
 ) {
     let none = Kept {
         triangle: NONE,
@@ -93,7 +93,7 @@ pub(crate) fn finish<S: Simd, const R: usize, const CLOSING: bool>(
         state.settle(simd);
     }
     for (row, triangle) in found.iter().enumerate().take(rows) {
-        emit(&MetInRow {
+        emit(&RowHits {
             row,
             some: parts[row],
             triangle,

@@ -1,16 +1,16 @@
 //! A placed triangle mesh that rays can be cast into.
 //!
 //! An f32 index over SIMD lanes finds candidate triangles; the hit is decided in f64 and is watertight. Results are
-//! bit-identical with any instruction set, for a single ray or in a beam. Of triangles hit at exactly the same distance,
+//! bit-identical with any instruction set, for a single ray or in a packet. Of triangles hit at exactly the same distance,
 //! the one with the lowest index counts.
 
 use crate::index::wide::WideBvh;
 use crate::lanes::inlined;
-use crate::mesh::beam::{self, Found};
 use crate::mesh::data::Mesh;
-use crate::mesh::each;
-use crate::mesh::exact::{Judge, Met};
-use crate::mesh::finish::{MetInRow, finish};
+use crate::mesh::exact::{Judge, TriangleHit};
+use crate::mesh::finish::{RowHits, finish};
+use crate::mesh::packet::{self, Found};
+use crate::mesh::single;
 use crate::packet::cast::{Caster, Packet, cast_all};
 use crate::packet::rays::Rays;
 use crate::packet::rows::LANES;
@@ -73,48 +73,48 @@ impl Triangles {
     }
 
     /// Returns the nearest hit of a ray.
-    pub fn nearest(&self, ray: &Ray) -> Option<Met> {
-        let mut met = [None];
-        self.follow_each(Level::new(), |_| *ray, &mut met);
-        met[0]
+    pub fn cast(&self, ray: &Ray) -> Option<TriangleHit> {
+        let mut hits = [None];
+        self.follow_each(Level::new(), |_| *ray, &mut hits);
+        hits[0]
     }
 
     /// Finds the nearest hit of each ray, for incoherent rays.
     ///
     /// # Panics
     /// If the numbers of rays and result slots differ.
-    pub fn nearest_of_each(&self, rays: &Rays, met: &mut [Option<Met>]) {
-        InMesh::new(self, Level::new()).cast_each(rays, 0..rays.len(), met);
+    pub fn cast_each(&self, rays: &Rays, hits: &mut [Option<TriangleHit>]) {
+        InMesh::new(self, Level::new()).cast_each(rays, 0..rays.len(), hits);
     }
 
     /// Finds the nearest hit of each ray: fast for coherent rays, a narrow cone with nearly one origin.
     ///
     /// # Panics
     /// If the numbers of rays and result slots differ.
-    pub fn nearest_of_beam(&self, rays: &Rays, met: &mut [Option<Met>]) {
-        cast_all(&InMesh::new(self, Level::new()), rays, met);
+    pub fn cast_packets(&self, rays: &Rays, hits: &mut [Option<TriangleHit>]) {
+        cast_all(&InMesh::new(self, Level::new()), rays, hits);
     }
 
-    fn follow_each(&self, level: Level, rays: impl Fn(usize) -> Ray, met: &mut [Option<Met>]) {
-        let (judge, count) = (self.judge(), met.len());
+    fn follow_each(&self, level: Level, rays: impl Fn(usize) -> Ray, hits: &mut [Option<TriangleHit>]) {
+        let (judge, count) = (self.judge(), hits.len());
         dispatch!(level, simd => {
-            let emit = inlined(#[inline(always)] |ray: usize, of_ray| met[ray] = of_ray);
-            each::follow(simd, &self.wide, &judge, count, &rays, emit);
+            let emit = inlined(#[inline(always)] |ray: usize, of_ray| hits[ray] = of_ray);
+            single::follow(simd, &self.wide, &judge, count, &rays, emit);
         });
     }
 
     /// Emits the nearest hits of a packet, row by row, with the incidence if `CLOSING`. The packet's reach may exceed that
     /// of the mesh.
     #[inline(always)]
-    pub(crate) fn nearest_of_packet<S: Simd, const R: usize, const CLOSING: bool>(
+    pub(crate) fn hits_of_packet<S: Simd, const R: usize, const CLOSING: bool>(
         &self,
         simd: S,
         packet: &Packet<'_, R>,
-        emit: impl FnMut(&MetInRow<'_>),
+        emit: impl FnMut(&RowHits<'_>),
     ) {
         let judge = self.judge();
         let mut found = Found::new(packet.rays.count);
-        beam::follow(simd, &self.wide, packet, &judge, &mut found);
+        packet::follow(simd, &self.wide, packet, &judge, &mut found);
         finish::<S, R, CLOSING>(simd, found.triangles(), &packet.rays, &judge, emit);
     }
 
@@ -129,9 +129,9 @@ impl Triangles {
     }
 
     /// Returns distance and normal of the nearest hit of a ray.
-    pub(crate) fn cast(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
-        let met = self.nearest(ray)?;
-        Some((met.distance, self.normal(met.triangle, ray)))
+    pub(crate) fn intersect(&self, ray: &Ray) -> Option<(f64, Unit<Vector3<f64>>)> {
+        let hit = self.cast(ray)?;
+        Some((hit.distance, self.normal(hit.triangle, ray)))
     }
 }
 
@@ -147,25 +147,25 @@ impl<'a> InMesh<'a> {
     }
 }
 
-impl Caster<Option<Met>> for InMesh<'_> {
-    fn cast_each(&self, rays: &Rays, which: Range<usize>, met: &mut [Option<Met>]) {
-        assert_eq!(which.len(), met.len(), "one result slot per ray");
+impl Caster<Option<TriangleHit>> for InMesh<'_> {
+    fn cast_each(&self, rays: &Rays, which: Range<usize>, hits: &mut [Option<TriangleHit>]) {
+        assert_eq!(which.len(), hits.len(), "one result slot per ray");
         let ray = inlined(
             #[inline(always)]
             |ray: usize| rays.get(which.start + ray),
         );
-        self.mesh.follow_each(self.level, ray, met);
+        self.mesh.follow_each(self.level, ray, hits);
     }
 
-    fn cast_rows<const R: usize>(&self, rays: &Rays, which: Range<usize>, met: &mut [Option<Met>]) -> bool {
+    fn cast_rows<const R: usize>(&self, rays: &Rays, which: Range<usize>, hits: &mut [Option<TriangleHit>]) -> bool {
         dispatch!(self.level, simd => {
             let mut packet = Packet::<R>::new(rays, which);
             let narrow = packet.surround(simd, self.mesh.wide.reach);
             if narrow {
-                self.mesh.nearest_of_packet::<_, R, false>(simd, &packet, inlined(#[inline(always)] |row: &MetInRow<'_>| {
-                    let places = met.chunks_mut(LANES).nth(row.row).unwrap_or_default();
+                self.mesh.hits_of_packet::<_, R, false>(simd, &packet, inlined(#[inline(always)] |row: &RowHits<'_>| {
+                    let places = hits.chunks_mut(LANES).nth(row.row).unwrap_or_default();
                     for (lane, place) in places.iter_mut().enumerate() {
-                        let found = Met { triangle: row.triangle[lane], distance: row.distance[lane] };
+                        let found = TriangleHit { triangle: row.triangle[lane], distance: row.distance[lane] };
                         *place = (row.some >> lane & 1 == 1).then_some(found);
                     }
                 }));
@@ -255,7 +255,7 @@ pub(crate) mod tests {
                     direction: outwards,
                 };
                 assert!(
-                    placed.cast(&ray).is_some(),
+                    placed.intersect(&ray).is_some(),
                     "leaks from {inside} towards {target}"
                 );
                 // From outside through the same point, no ray reaches the inside without a hit.
@@ -264,7 +264,7 @@ pub(crate) mod tests {
                     origin: outside,
                     direction: -outwards,
                 };
-                let (distance, _) = placed.cast(&ray).expect("a hit from outside");
+                let (distance, _) = placed.intersect(&ray).expect("a hit from outside");
                 assert!(distance < 4.0, "leaks from outside at {target}");
             }
         });
@@ -325,7 +325,7 @@ pub(crate) mod tests {
                             origin: from,
                             direction: Unit::new_unchecked(along),
                         };
-                        let (distance, normal) = placed.cast(&ray).expect("a closed mesh");
+                        let (distance, normal) = placed.intersect(&ray).expect("a closed mesh");
                         let expected = if sign > 0.0 { f64::from(UNITS) - 3.25 } else { 3.25 };
                         assert_eq!((distance, normal.into_inner()), (expected, along), "from {from}");
                     }
@@ -344,7 +344,7 @@ pub(crate) mod tests {
                 origin: Point3::origin(),
                 direction: Unit::new_normalize(draws.normal3()),
             };
-            let (found, normal) = placed.cast(&ray).expect("a closed mesh");
+            let (found, normal) = placed.intersect(&ray).expect("a closed mesh");
             // By solving a + s(b − a) + t(c − a) = d·u for every triangle.
             let solved = (0..placed.triangles.len()).filter_map(|i| {
                 let [a, b, c] = placed.corners(i);
@@ -374,6 +374,6 @@ pub(crate) mod tests {
             origin: Point3::new(0.5, 0.0, -1.0),
             direction: Vector3::z_axis(),
         };
-        assert!(placed.cast(&ray).is_none());
+        assert!(placed.intersect(&ray).is_none());
     }
 }

@@ -7,4 +7,4 @@ pub(crate) mod rays;
 pub(crate) mod rows;
 
 pub use rays::Rays;
-pub use rows::BUNDLE;
+pub use rows::PACKET;

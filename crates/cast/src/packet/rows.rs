@@ -15,9 +15,9 @@ pub(crate) const TWO_ROWS: usize = 2 * LANES;
 pub(crate) const FOUR_ROWS: usize = 4 * LANES;
 pub(crate) const MOST: usize = ROWS * LANES;
 
-/// Rays that [`World::cast_beam`](crate::World::cast_beam) and
-/// [`Triangles::nearest_of_beam`](crate::Triangles::nearest_of_beam) cast as one packet.
-pub const BUNDLE: usize = MOST;
+/// Rays of a full packet of [`World::cast_packets`](crate::World::cast_packets) and
+/// [`Triangles::cast_packets`](crate::Triangles::cast_packets).
+pub const PACKET: usize = MOST;
 
 /// One number per ray.
 #[derive(Clone, Copy)]

@@ -11,7 +11,7 @@ use crate::build::trajectory::Trajectory;
 use crate::error::SimError;
 use crate::light::optics::{Mirrors, Rig, Setting};
 use crate::receive::reading::{Parts, Return, SubRayEnd};
-use catoptric_cast::BUNDLE;
+use catoptric_cast::PACKET;
 use catoptric_model::{Pose, PoseKind};
 use rayon::prelude::*;
 
@@ -40,9 +40,9 @@ const PACKETS: usize = 4;
 fn together(sub_rays: usize) -> usize {
     let filled = |beams: usize| {
         let rays = beams * sub_rays;
-        rays as f64 / rays.next_multiple_of(BUNDLE) as f64
+        rays as f64 / rays.next_multiple_of(PACKET) as f64
     };
-    let most = (PACKETS * BUNDLE / sub_rays.max(1)).clamp(1, BEAMS_OF_A_THREAD);
+    let most = (PACKETS * PACKET / sub_rays.max(1)).clamp(1, BEAMS_OF_A_THREAD);
     (1..=most).fold(
         1,
         |best, beams| if filled(beams) > filled(best) { beams } else { best },
@@ -224,7 +224,7 @@ mod tests {
             let beams = together(sub_rays);
             assert!((1..=BEAMS_OF_A_THREAD).contains(&beams), "{beams} of {sub_rays}");
             let rays = beams * sub_rays;
-            assert!(beams == 1 || rays <= PACKETS * BUNDLE, "{rays} rays");
+            assert!(beams == 1 || rays <= PACKETS * PACKET, "{rays} rays");
         }
         // Eight of 16 fill one packet; six of 19 would leave 14 lanes of one empty, twenty leave 4 of three.
         assert_eq!((together(16), together(19)), (8, 20));

@@ -2,7 +2,7 @@
 
 use crate::light::glass::Passage;
 use catoptric_cast::Ray;
-use catoptric_cast::{Hit, placed};
+use catoptric_cast::{SurfacePoint, placed};
 use catoptric_model::Pose;
 use nalgebra::{Point3, Vector3};
 
@@ -13,7 +13,7 @@ pub const MAX_BOUNCES: usize = 8;
 #[derive(Debug, Clone, Copy)]
 pub enum End {
     /// On a surface that scatters.
-    Hit(Hit),
+    Hit(SurfacePoint),
     /// In the open.
     Escaped,
     /// Between mirrors after the last bounce that is allowed, or in the rim of a mirror's glass.

@@ -12,7 +12,7 @@ use crate::build::structure::{Back, BuiltFacet, OpaquePart, Structure};
 use crate::error::SimError;
 use crate::scene::Scene;
 use catoptric_cast::Ray;
-use catoptric_cast::{Contact, Hit, Rays, Shape, World, placed};
+use catoptric_cast::{Hit, SurfacePoint, Rays, Shape, World, placed};
 use catoptric_model::Pose;
 use nalgebra::{Point3, Unit, Vector3};
 use std::borrow::Cow;
@@ -79,7 +79,7 @@ pub(super) struct Contents<'a> {
 
 /// The end of a leg of a ray, in the frame in which the surface is kept.
 pub(super) struct Leg<'p> {
-    pub(super) hit: Hit,
+    pub(super) hit: SurfacePoint,
     /// Direction of the ray.
     pub(super) incoming: Unit<Vector3<f64>>,
     /// From the sensor frame to that frame, unless they are the same.
@@ -120,7 +120,7 @@ pub enum Mirrors {
 #[derive(Debug, Default)]
 pub(crate) struct Beyond {
     rays: Rays,
-    pub(crate) contacts: Vec<Option<Contact>>,
+    pub(crate) hits: Vec<Option<Hit>>,
 }
 
 impl Beyond {
@@ -274,15 +274,15 @@ impl<'a> Setting<'a> {
 
     /// Casts all legs into the room, those of neighboring beams together.
     pub(crate) fn cast_into_room(&self, beyond: &mut Beyond) {
-        beyond.contacts.clear();
-        beyond.contacts.resize(beyond.rays.len(), None);
+        beyond.hits.clear();
+        beyond.hits.resize(beyond.rays.len(), None);
         if let Some(room) = &self.contents.room {
-            room.cast_beam(&beyond.rays, None, &mut beyond.contacts);
+            room.cast_packets(&beyond.rays, None, &mut beyond.hits);
         }
     }
 
     /// Index among all surfaces of one that a leg hit in the room.
-    pub(crate) fn met_in_room(&self, contact: &Contact) -> usize {
+    pub(crate) fn surface_in_room(&self, contact: &Hit) -> usize {
         contact.surface as usize + self.contents.first_of_room
     }
 
@@ -348,7 +348,7 @@ impl<'a> Setting<'a> {
     }
 
     /// A leg whose end is kept in the sensor frame.
-    pub(super) fn unmoved(&self, hit: Hit, incoming: Unit<Vector3<f64>>) -> Leg<'_> {
+    pub(super) fn unmoved(&self, hit: SurfacePoint, incoming: Unit<Vector3<f64>>) -> Leg<'_> {
         Leg {
             hit,
             incoming,
@@ -372,14 +372,14 @@ impl<'a> Setting<'a> {
     }
 
     /// The same along every ray of a beam.
-    pub(super) fn cast_beam<'s>(&'s self, rays: &Rays, left: Option<usize>, legs: &mut Vec<Option<Leg<'s>>>) {
+    pub(super) fn cast_packets<'s>(&'s self, rays: &Rays, left: Option<usize>, legs: &mut Vec<Option<Leg<'s>>>) {
         legs.clear();
         let contents = &*self.contents;
         let first = contents.first_of_room;
         let cast = |world: &World, rays: &Rays, left: Option<usize>| {
-            let mut contacts = vec![None; rays.len()];
-            world.cast_beam(rays, left, &mut contacts);
-            contacts
+            let mut hits = vec![None; rays.len()];
+            world.cast_packets(rays, left, &mut hits);
+            hits
         };
         let world = &contents.world;
         let own = cast(world, rays, left.filter(|l| *l < first));
@@ -403,8 +403,8 @@ impl<'a> Setting<'a> {
     /// The nearer of what a ray hits of the structure and, in the frame of the room, of the room.
     fn nearer(
         &self,
-        (own, ray): (Option<Hit>, &Ray),
-        (past, in_room): (Option<Hit>, &Ray),
+        (own, ray): (Option<SurfacePoint>, &Ray),
+        (past, in_room): (Option<SurfacePoint>, &Ray),
     ) -> Option<Leg<'_>> {
         match (own, past) {
             (Some(own), Some(past)) if own.distance <= past.distance => {
@@ -412,7 +412,7 @@ impl<'a> Setting<'a> {
             }
             (own, None) => Some(self.unmoved(own?, ray.direction)),
             (_, Some(past)) => Some(Leg {
-                hit: Hit {
+                hit: SurfacePoint {
                     surface: past.surface + self.contents.first_of_room,
                     ..past
                 },
@@ -425,8 +425,8 @@ impl<'a> Setting<'a> {
 
 impl Leg<'_> {
     /// The end of the leg in the sensor frame.
-    pub(super) fn in_sensor_frame(&self) -> Hit {
-        self.kept_from_sensor.map_or(self.hit, |pose| Hit {
+    pub(super) fn in_sensor_frame(&self) -> SurfacePoint {
+        self.kept_from_sensor.map_or(self.hit, |pose| SurfacePoint {
             point: pose.inverse_transform_point(&self.hit.point),
             normal: pose.inverse_transform_unit_vector(&self.hit.normal),
             ..self.hit

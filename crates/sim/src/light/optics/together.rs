@@ -41,7 +41,7 @@ impl Setting<'_> {
             for group in going.chunk_by(|a, b| a.0 == b.0) {
                 beam.clear();
                 beam.extend(group.iter().map(|(_, ray)| courses[*ray].last));
-                self.cast_beam(&beam, group[0].0, &mut legs);
+                self.cast_packets(&beam, group[0].0, &mut legs);
                 for ((_, ray), leg) in group.iter().zip(&legs) {
                     let course = &mut courses[*ray];
                     if let Some(leg) = leg

@@ -8,7 +8,7 @@ use crate::light::footprint;
 use crate::light::optics::{BeamPaths, Rig, Run, Setting, Then};
 use crate::light::power::{self, Target};
 use crate::receive::detect::Pulse;
-use catoptric_cast::Contact;
+use catoptric_cast::Hit;
 use std::ops::Range;
 
 /// Sub-rays that leave the structure identically, and what is around it.
@@ -47,7 +47,7 @@ impl Sensor {
         if let Some(any) = settings.first() {
             any.cast_into_room(&mut beyond);
         }
-        let mut in_room = beyond.contacts.as_slice();
+        let mut in_room = beyond.hits.as_slice();
         for ((setting, beam), place) in settings.iter().zip(first..).zip(returns) {
             let paths = rig.paths(beam);
             let (own, others) = in_room.split_at(paths.leaving.len());
@@ -64,7 +64,7 @@ impl Sensor {
         paths: &BeamPaths<'_>,
         setting: &Setting<'_>,
         beam: usize,
-        in_room: &[Option<Contact>],
+        in_room: &[Option<Hit>],
         parts: &mut Parts,
     ) {
         parts.begin();
@@ -98,13 +98,13 @@ impl Sensor {
         &self,
         context: &RunContext<'_>,
         beam: usize,
-        in_room: &[Option<Contact>],
+        in_room: &[Option<Hit>],
         parts: &mut Parts,
     ) {
         let RunContext { setting, paths, run } = *context;
         let mut done = 0;
         while let Some(first) = in_room.get(done) {
-            let surface = first.map(|contact| setting.met_in_room(&contact));
+            let surface = first.map(|hit| setting.surface_in_room(&hit));
             let mirror = surface.filter(|surface| setting.is_mirror(*surface));
             // Mirrors are handled ray by ray.
             let count = if mirror.is_some() {
@@ -112,11 +112,11 @@ impl Sensor {
             } else {
                 same_surface(&in_room[done..])
             };
-            let contacts = &in_room[done..done + count];
+            let hits = &in_room[done..done + count];
             let from = run.sub_rays.start + done;
             let sub_rays = from..from + count;
             done += count;
-            let front = first.is_some_and(|contact| contact.front());
+            let front = first.is_some_and(|hit| hit.front());
             if mirror.is_some_and(|mirror| setting.reflecting(mirror, front).is_some()) {
                 // Its light may return to the structure.
                 let sub_ray = &self.sub_rays[sub_rays.start];
@@ -125,11 +125,11 @@ impl Sensor {
                 continue;
             }
             if let Some(surface) = surface {
-                let ends = contacts.iter().zip(&paths.lengths[sub_rays.clone()]);
-                // All of these contacts exist.
-                let ends = ends.map(|(contact, length)| {
-                    let end = |contact: &Contact| (length + contact.distance, contact.cos_incidence());
-                    contact.as_ref().map_or((f64::INFINITY, 0.0), end)
+                let ends = hits.iter().zip(&paths.lengths[sub_rays.clone()]);
+                // All of these hits exist.
+                let ends = ends.map(|(hit, length)| {
+                    let end = |hit: &Hit| (length + hit.distance, hit.cos_incidence());
+                    hit.as_ref().map_or((f64::INFINITY, 0.0), end)
                 });
                 self.add_light(context, sub_rays.clone(), surface, ends, parts);
             }
@@ -196,11 +196,11 @@ impl Sensor {
 }
 
 /// Number of consecutive legs, from the first on, that hit the same surface, or nothing.
-fn same_surface(in_room: &[Option<Contact>]) -> usize {
-    let surface = |contact: &Option<Contact>| contact.as_ref().map(|contact| contact.surface);
+fn same_surface(in_room: &[Option<Hit>]) -> usize {
+    let surface = |hit: &Option<Hit>| hit.as_ref().map(|hit| hit.surface);
     let met = in_room.first().and_then(surface);
     in_room
         .iter()
-        .take_while(|contact| surface(contact) == met)
+        .take_while(|hit| surface(hit) == met)
         .count()
 }

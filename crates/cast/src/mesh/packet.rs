@@ -20,7 +20,8 @@
 //! ([`finish`](super::finish)).
 
 use crate::hit::NONE;
-use crate::index::wide::{Leaf, WIDTH, Walk, WideBvh};
+use crate::index::traversal::Traversal;
+use crate::index::wide::{Child, Leaf, Node, WIDTH, WideBvh};
 use crate::lanes::{cross, dot, inlined, minus, size};
 use crate::mesh::exact::Judge;
 use crate::packet::cast::Packet;
@@ -111,27 +112,19 @@ pub(crate) fn follow<S: Simd, const R: usize>(
     judge: &Judge<'_>,
     found: &mut Found<R>,
 ) {
-    let mut walk = Walk::new();
-    let mut next = Some(walk.start());
-    while let Some(child) = next {
-        let mut nearer = None;
-        if child.is_leaf() {
-            leaf(
-                simd,
-                &wide.leaves[child.number()],
-                child.count(),
-                wide.reach,
-                packet,
-                judge,
-                found,
-            );
-        } else {
-            let node = &wide.nodes[child.number()];
-            let (met, near) = packet.pyramid.boxes(simd, &node.bounds, found.limit);
-            nearer = walk.enter(node, met, near);
-        }
-        next = nearer.or_else(|| walk.next(found.limit));
-    }
+    let boxes = inlined(
+        #[inline(always)]
+        |node: &Node, limit: f32| packet.pyramid.boxes(simd, &node.bounds, limit),
+    );
+    let visit = inlined(
+        #[inline(always)]
+        |child: Child| {
+            let triangles = &wide.leaves[child.number()];
+            leaf(simd, triangles, child.count(), wide.reach, packet, judge, found);
+            found.limit
+        },
+    );
+    Traversal::new().run(&wide.nodes, upwards(FARTHEST), boxes, visit);
 }
 
 #[inline(always)]

@@ -1,22 +1,23 @@
-//! A world: surfaces with an index over them, into which rays are cast.
+//! A world: surfaces with one index over them, into which rays are cast one by one or in packets.
 
-use crate::hit::{Contact, Hit, NONE};
+mod packet;
+
+use crate::hit::{Hit, NONE, SurfacePoint};
 use crate::index::build::over_boxes;
-use crate::index::wide::Node;
+use crate::index::line::Line;
+use crate::index::traversal::Traversal;
+use crate::index::wide::{Child, Node};
+use crate::lanes::inlined;
 use crate::ray::{FARTHEST, Ray};
 use crate::rounding::upwards;
 use crate::shape::Shape;
-use crate::solid::block::to_glam;
+use fearless_simd::{Level, dispatch};
 use nalgebra::{Unit, Vector3};
-use parry3d::bounding_volume::Aabb;
 use parry3d::math::Vector;
-use parry3d::partitioning::{Bvh, BvhBuildStrategy};
 
 /// Surfaces with an index over them.
 pub struct World {
     pub(crate) shapes: Vec<Shape>,
-    bvh: Bvh,
-    /// The same boxes as an eight-wide index, for packets.
     pub(crate) nodes: Vec<Node>,
     pub(crate) reach: f32,
 }
@@ -24,17 +25,19 @@ pub struct World {
 impl World {
     /// Builds the index; a hit refers to a shape by its index in this list.
     pub fn new(shapes: Vec<Shape>) -> Self {
-        let boxes: Vec<Aabb> = shapes.iter().map(Shape::bounds).collect();
         let corner = |v: Vector| Vector3::new(v.x, v.y, v.z);
-        let corners: Vec<_> = boxes.iter().map(|b| (corner(b.mins), corner(b.maxs))).collect();
-        let reach = corners
+        let boxes: Vec<_> = shapes
             .iter()
-            .fold(0.0, |m: f64, (a, b)| m.max(a.amax()).max(b.amax()));
+            .map(|shape| {
+                let bounds = shape.bounds();
+                (corner(bounds.mins), corner(bounds.maxs))
+            })
+            .collect();
+        let reach = boxes.iter().fold(0.0, |m: f64, (a, b)| m.max(a.amax()).max(b.amax()));
         let reach = upwards(reach);
         Self {
-            bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes),
             shapes,
-            nodes: over_boxes(&corners, reach),
+            nodes: over_boxes(&boxes, reach),
             reach,
         }
     }
@@ -44,25 +47,30 @@ impl World {
         &self.shapes
     }
 
-    /// Returns the nearest hit of a ray, ignoring `left`, the mirror that it just left.
-    pub fn cast(&self, ray: &Ray, left: Option<usize>) -> Option<Hit> {
-        Some(self.hit(&self.contact(ray, left)?, ray))
+    /// Returns the nearest hit of a ray, ignoring the surface `except`, as a rule the mirror that the ray leaves. Of surfaces
+    /// at exactly the same distance, the one with the lowest index counts.
+    pub fn cast(&self, ray: &Ray, except: Option<usize>) -> Option<Hit> {
+        self.cast_at(Level::new(), ray, except)
     }
 
-    pub(crate) fn contact(&self, ray: &Ray, left: Option<usize>) -> Option<Contact> {
-        let parry_ray = parry3d::query::Ray::new(to_glam(&ray.origin.coords), to_glam(&ray.direction));
-        let (surface, distance) = self.bvh.cast_ray(&parry_ray, FARTHEST, |leaf, _| {
-            let leaf = leaf as usize;
-            if left == Some(leaf) {
-                return None;
-            }
-            self.shapes[leaf].distance(ray)
-        })?;
-        let triangle = match &self.shapes[surface as usize] {
-            Shape::Mesh(mesh) => mesh.nearest(ray)?.triangle,
-            _ => NONE,
-        };
-        Some(Contact {
+    pub(crate) fn cast_at(&self, level: Level, ray: &Ray, except: Option<usize>) -> Option<Hit> {
+        let (mut distance, mut surface, mut triangle) = (FARTHEST, NONE, NONE);
+        let line = Line::new(ray, self.reach);
+        dispatch!(level, simd => {
+            let boxes = inlined(#[inline(always)] |node: &Node, limit: f32| line.boxes(simd, node, limit));
+            let visit = inlined(#[inline(always)] |child: Child| {
+                let number = child.number();
+                if except != Some(number)
+                    && let Some((to_shape, of_mesh)) = self.shapes[number].hit(ray)
+                    && (to_shape, numbered(number)) < (distance, surface)
+                {
+                    (distance, surface, triangle) = (to_shape, numbered(number), of_mesh);
+                }
+                upwards(distance)
+            });
+            Traversal::new().run(&self.nodes, upwards(FARTHEST), boxes, visit);
+        });
+        (surface != NONE).then(|| Hit {
             surface,
             triangle,
             distance,
@@ -74,7 +82,9 @@ impl World {
     pub(crate) fn closing(&self, surface: u32, triangle: u32, ray: &Ray) -> f64 {
         match &self.shapes[surface as usize] {
             Shape::Mesh(mesh) => mesh.closing(triangle, ray),
-            _ => self.normal(surface, triangle, ray).dot(&ray.direction),
+            Shape::Polygon(_) | Shape::Block(_) | Shape::Cylinder(_) => {
+                self.normal(surface, triangle, ray).dot(&ray.direction)
+            }
         }
     }
 
@@ -84,20 +94,28 @@ impl World {
             Shape::Polygon(polygon) => polygon.normal,
             Shape::Mesh(mesh) => mesh.normal(triangle, ray),
             // The ray is known to hit it, so the fallback is never used.
-            other => other.cast(ray).map_or(-ray.direction, |(_, normal)| normal),
+            body @ (Shape::Block(_) | Shape::Cylinder(_)) => {
+                body.intersect(ray).map_or(-ray.direction, |(_, normal)| normal)
+            }
         }
     }
 
-    /// Completes a contact with the hit point and the normal.
-    pub fn hit(&self, contact: &Contact, ray: &Ray) -> Hit {
-        Hit {
-            surface: contact.surface as usize,
-            distance: contact.distance,
-            point: ray.origin + ray.direction.into_inner() * contact.distance,
-            normal: self.normal(contact.surface, contact.triangle, ray),
-            closing: contact.closing,
+    /// Returns the point of the surface that a ray hits, given its hit.
+    pub fn surface_point(&self, hit: &Hit, ray: &Ray) -> SurfacePoint {
+        SurfacePoint {
+            surface: hit.surface as usize,
+            distance: hit.distance,
+            point: ray.origin + ray.direction.into_inner() * hit.distance,
+            normal: self.normal(hit.surface, hit.triangle, ray),
+            closing: hit.closing,
         }
     }
+}
+
+/// Returns a surface's index as u32; nodes of the index limit it to fewer bits.
+#[allow(clippy::cast_possible_truncation)]
+pub(crate) fn numbered(surface: usize) -> u32 {
+    surface as u32
 }
 
 #[cfg(test)]
@@ -126,8 +144,9 @@ mod tests {
         for order in [[1.0, 2.0, 3.0], [3.0, 1.0, 2.0], [2.0, 3.0, 1.0]] {
             let world = World::new(order.map(square).to_vec());
             let hit = world.cast(&towards(0.1, 0.2), None).expect("a hit");
-            assert_eq!(order[hit.surface], 1.0);
-            assert!((hit.point.x - 1.0).abs() < 1e-15);
+            assert_eq!(order[hit.surface as usize], 1.0);
+            let point = world.surface_point(&hit, &towards(0.1, 0.2)).point;
+            assert!((point.x - 1.0).abs() < 1e-15);
         }
     }
 
@@ -157,6 +176,7 @@ mod tests {
         ]);
         let hit = world.cast(&towards(0.0, 0.0), None).expect("a hit");
         assert!((hit.distance - 2.75).abs() < 1e-12 && hit.front());
-        assert!((hit.normal.into_inner() + Vector3::x()).norm() < 1e-12);
+        let normal = world.surface_point(&hit, &towards(0.0, 0.0)).normal;
+        assert!((normal.into_inner() + Vector3::x()).norm() < 1e-12);
     }
 }

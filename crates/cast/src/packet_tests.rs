@@ -1,7 +1,8 @@
-//! Compares packets with single rays, with a brute-force test of every triangle, and with parry.
+//! Compares packets with single rays, with a brute-force test of every triangle and surface, and with parry.
 
+use crate::hit::Hit;
 use crate::mesh::data::Mesh;
-use crate::mesh::exact::Met;
+use crate::mesh::exact::TriangleHit;
 use crate::mesh::triangles::tests::random_star;
 use crate::mesh::triangles::{InMesh, Triangles};
 use crate::packet::cast::{Caster, cast_all};
@@ -15,6 +16,7 @@ use crate::world::World;
 use catoptric_model::Pose;
 use fearless_simd::Level;
 use nalgebra::{Point3, Unit, Vector3};
+use parry3d::partitioning::{Bvh, BvhBuildStrategy};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -55,11 +57,11 @@ fn cone(draws: &mut Draws, from: Point3<f64>, towards: Point3<f64>, count: usize
 }
 
 /// The nearest hit by brute force.
-fn tried(mesh: &Triangles, ray: &Ray, count: u32) -> Option<Met> {
+fn tried(mesh: &Triangles, ray: &Ray, count: u32) -> Option<TriangleHit> {
     let judge = mesh.judge();
     let met = (0..count).filter_map(|triangle| {
         let distance = judge.meet(ray, triangle)?;
-        Some(Met { triangle, distance })
+        Some(TriangleHit { triangle, distance })
     });
     met.min_by(|a, b| {
         a.distance
@@ -96,7 +98,7 @@ fn soup(seed: u64, count: u32) -> Mesh {
 }
 
 #[test]
-fn beams_and_rays_agree_with_brute_force_on_every_instruction_set() {
+fn packets_and_rays_agree_with_brute_force_on_every_instruction_set() {
     let of_seed = |number: usize| {
         let seed = number as u64;
         let source = soup(seed, [3, 8, 60, 700][number % 4]);
@@ -131,7 +133,7 @@ fn beams_and_rays_agree_with_brute_force_on_every_instruction_set() {
             for level in levels() {
                 let mut met = vec![None; rays.len()];
                 cast_all(&InMesh::new(&mesh, level), &rays, &mut met);
-                assert_eq!(met, expected, "seed {seed}, shot {shot}, a beam at {level:?}");
+                assert_eq!(met, expected, "seed {seed}, shot {shot}, a packet at {level:?}");
                 let mut met = vec![None; rays.len()];
                 InMesh::new(&mesh, level).cast_each(&rays, 0..rays.len(), &mut met);
                 assert_eq!(met, expected, "seed {seed}, shot {shot}, each ray at {level:?}");
@@ -144,7 +146,7 @@ fn beams_and_rays_agree_with_brute_force_on_every_instruction_set() {
 }
 
 #[test]
-fn no_beam_leaks_out_of_a_closed_mesh() {
+fn no_packet_leaks_out_of_a_closed_mesh() {
     let source = random_star(17, 4);
     let place = Pose::new(Vector3::new(0.3, -1.2, 0.7), Vector3::new(0.4, 0.1, -0.8));
     let mesh = Triangles::new(&source, 1.0, &place);
@@ -155,7 +157,7 @@ fn no_beam_leaks_out_of_a_closed_mesh() {
         for target in [a, nalgebra::center(&a, &b), nalgebra::center(&b, &c)] {
             let rays = cone(&mut draws, inside, target, 32, 0.01);
             let mut met = vec![None; rays.len()];
-            mesh.nearest_of_beam(&rays, &mut met);
+            mesh.cast_packets(&rays, &mut met);
             assert!(met.iter().all(Option::is_some), "leaks towards {target}");
         }
     });
@@ -176,7 +178,7 @@ fn hits_agree_with_parry() {
             let (from, towards) = (vector(&mut draws, 3.0), vector(&mut draws, 0.8));
             let rays = cone(&mut draws, Point3::from(from), Point3::from(towards), 64, 0.0);
             let mut met = vec![None; rays.len()];
-            mesh.nearest_of_beam(&rays, &mut met);
+            mesh.cast_packets(&rays, &mut met);
             let off = rays.iter().zip(&met).filter(|(ray, met)| {
                 let ray = parry3d::query::Ray::new(to_glam(&ray.origin.coords), to_glam(&ray.direction));
                 let expected = parry.cast_local_ray(&ray, FARTHEST, false);
@@ -198,8 +200,23 @@ fn hits_agree_with_parry() {
     assert!(off <= 2, "{off} rays");
 }
 
+/// Asserts that a hit is the nearest by brute force over all surfaces, and the one found through parry's index.
+fn agrees(world: &World, parry: &Bvh, ray: &Ray, except: Option<usize>, found: Option<&Hit>) {
+    let of_shape = |number: usize| {
+        let other = except != Some(number);
+        other.then(|| world.shapes()[number].distance(ray)).flatten()
+    };
+    let tried = (0..world.shapes().len()).filter_map(|number| Some((of_shape(number)?, number)));
+    let tried = tried.min_by(|a, b| a.partial_cmp(b).expect("finite distances"));
+    let found = found.map(|hit| (hit.distance, hit.surface as usize));
+    assert_eq!(found, tried, "by brute force");
+    let parry_ray = parry3d::query::Ray::new(to_glam(&ray.origin.coords), to_glam(&ray.direction));
+    let walked = parry.cast_ray(&parry_ray, FARTHEST, |leaf, _| of_shape(leaf as usize));
+    assert_eq!(found.map(|f| f.0), walked.map(|(_, distance)| distance), "by parry");
+}
+
 #[test]
-fn a_world_casts_a_beam_as_it_casts_single_rays() {
+fn a_world_casts_packets_as_it_casts_single_rays() {
     let star = Arc::new(Triangles::new(
         &random_star(4, 3),
         0.7,
@@ -222,6 +239,8 @@ fn a_world_casts_a_beam_as_it_casts_single_rays() {
             Some(Shape::Polygon(Polygon::new(corners)?))
         }));
         let world = World::new(shapes);
+        let boxes: Vec<_> = world.shapes().iter().map(Shape::bounds).collect();
+        let parry = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
         let mut hits = [0; 3];
         for shot in 0..200_usize {
             let from = Point3::from(vector(&mut draws, 4.0));
@@ -233,14 +252,15 @@ fn a_world_casts_a_beam_as_it_casts_single_rays() {
                 [1, 16, 19, 61, 130][shot % 5],
                 [0.0, 0.004][shot % 2],
             );
-            for left in [None, world.cast(&rays.get(0), None).map(|hit| hit.surface)] {
+            for except in [None, world.cast(&rays.get(0), None).map(|hit| hit.surface as usize)] {
                 for level in levels() {
                     let mut found = vec![None; rays.len()];
-                    world.cast_beam_at(level, &rays, left, &mut found);
+                    world.cast_packets_at(level, &rays, except, &mut found);
                     for (ray, found) in rays.iter().zip(&found) {
-                        assert_eq!(*found, world.contact(&ray, left), "{level:?}");
-                        if let Some(contact) = found {
-                            hits[contact.surface.min(2) as usize] += 1;
+                        assert_eq!(*found, world.cast_at(level, &ray, except), "{level:?}");
+                        agrees(&world, &parry, &ray, except, found.as_ref());
+                        if let Some(hit) = found {
+                            hits[hit.surface.min(2) as usize] += 1;
                         }
                     }
                 }
@@ -251,12 +271,12 @@ fn a_world_casts_a_beam_as_it_casts_single_rays() {
 }
 
 #[test]
-fn an_empty_world_and_an_empty_beam_have_no_hits() {
+fn an_empty_world_and_an_empty_packet_have_no_hits() {
     let world = World::new(Vec::new());
     let mut draws = Draws::new(1, 0);
     let rays = cone(&mut draws, Point3::origin(), Point3::new(1.0, 0.0, 0.0), 16, 0.0);
     let mut hits = vec![None; 16];
-    world.cast_beam(&rays, None, &mut hits);
+    world.cast_packets(&rays, None, &mut hits);
     assert!(hits.iter().all(Option::is_none));
-    world.cast_beam(&Rays::default(), None, &mut []);
+    world.cast_packets(&Rays::default(), None, &mut []);
 }

@@ -4,10 +4,11 @@
 //! A polygon's plane and edges are computed in f64 in the same order as for a single ray, so the results are
 //! bit-identical. Where the whole pyramid around the rays passes inside or outside the polygon, no edges are tested.
 
-use crate::hit::{Contact, NONE};
-use crate::index::wide::Walk;
+use crate::hit::{Hit, NONE};
+use crate::index::traversal::Traversal;
+use crate::index::wide::{Child, Node};
 use crate::lanes::{inlined, minus, unfused};
-use crate::mesh::finish::MetInRow;
+use crate::mesh::finish::RowHits;
 use crate::packet::cast::{Caster, Packet, cast_all};
 use crate::packet::in_rows::InRows;
 use crate::packet::rays::Rays;
@@ -16,7 +17,7 @@ use crate::ray::FARTHEST;
 use crate::rounding::upwards;
 use crate::shape::Shape;
 use crate::solid::polygon::{EDGE_SLACK, Polygon};
-use crate::world::World;
+use crate::world::{World, numbered};
 use fearless_simd::{Level, Simd, dispatch, prelude::*};
 use fearless_simd::{f64x4, f64x8, mask32x8, mask64x8, u32x8};
 use nalgebra::Vector3;
@@ -51,17 +52,17 @@ struct Candidates<S: Simd> {
     of_mesh: Option<(u32x8<S>, f64x8<S>)>,
 }
 
-/// A world without the surface that the rays left, and the instruction set to cast with.
+/// A world without one surface, as a rule the mirror that the rays leave, and the instruction set to cast with.
 struct InWorld<'a> {
     world: &'a World,
     level: Level,
-    left: Option<usize>,
+    except: Option<usize>,
 }
 
-impl Caster<Option<Contact>> for InWorld<'_> {
-    fn cast_each(&self, rays: &Rays, which: Range<usize>, contacts: &mut [Option<Contact>]) {
-        for (ray, contact) in which.zip(contacts) {
-            *contact = self.world.contact(&rays.get(ray), self.left);
+impl Caster<Option<Hit>> for InWorld<'_> {
+    fn cast_each(&self, rays: &Rays, which: Range<usize>, hits: &mut [Option<Hit>]) {
+        for (ray, hit) in which.zip(hits) {
+            *hit = self.world.cast_at(self.level, &rays.get(ray), self.except);
         }
     }
 
@@ -69,16 +70,16 @@ impl Caster<Option<Contact>> for InWorld<'_> {
         &self,
         rays: &Rays,
         which: Range<usize>,
-        contacts: &mut [Option<Contact>],
+        hits: &mut [Option<Hit>],
     ) -> bool {
         dispatch!(self.level, simd => {
             let mut packet = Packet::<R>::new(rays, which);
             let narrow = packet.surround(simd, self.world.reach);
             if narrow {
                 let mut nearest = Nearest::new(packet.rays.count);
-                self.world.sweep(simd, &packet, self.left, &mut nearest);
-                for (ray, contact) in contacts.iter_mut().enumerate() {
-                    *contact = nearest.contact(self.world, &packet.rays, ray);
+                self.world.traverse(simd, &packet, self.except, &mut nearest);
+                for (ray, hit) in hits.iter_mut().enumerate() {
+                    *hit = nearest.hit(self.world, &packet.rays, ray);
                 }
             }
             narrow
@@ -87,52 +88,52 @@ impl Caster<Option<Contact>> for InWorld<'_> {
 }
 
 impl World {
-    /// Finds the nearest hit of each ray, ignoring the surface `left`. Equals [`World::cast`] without the point and the
-    /// normal, which [`World::hit`] adds; faster for coherent rays, a narrow cone with nearly one origin. Of surfaces at
-    /// exactly the same distance, the one with the lowest index counts.
+    /// Finds the nearest hit of each ray, ignoring the surface `except`: what [`World::cast`] finds for each, faster if the
+    /// rays are coherent, that is if those of a packet form a narrow cone with nearly one origin.
     ///
     /// # Panics
     /// If the numbers of rays and result slots differ.
-    pub fn cast_beam(&self, rays: &Rays, left: Option<usize>, contacts: &mut [Option<Contact>]) {
-        self.cast_beam_at(Level::new(), rays, left, contacts);
+    pub fn cast_packets(&self, rays: &Rays, except: Option<usize>, hits: &mut [Option<Hit>]) {
+        self.cast_packets_at(Level::new(), rays, except, hits);
     }
 
-    pub(crate) fn cast_beam_at(
+    pub(crate) fn cast_packets_at(
         &self,
         level: Level,
         rays: &Rays,
-        left: Option<usize>,
-        contacts: &mut [Option<Contact>],
+        except: Option<usize>,
+        hits: &mut [Option<Hit>],
     ) {
         let world = self;
-        cast_all(&InWorld { world, level, left }, rays, contacts);
+        cast_all(&InWorld { world, level, except }, rays, hits);
     }
 
     #[inline(always)]
-    fn sweep<S: Simd, const R: usize>(
+    fn traverse<S: Simd, const R: usize>(
         &self,
         simd: S,
         packet: &Packet<'_, R>,
-        left: Option<usize>,
+        except: Option<usize>,
         nearest: &mut Nearest<R>,
     ) {
-        let mut walk = Walk::new();
-        let mut next = Some(walk.start());
-        while let Some(child) = next {
-            let mut nearer = None;
-            if !child.is_leaf() {
-                let node = &self.nodes[child.number()];
-                let (met, near) = packet.pyramid.boxes(simd, &node.bounds, nearest.limit);
-                nearer = walk.enter(node, met, near);
-            } else if left != Some(child.number()) {
-                self.meet(simd, packet, child.number(), nearest);
-            }
-            next = nearer.or_else(|| walk.next(nearest.limit));
-        }
+        let boxes = inlined(
+            #[inline(always)]
+            |node: &Node, limit: f32| packet.pyramid.boxes(simd, &node.bounds, limit),
+        );
+        let visit = inlined(
+            #[inline(always)]
+            |child: Child| {
+                if except != Some(child.number()) {
+                    self.intersect(simd, packet, child.number(), nearest);
+                }
+                nearest.limit
+            },
+        );
+        Traversal::new().run(&self.nodes, upwards(FARTHEST), boxes, visit);
     }
 
     #[inline(always)]
-    fn meet<S: Simd, const R: usize>(
+    fn intersect<S: Simd, const R: usize>(
         &self,
         simd: S,
         packet: &Packet<'_, R>,
@@ -144,9 +145,9 @@ impl World {
             Shape::Mesh(mesh) => {
                 let take = inlined(
                     #[inline(always)]
-                    |met: &MetInRow<'_>| nearest.mesh(simd, numbered(surface), met),
+                    |met: &RowHits<'_>| nearest.mesh(simd, numbered(surface), met),
                 );
-                mesh.nearest_of_packet::<_, R, true>(simd, packet, take);
+                mesh.hits_of_packet::<_, R, true>(simd, packet, take);
                 nearest.set_limit(simd);
             }
             other => {
@@ -178,9 +179,9 @@ impl<const R: usize> Nearest<R> {
         nearest
     }
 
-    /// Returns the contact of a ray with its nearest surface.
+    /// Returns the hit of a ray on its nearest surface.
     #[inline(always)]
-    fn contact(&self, world: &World, rays: &InRows<'_, R>, number: usize) -> Option<Contact> {
+    fn hit(&self, world: &World, rays: &InRows<'_, R>, number: usize) -> Option<Hit> {
         let surface = self.surface.get(number);
         if surface == NONE {
             return None;
@@ -192,7 +193,7 @@ impl<const R: usize> Nearest<R> {
                 (NONE, world.closing(surface, NONE, &ray))
             }
         };
-        Some(Contact {
+        Some(Hit {
             surface,
             triangle,
             distance: self.distance.get(number),
@@ -261,7 +262,7 @@ impl<const R: usize> Nearest<R> {
     }
 
     #[inline(always)]
-    fn mesh<S: Simd>(&mut self, simd: S, surface: u32, met: &MetInRow<'_>) {
+    fn mesh<S: Simd>(&mut self, simd: S, surface: u32, met: &RowHits<'_>) {
         for second in 0..2 {
             let places = second * HALF..(second + 1) * HALF;
             let some = mask64x8::from_bitmask(simd, met.some >> (second * HALF) & 0xff);
@@ -299,12 +300,6 @@ impl<const R: usize> Nearest<R> {
             self.set_limit(simd);
         }
     }
-}
-
-/// Returns a surface's index as u32; nodes of the index limit it to fewer bits.
-#[allow(clippy::cast_possible_truncation)]
-fn numbered(surface: usize) -> u32 {
-    surface as u32
 }
 
 /// Returns the distances at which eight rays hit a polygon, infinite for a miss: `Polygon::cast` in lanes.
