@@ -7,7 +7,7 @@
 
 use catoptric::cast::Mesh;
 use catoptric::cast::Ray;
-use catoptric::cast::{Hit, TriangleHit, Polygon, Rays, Shape, Triangles, World};
+use catoptric::cast::{Hit, Polygon, Rays, Shape, TriangleHit, Triangles, World};
 use catoptric::model::Pose;
 use nalgebra::{Point3, Unit, Vector3};
 use std::fs;

@@ -5,7 +5,7 @@ use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print};
 use catoptric::files::cloud::CloudFormat;
-use catoptric::{CloudFrame, apply_into, read_calibration_for, read_dataset};
+use catoptric::{CloudFrame, apply_into, read_calibration_for};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -35,7 +35,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let path = &arguments.out;
     // Said before anything is read.
     CloudFormat::of_path(path).map_err(|e| CliError::invalid(e.to_string(), None))?;
-    let dataset = read_dataset(&arguments.dataset)?;
+    let dataset = context.read_dataset(&arguments.dataset)?;
     let calibration = read_calibration_for(&arguments.calibration, &dataset.session)?;
     let cloud = apply_into(&dataset, &calibration, arguments.pose, arguments.frame, path)?;
     if cloud.mount_is_nominal {

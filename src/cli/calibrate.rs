@@ -6,7 +6,7 @@ use super::one_of::one_of;
 use super::output::{counted, print, quoted};
 use catoptric::calib::{JacobianForm, Options};
 use catoptric::model::Status;
-use catoptric::{Calibration, Method, calibrate_with, read_characterization, read_dataset, write_json};
+use catoptric::{Calibration, Method, calibrate_with, read_characterization, write_json};
 use clap::Args;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -42,7 +42,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let mut dataset = read_dataset(&arguments.dataset)?;
+    let mut dataset = context.read_dataset(&arguments.dataset)?;
     context.check()?;
     if let Some(path) = &arguments.characterization {
         let found = read_characterization(path)?;

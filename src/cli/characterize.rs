@@ -4,7 +4,7 @@ use super::Context;
 use super::error::CliError;
 use super::output::{print, print_json, quoted};
 use catoptric::model::{Characterization, RangeBias};
-use catoptric::{Error, Scene, characterize, files, read_dataset, read_truth, report, simulate_with, tables};
+use catoptric::{Error, Scene, characterize, files, read_truth, report, simulate_with, tables};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -37,7 +37,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
             return Err(CliError::invalid(message, None));
         }
         let truth = read_truth(&arguments.input)?;
-        (read_dataset(&arguments.input)?, truth)
+        (context.read_dataset(&arguments.input)?, truth)
     } else {
         let mut scene = Scene::load_with(&arguments.input, &arguments.set)?;
         if let Some(seed) = arguments.seed {

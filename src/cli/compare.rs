@@ -1,11 +1,12 @@
 //! `catoptric compare`: tabulates several calibrations of one dataset, ours and third-party ones.
 
+use super::Context;
 use super::error::CliError;
 use super::output::{counted, print};
 use super::score::figure;
 use catoptric::compare::{CONTRADICTION, Row};
 use catoptric::score::Honesty;
-use catoptric::{Comparison, Contestant, Error, compare, read_calibration_for, read_dataset, read_truth};
+use catoptric::{Comparison, Contestant, Error, compare, read_calibration_for, read_truth};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -23,8 +24,8 @@ pub(crate) struct Arguments {
 }
 
 /// Succeeds whatever the verdicts are; judging a single calibration is up to `score`.
-pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
-    let dataset = read_dataset(&arguments.dataset)?;
+pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
+    let dataset = context.read_dataset(&arguments.dataset)?;
     let truth = read_truth(&arguments.dataset)?;
     let contestants: Vec<Contestant> = arguments
         .calibrations

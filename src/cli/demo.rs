@@ -10,8 +10,8 @@ use catoptric::calib::Options;
 use catoptric::files;
 use catoptric::report::MAX_POINTS;
 use catoptric::{
-    CloudFrame, Error, Method, Recording, Scene, Template, Verdict, apply_into, calibrate_with, read_dataset,
-    read_truth, report, score, simulate_into, write_json,
+    CloudFrame, Error, Method, Recording, Scene, Template, Verdict, apply_into, calibrate_with, read_truth,
+    report, score, simulate_into, write_json,
 };
 use clap::Args;
 use std::path::PathBuf;
@@ -56,7 +56,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let figures = simulate_into(&scene, &dataset_folder, &recording, &control)?;
 
     context.say("reading the dataset back");
-    let dataset = read_dataset(&dataset_folder)?;
+    let dataset = context.read_dataset(&dataset_folder)?;
     let truth = read_truth(&dataset_folder)?;
     let mut results = Vec::new();
     let mut lines = Vec::new();

@@ -4,7 +4,7 @@ use super::Context;
 use super::error::CliError;
 use super::output::{counted, print, quoted};
 use catoptric::export::Part;
-use catoptric::{Error, ExportFormat, Scene, export, export_boards, files, read_dataset};
+use catoptric::{Error, ExportFormat, Scene, export, export_boards, files};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -65,7 +65,7 @@ enum Solids {
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     if arguments.input.is_dir() {
-        return boards(arguments);
+        return boards(arguments, context);
     }
     let reach_m = arguments.reach_m.unwrap_or(REACH_M);
     if !(reach_m.is_finite() && reach_m > 0.0) {
@@ -107,7 +107,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
 }
 
 /// Exports the boards of a dataset.
-fn boards(arguments: &Arguments) -> Result<(), CliError> {
+fn boards(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let shown = quoted(&arguments.input);
     if arguments.format != FormatName::Csv {
         return Err(CliError::invalid(
@@ -129,7 +129,7 @@ fn boards(arguments: &Arguments) -> Result<(), CliError> {
             "a dataset is exported as recorded".to_owned(),
         ));
     }
-    let dataset = read_dataset(&arguments.input)?;
+    let dataset = context.read_dataset(&arguments.input)?;
     let (table, boards) = export_boards(&dataset).map_err(|error| match error {
         Error::Invalid { message, help } => CliError::invalid(format!("{message} in {shown}"), help),
         other => other.into(),

@@ -27,12 +27,13 @@ mod tolerance;
 mod trace;
 mod validate;
 
-use catoptric::{Control, Stop};
+use catoptric::{Control, Dataset, Stop, read_dataset_with};
 use clap::{ArgAction, Args, Parser, Subcommand};
 use error::CliError;
 use progress::Reporter;
 use std::ffi::OsString;
 use std::io::Write;
+use std::path::Path;
 use std::sync::Arc;
 
 /// Printed at the end of every help text.
@@ -129,6 +130,11 @@ impl Context {
         }
     }
 
+    /// Reads a dataset; Ctrl-C stops that, and every later pass over its readings.
+    fn read_dataset(&self, folder: &Path) -> Result<Dataset, CliError> {
+        Ok(read_dataset_with(folder, &self.control())?)
+    }
+
     /// Returns an error once Ctrl-C has been pressed.
     fn check(&self) -> Result<(), CliError> {
         Ok(self.stop.check().map_err(catoptric::Error::from)?)
@@ -176,7 +182,8 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> u8 {
     });
     match ended {
         Ok(()) => 0,
-        Err(error) => error.report(),
+        // Whatever fails after that was stopped.
+        Err(error) => context.check().err().unwrap_or(error).report(),
     }
 }
 
@@ -202,7 +209,7 @@ fn dispatch(verb: &Verb, context: &Context) -> Result<(), CliError> {
         Verb::Calibrate(arguments) => calibrate::run(arguments, context),
         Verb::Validate(arguments) => validate::run(arguments),
         Verb::Score(arguments) => score::run(arguments, context),
-        Verb::Compare(arguments) => compare::run(arguments),
+        Verb::Compare(arguments) => compare::run(arguments, context),
         Verb::Study(arguments) => study::run(arguments, context),
         Verb::Plan(arguments) => plan::run(arguments, context),
         Verb::Layout(arguments) => layout::run(arguments, context),

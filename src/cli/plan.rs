@@ -6,9 +6,7 @@ use super::one_of::one_of;
 use super::output::{counted, print, print_json, quoted};
 use catoptric::calib::plan::{Criterion, FacetPlan, Open, Plan, PlannedPose, Request, Standing};
 use catoptric::files::{self, dataset};
-use catoptric::{
-    Dataset, PlanStart, Scene, completed_scene, plan, planned_scene, read_dataset, report, write_planned,
-};
+use catoptric::{Dataset, PlanStart, Scene, completed_scene, plan, planned_scene, report, write_planned};
 use clap::Args;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -66,7 +64,7 @@ enum Source {
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let begin = Instant::now();
-    let source = source(arguments)?;
+    let source = source(arguments, context)?;
     let start = match &source {
         Source::Drawing(scene) => PlanStart::of_scene(scene)?,
         Source::Recording(dataset) => PlanStart::of_dataset(dataset)?,
@@ -84,7 +82,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     print(&(facets + &written))
 }
 
-fn source(arguments: &Arguments) -> Result<Source, CliError> {
+fn source(arguments: &Arguments, context: &Context) -> Result<Source, CliError> {
     if !arguments.input.is_dir() {
         let scene = Scene::load_with(&arguments.input, &arguments.set)?;
         return Ok(Source::Drawing(Box::new(scene)));
@@ -93,7 +91,9 @@ fn source(arguments: &Arguments) -> Result<Source, CliError> {
         let message = "--set changes a scene; a dataset cannot be changed";
         return Err(CliError::invalid(message, None));
     }
-    Ok(Source::Recording(Box::new(read_dataset(&arguments.input)?)))
+    Ok(Source::Recording(Box::new(
+        context.read_dataset(&arguments.input)?,
+    )))
 }
 
 fn request(arguments: &Arguments, readings: usize) -> Result<Request, CliError> {

@@ -5,7 +5,7 @@ use super::error::CliError;
 use super::output::print;
 use catoptric::apply::{CloudSketch, Lift};
 use catoptric::report::MAX_POINTS;
-use catoptric::{CloudFrame, Error, files, read_calibration_for, read_dataset, read_truth, report, score};
+use catoptric::{CloudFrame, Error, files, read_calibration_for, read_truth, report, score};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -23,7 +23,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let dataset = read_dataset(&arguments.dataset)?;
+    let dataset = context.read_dataset(&arguments.dataset)?;
     let truth = read_truth(&arguments.dataset)?;
     let mut results = Vec::new();
     for path in &arguments.calibrations {

@@ -3,7 +3,7 @@
 use super::Context;
 use super::error::CliError;
 use super::output::{print, quoted};
-use catoptric::{Error, Score, Verdict, read_calibration_for, read_dataset, read_truth, score};
+use catoptric::{Error, Score, Verdict, read_calibration_for, read_truth, score};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -31,7 +31,7 @@ fn positive(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let dataset = read_dataset(&arguments.dataset)?;
+    let dataset = context.read_dataset(&arguments.dataset)?;
     let truth = read_truth(&arguments.dataset)?;
     let calibration = read_calibration_for(&arguments.calibration, &dataset.session)?;
     let mut result = score(&dataset, &calibration, truth.as_ref()).map_err(Error::from)?;

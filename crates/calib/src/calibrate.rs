@@ -49,9 +49,8 @@ pub fn calibrate_until(
     // Step 4: which elements a mirror deflects.
     let candidates = screen::candidates(dataset, &prepared.summaries, mount, &prepared.boards);
     // The drawing decides which boards an element can hit until its neighbors show how the facet was built.
-    let work = prepared.workspace(dataset, options);
+    let work = prepared.workspace(dataset, options, stop);
     let first = element::estimates(&work, &BATCH, &candidates, drawn)?;
-    stop.check()?;
     let built = facet_plane::as_built(&dataset.session, drawn, &first);
     let mut calibration = Calibration {
         schema_version: calibration::SCHEMA_VERSION,
@@ -77,7 +76,6 @@ pub fn calibrate_until(
         Scope::Together(extent) => {
             // Each element is solved separately first, which decides whether its readings are usable and which boards it hits.
             calibration.beams = element::estimates(&work, &GENERALIZED, &candidates, &built)?;
-            stop.check()?;
             let assigned = joint::assigned(&work, &candidates, &built, &calibration.beams);
             joint::together(*extent, &work, mount, &built, &assigned, &mut calibration);
         }

@@ -10,7 +10,7 @@ use crate::readings::bare::Bare;
 use crate::readings::locate;
 use crate::readings::observations::BoardInSensor;
 use crate::tracking;
-use catoptric_model::{Dataset, MirrorPlane, Session, Summary};
+use catoptric_model::{Dataset, MirrorPlane, Session, Stop, Summary};
 use std::borrow::Cow;
 
 /// The basis of everything else: mounting and boards in the sensor frame.
@@ -54,7 +54,12 @@ pub(crate) fn prepare(dataset: &Dataset) -> Result<Prepared, CalibError> {
 }
 
 impl Prepared {
-    pub(crate) fn workspace<'a>(&'a self, dataset: &'a Dataset, options: &'a Options) -> Workspace<'a> {
+    pub(crate) fn workspace<'a>(
+        &'a self,
+        dataset: &'a Dataset,
+        options: &'a Options,
+        stop: &'a Stop,
+    ) -> Workspace<'a> {
         Workspace {
             dataset,
             summaries: &self.summaries,
@@ -63,6 +68,7 @@ impl Prepared {
             rig_from_sensor: self.mount.rig_from_sensor,
             mount: &self.mount.uncertainty,
             options,
+            stop,
             columns: None,
         }
     }

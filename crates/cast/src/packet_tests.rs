@@ -59,11 +59,11 @@ fn cone(draws: &mut Draws, from: Point3<f64>, towards: Point3<f64>, count: usize
 /// The nearest hit by brute force.
 fn tried(mesh: &Triangles, ray: &Ray, count: u32) -> Option<TriangleHit> {
     let judge = mesh.judge();
-    let met = (0..count).filter_map(|triangle| {
+    let found = (0..count).filter_map(|triangle| {
         let distance = judge.meet(ray, triangle)?;
         Some(TriangleHit { triangle, distance })
     });
-    met.min_by(|a, b| {
+    found.min_by(|a, b| {
         a.distance
             .total_cmp(&b.distance)
             .then(a.triangle.cmp(&b.triangle))
@@ -131,12 +131,12 @@ fn packets_and_rays_agree_with_brute_force_on_every_instruction_set() {
             let expected: Vec<_> = rays.iter().map(|ray| tried(&mesh, &ray, count)).collect();
             hits += expected.iter().flatten().count();
             for level in levels() {
-                let mut met = vec![None; rays.len()];
-                cast_all(&InMesh::new(&mesh, level), &rays, &mut met);
-                assert_eq!(met, expected, "seed {seed}, shot {shot}, a packet at {level:?}");
-                let mut met = vec![None; rays.len()];
-                InMesh::new(&mesh, level).cast_each(&rays, 0..rays.len(), &mut met);
-                assert_eq!(met, expected, "seed {seed}, shot {shot}, each ray at {level:?}");
+                let mut found = vec![None; rays.len()];
+                cast_all(&InMesh::new(&mesh, level), &rays, &mut found);
+                assert_eq!(found, expected, "seed {seed}, shot {shot}, a packet at {level:?}");
+                let mut found = vec![None; rays.len()];
+                InMesh::new(&mesh, level).cast_each(&rays, 0..rays.len(), &mut found);
+                assert_eq!(found, expected, "seed {seed}, shot {shot}, each ray at {level:?}");
             }
         }
         hits
@@ -156,9 +156,9 @@ fn no_packet_leaks_out_of_a_closed_mesh() {
         let inside = place * Point3::from(draws.normal3().normalize() * (0.1 * draws.uniform()));
         for target in [a, nalgebra::center(&a, &b), nalgebra::center(&b, &c)] {
             let rays = cone(&mut draws, inside, target, 32, 0.01);
-            let mut met = vec![None; rays.len()];
-            mesh.cast_packets(&rays, &mut met);
-            assert!(met.iter().all(Option::is_some), "leaks towards {target}");
+            let mut found = vec![None; rays.len()];
+            mesh.cast_packets(&rays, &mut found);
+            assert!(found.iter().all(Option::is_some), "leaks towards {target}");
         }
     });
 }
@@ -177,19 +177,19 @@ fn hits_agree_with_parry() {
             let mut draws = Draws::new(8, beam);
             let (from, towards) = (vector(&mut draws, 3.0), vector(&mut draws, 0.8));
             let rays = cone(&mut draws, Point3::from(from), Point3::from(towards), 64, 0.0);
-            let mut met = vec![None; rays.len()];
-            mesh.cast_packets(&rays, &mut met);
-            let off = rays.iter().zip(&met).filter(|(ray, met)| {
+            let mut found = vec![None; rays.len()];
+            mesh.cast_packets(&rays, &mut found);
+            let off = rays.iter().zip(&found).filter(|(ray, found)| {
                 let ray = parry3d::query::Ray::new(to_glam(&ray.origin.coords), to_glam(&ray.direction));
                 let expected = parry.cast_local_ray(&ray, FARTHEST, false);
-                let difference = match (met, expected) {
-                    (Some(met), Some(expected)) => (met.distance - expected).abs(),
+                let difference = match (found, expected) {
+                    (Some(found), Some(expected)) => (found.distance - expected).abs(),
                     (None, None) => 0.0,
                     _ => f64::INFINITY,
                 };
                 assert!(
                     !(1e-6..=1e-3).contains(&difference),
-                    "{met:?} against {expected:?}"
+                    "{found:?} against {expected:?}"
                 );
                 difference > 1e-3
             });
@@ -212,7 +212,11 @@ fn agrees(world: &World, parry: &Bvh, ray: &Ray, except: Option<usize>, found: O
     assert_eq!(found, tried, "by brute force");
     let parry_ray = parry3d::query::Ray::new(to_glam(&ray.origin.coords), to_glam(&ray.direction));
     let walked = parry.cast_ray(&parry_ray, FARTHEST, |leaf, _| of_shape(leaf as usize));
-    assert_eq!(found.map(|f| f.0), walked.map(|(_, distance)| distance), "by parry");
+    assert_eq!(
+        found.map(|f| f.0),
+        walked.map(|(_, distance)| distance),
+        "by parry"
+    );
 }
 
 #[test]
@@ -252,7 +256,10 @@ fn a_world_casts_packets_as_it_casts_single_rays() {
                 [1, 16, 19, 61, 130][shot % 5],
                 [0.0, 0.004][shot % 2],
             );
-            for except in [None, world.cast(&rays.get(0), None).map(|hit| hit.surface as usize)] {
+            for except in [
+                None,
+                world.cast(&rays.get(0), None).map(|hit| hit.surface as usize),
+            ] {
                 for level in levels() {
                     let mut found = vec![None; rays.len()];
                     world.cast_packets_at(level, &rays, except, &mut found);

@@ -23,7 +23,8 @@ use std::sync::Arc;
 #[derive(Clone, Default)]
 pub struct Control {
     /// Once a stop is requested, the verb ends with [`Error::Stopped`] within a tenth of a second and leaves no
-    /// incomplete files.
+    /// incomplete files. A few indivisible steps may take longer: the index of a mesh of more than a hundred thousand
+    /// triangles, and one evaluation of a calibration with thousands of elements.
     pub stop: Stop,
     /// Called whenever part of the work is done, from one thread at a time.
     pub progress: Option<Arc<dyn Fn(Progress) + Send + Sync>>,
@@ -43,17 +44,18 @@ pub struct Progress {
 }
 
 impl Control {
-    /// Runs some work on the requested number of threads.
+    /// Runs some work on the requested number of threads. Work that fails after a stop was requested has been stopped.
     pub(crate) fn run<T: Send>(&self, work: impl FnOnce() -> Result<T, Error> + Send) -> Result<T, Error> {
         self.check()?;
-        match self.threads {
+        let done = match self.threads {
             None => work(),
             Some(threads) => rayon::ThreadPoolBuilder::new()
                 .num_threads(threads.get())
                 .build()
                 .map_err(|e| Error::Threads(e.to_string()))?
                 .install(work),
-        }
+        };
+        done.or_else(|error| Err(self.check().err().unwrap_or(error)))
     }
 
     /// Returns an error once a stop has been requested.

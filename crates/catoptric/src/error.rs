@@ -20,10 +20,10 @@ pub enum Error {
     Scene(#[from] SceneErrors),
     /// A valid scene cannot be set up.
     #[error(transparent)]
-    Setup(#[from] SimError),
+    Setup(SimError),
     /// A file cannot be read, written or parsed.
     #[error(transparent)]
-    File(#[from] IoError),
+    File(IoError),
     /// A dataset cannot be calibrated, or no calibration can meet the request.
     #[error("cannot calibrate: {0}")]
     Calibration(CalibError),
@@ -111,6 +111,24 @@ impl Error {
     }
 }
 
+impl From<SimError> for Error {
+    fn from(error: SimError) -> Self {
+        match error {
+            SimError::Stopped(stopped) => Self::Stopped(stopped),
+            other => Self::Setup(other),
+        }
+    }
+}
+
+impl From<IoError> for Error {
+    fn from(error: IoError) -> Self {
+        match error {
+            IoError::Stopped(stopped) => Self::Stopped(stopped),
+            other => Self::File(other),
+        }
+    }
+}
+
 impl From<CalibError> for Error {
     fn from(error: CalibError) -> Self {
         match error {
@@ -134,8 +152,8 @@ impl From<StudyError> for Error {
     fn from(error: StudyError) -> Self {
         match error {
             StudyError::Stopped(stopped) => Self::Stopped(stopped),
-            StudyError::File(error) => Self::File(error),
-            StudyError::Setup(error) => Self::Setup(error),
+            StudyError::File(error) => error.into(),
+            StudyError::Setup(error) => error.into(),
             other => Self::Study(other),
         }
     }

@@ -3,6 +3,7 @@
 //! Blocks are read again later and must not have changed by then: every block has a checksum of its messages.
 
 use super::error::IoError;
+use catoptric_model::Stop;
 use crc32fast::Hasher;
 use mcap::records::op;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -91,6 +92,7 @@ impl Place {
     /// [`IoError`] with the offset if the recording cannot be read, is cut off or corrupt, or if `visit` fails.
     pub(super) fn visit(
         &self,
+        stop: &Stop,
         mut visit: impl FnMut(u8, &[u8], (usize, usize)) -> Result<(), String>,
     ) -> Result<(Vec<Block>, u64), IoError> {
         // All checksums are checked: damaged readings must not look like readings.
@@ -105,6 +107,7 @@ impl Place {
         let mut blocks: Vec<Block> = Vec::new();
         let mut run = (Hasher::new(), 0);
         while let Some(event) = reader.next_event() {
+            stop.check()?;
             let at = |what: String| self.corrupt(what, offset);
             match event.map_err(|e| at(words(&e)))? {
                 LinearReadEvent::ReadRequest(need) => {

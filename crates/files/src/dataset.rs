@@ -19,7 +19,7 @@ use super::manifest::{Manifest, Provenance};
 use super::playback::{read_recording, survey};
 use super::recording::{Encoded, RecordingEncoder, RecordingWriter};
 use super::results::require_version;
-use catoptric_model::{Dataset, ModelError, PoseRecord, Session, Stretch, session};
+use catoptric_model::{Dataset, ModelError, PoseRecord, Session, Stop, Stretch, session};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs;
@@ -133,7 +133,8 @@ impl DatasetWriter {
         recording.finish()?.finish()?;
         let mut files = BTreeMap::new();
         for (name, path) in folder.files()? {
-            let hash = sha256_file(&path).map_err(|e| IoError::read(folder.shown(&name), e))?;
+            let hash =
+                sha256_file(&path, &Stop::default()).map_err(|e| IoError::read(folder.shown(&name), e))?;
             files.insert(name, hash);
         }
         let manifest = Manifest::new(provenance, SCENE, files);
@@ -195,7 +196,9 @@ pub fn read_session(dataset: &Path) -> Result<Session, IoError> {
 /// # Errors
 /// [`IoError`] as [`read_dataset`].
 pub fn read_stretches(dataset: &Path) -> Result<(Session, Vec<Stretch>), IoError> {
-    let (session, stretches, _) = read(dataset, |place, session| read_recording(place.path(), session))?;
+    let (session, stretches, _) = read(dataset, &Stop::default(), |place, session| {
+        read_recording(place.path(), session)
+    })?;
     Ok((session, stretches))
 }
 
@@ -207,7 +210,15 @@ pub fn read_stretches(dataset: &Path) -> Result<(Session, Vec<Stretch>), IoError
 /// [`IoError`] names the file that is missing, changed since the manifest was written, invalid, or inconsistent
 /// with the others. A third-party dataset without a manifest is accepted unchecked.
 pub fn read_dataset(dataset: &Path) -> Result<Dataset, IoError> {
-    let (session, poses, id) = read(dataset, survey)?;
+    read_dataset_until(dataset, &Stop::default())
+}
+
+/// As [`read_dataset`], but can be stopped before it ends, and so can every later pass over its readings.
+///
+/// # Errors
+/// As [`read_dataset`], and [`IoError::Stopped`].
+pub fn read_dataset_until(dataset: &Path, stop: &Stop) -> Result<Dataset, IoError> {
+    let (session, poses, id) = read(dataset, stop, |place, session| survey(place, session, stop))?;
     assembled(dataset, session, poses, id)
 }
 
@@ -218,22 +229,24 @@ pub fn read_dataset(dataset: &Path) -> Result<Dataset, IoError> {
 pub fn parse_dataset(session: Session, recording: impl Into<Arc<[u8]>>) -> Result<Dataset, IoError> {
     let (path, bytes) = (PathBuf::from(OBSERVATIONS), recording.into());
     let id = sha256(&bytes);
-    let poses = survey(Place::Memory(path.clone(), bytes), &session)?;
+    let poses = survey(Place::Memory(path.clone(), bytes), &session, &Stop::default())?;
     assembled(&path, session, poses, id)
 }
 
 /// Reads the session and the requested part of the observations; returns the hash of the recording as well.
 fn read<T: Send>(
     dataset: &Path,
+    stop: &Stop,
     observations: impl FnOnce(Place, &Session) -> Result<T, IoError> + Send,
 ) -> Result<(Session, T, String), IoError> {
     let hashes = read_hashes(dataset)?;
     let session = parse_session(dataset, &read_checked(dataset, SESSION, hashes.as_ref())?)?;
     let path = dataset.join(OBSERVATIONS);
     let (id, found) = rayon::join(
-        || sha256_file(&path),
+        || sha256_file(&path, stop),
         || observations(Place::File(path.clone()), &session),
     );
+    stop.check()?;
     // For a changed file, the error about the change takes precedence over any other.
     let id = id.map_err(|e| IoError::read(&path, e))?;
     check(dataset, OBSERVATIONS, &id, hashes.as_ref())?;

@@ -1,12 +1,15 @@
 //! Errors in reading and writing files. Every message names the file.
 
-use catoptric_model::ModelError;
+use catoptric_model::{ModelError, Stopped};
 use std::io;
 use std::path::{Path, PathBuf};
 
 /// A file or folder that cannot be read, written or understood.
 #[derive(Debug, thiserror::Error)]
 pub enum IoError {
+    /// The caller stopped the work.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
     /// The operating system refused to read.
     #[error("{}: cannot be read: {source}", path.display())]
     Read {
@@ -148,6 +151,7 @@ impl IoError {
     /// not read or write, or if an existing file or folder may not be replaced.
     pub fn exit_code(&self) -> u8 {
         match self {
+            Self::Stopped(_) => 130,
             Self::Text { .. }
             | Self::Recording { .. }
             | Self::Content { .. }

@@ -3,6 +3,7 @@
 use super::error::IoError;
 use super::json::to_json;
 use super::paths::parent;
+use catoptric_model::Stop;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::fs::{self, File};
@@ -178,11 +179,13 @@ pub fn sha256(bytes: &[u8]) -> String {
 ///
 /// # Errors
 /// The error of the operating system if it cannot be read.
-pub(super) fn sha256_file(path: &Path) -> io::Result<String> {
+/// Once a stop is requested, it ends with an error.
+pub(super) fn sha256_file(path: &Path, stop: &Stop) -> io::Result<String> {
     let mut hasher = Sha256::new();
     let mut file = File::open(path)?;
     let mut buffer = vec![0; 1 << 16];
     loop {
+        stop.check().map_err(io::Error::other)?;
         match io::Read::read(&mut file, &mut buffer)? {
             0 => return Ok(hexadecimal(&hasher.finalize())),
             n => hasher.update(&buffer[..n]),
@@ -247,6 +250,6 @@ mod tests {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("abc");
         write_file(&path, b"abc").expect("written");
-        assert_eq!(sha256_file(&path).expect("read"), expected);
+        assert_eq!(sha256_file(&path, &Stop::default()).expect("read"), expected);
     }
 }

@@ -67,7 +67,7 @@ pub mod rays;
 pub mod results;
 
 #[cfg(feature = "recording")]
-pub use dataset::{DatasetWriter, read_dataset, read_session};
+pub use dataset::{DatasetWriter, read_dataset, read_dataset_until, read_session};
 pub use error::IoError;
 #[cfg(feature = "recording")]
 pub use file::{StagedOutput, write_file, write_json};

@@ -14,7 +14,7 @@ use super::messages;
 use super::source::{Source, Start};
 use super::survey::{Survey, Surveyed, watch};
 use catoptric_model::session::ScannerSheet;
-use catoptric_model::{ModelError, PoseLabel, PoseRecord, Readings, ScanSource, Session, Stretch};
+use catoptric_model::{ModelError, PoseLabel, PoseRecord, Readings, ScanSource, Session, Stop, Stretch};
 use mcap::records::{Record, op};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -53,7 +53,7 @@ struct Playback<'a, R: Keep> {
 /// # Errors
 /// [`IoError`] with the file and offset if it cannot be read, is cut off or corrupt, or does not fit the session.
 pub fn read_recording(path: &Path, session: &Session) -> Result<Vec<Stretch>, IoError> {
-    Ok(play::<Whole>(&Place::File(path.to_owned()), session)?.0)
+    Ok(play::<Whole>(&Place::File(path.to_owned()), session, &Stop::default())?.0)
 }
 
 /// Reads a recording from memory; `path` names it in errors.
@@ -62,7 +62,7 @@ pub fn read_recording(path: &Path, session: &Session) -> Result<Vec<Stretch>, Io
 /// [`IoError`] as [`read_recording`].
 pub fn parse_recording(bytes: &[u8], path: &Path, session: &Session) -> Result<Vec<Stretch>, IoError> {
     let place = Place::Memory(path.to_owned(), Arc::from(bytes));
-    Ok(play::<Whole>(&place, session)?.0)
+    Ok(play::<Whole>(&place, session, &Stop::default())?.0)
 }
 
 /// Reads what a calibration needs of every stretch of a recording; readings stay in the recording.
@@ -71,8 +71,9 @@ pub fn parse_recording(bytes: &[u8], path: &Path, session: &Session) -> Result<V
 pub(super) fn survey(
     place: Place,
     session: &Session,
+    stop: &Stop,
 ) -> Result<Result<Vec<PoseRecord>, ModelError>, IoError> {
-    let (surveyed, source) = play::<Survey>(&place, session)?;
+    let (surveyed, source) = play::<Survey>(&place, session, stop)?;
     let source = Arc::new(source);
     let complete = |(stretch, surveyed): (usize, Surveyed)| {
         let mut record = match surveyed.record {
@@ -95,7 +96,7 @@ pub(super) fn survey(
 }
 
 /// Reads a recording once and returns the data kept of every stretch, and the index of its messages.
-fn play<R: Keep>(place: &Place, session: &Session) -> Result<(Vec<R::Kept>, Source), IoError> {
+fn play<R: Keep>(place: &Place, session: &Session, stop: &Stop) -> Result<(Vec<R::Kept>, Source), IoError> {
     let mut playback = Playback::<R> {
         scanner: &session.scanner,
         bodies: Bodies::of(session, place.path())?,
@@ -106,11 +107,12 @@ fn play<R: Keep>(place: &Place, session: &Session) -> Result<(Vec<R::Kept>, Sour
         starts: Vec::new(),
         finished: Vec::new(),
     };
-    let (blocks, length) = place.visit(|opcode, data, at| playback.record(opcode, data, at))?;
+    let (blocks, length) = place.visit(stop, |opcode, data, at| playback.record(opcode, data, at))?;
     let ended = playback.end_stretch();
     ended.map_err(|what| place.corrupt(what, length))?;
     let source = Source {
         place: place.clone(),
+        stop: stop.clone(),
         blocks,
         stretches: playback.starts,
         topics: playback.topics,

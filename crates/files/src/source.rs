@@ -7,7 +7,7 @@ use super::error::IoError;
 use super::messages;
 use super::playback::Topic;
 use super::survey::MOST_WAITING;
-use catoptric_model::{ScanSource, Scans, TrackedFrame, Unreadable};
+use catoptric_model::{ScanSource, Scans, Stop, TrackedFrame, Unreadable};
 use mcap::records::Record;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, VecDeque};
@@ -28,6 +28,8 @@ pub(super) struct Start {
 /// A recording with the index of its contents.
 pub(super) struct Source {
     pub(super) place: Place,
+    /// Looked at before each block.
+    pub(super) stop: Stop,
     pub(super) blocks: Vec<Block>,
     pub(super) stretches: Vec<Start>,
     pub(super) topics: BTreeMap<u16, Topic>,
@@ -96,6 +98,7 @@ impl Source {
     }
 
     fn records(&self, block: usize) -> Result<Arc<Records>, IoError> {
+        self.stop.check()?;
         let kept = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, records)) = kept().iter().find(|(b, _)| *b == block) {
             return Ok(Arc::clone(records));

@@ -1,10 +1,13 @@
 //! Errors that stop a simulation.
 
-use catoptric_model::ScanError;
+use catoptric_model::{ScanError, Stopped};
 
 /// Why a scene cannot be simulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SimError {
+    /// The caller stopped the work.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
     /// A facet whose description spans no mirror.
     #[error("facet {name:?} has no shape: {reason}")]
     Facet {

@@ -3,7 +3,7 @@
 use super::oracle::Oracle;
 use super::{Contestant, ElementAngles, Job, Study};
 use crate::score::{ElementError, Knowable, knowable, score_by};
-use catoptric_calib::Calibrator;
+use catoptric_calib::{Calibrator, Method, calibrate_until};
 use catoptric_model::bias::DistanceBias;
 use catoptric_model::{Calibration, Dataset, Deflection, RangeBias, Stop};
 use catoptric_sim::truth::BeamClass;
@@ -91,7 +91,8 @@ struct Experiment {
 impl Experiment {
     fn of(study: &Study, job: Job) -> Result<Self, SimError> {
         let laboratory = Laboratory::new(&study.cells[job.cell].scene, job.seed)?;
-        let (dataset, truth) = (laboratory.dataset()?, laboratory.truth()?);
+        let (dataset, truth) = (laboratory.dataset_until(&study.stop)?, laboratory.truth()?);
+        study.stop.check()?;
         Ok(Self {
             knowable: knowable(&dataset, &truth).expect(IN_MEMORY),
             #[cfg(feature = "recording")]
@@ -103,9 +104,13 @@ impl Experiment {
 
     fn calibrate(&self, contestant: &Contestant, stop: &Stop) -> Result<Calibration, String> {
         let words = |e: catoptric_calib::CalibError| e.to_string();
+        let options = catoptric_calib::Options::default();
+        let by_method = |method: Method, dataset: &Dataset| {
+            calibrate_until(dataset, method, &options, stop).map_err(words)
+        };
         stop.check().map_err(|e| e.to_string())?;
         match contestant {
-            Contestant::Method(method) => Calibrator::calibrate(method, &self.dataset).map_err(words),
+            Contestant::Method(method) => by_method(*method, &self.dataset),
             Contestant::Uncorrected(method) => {
                 let mut dataset = self.dataset.clone();
                 let believed = &mut dataset.session.believed;
@@ -122,7 +127,7 @@ impl Experiment {
                     },
                     ..RangeBias::default()
                 };
-                Calibrator::calibrate(method, &dataset).map_err(words)
+                by_method(*method, &dataset)
             }
             Contestant::Oracle => {
                 let truth = self.truth.clone();

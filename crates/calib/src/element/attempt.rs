@@ -10,7 +10,7 @@ use crate::readings::locate;
 use crate::readings::observations::{BoardInSensor, BoardView, Observation, azimuth};
 use crate::readings::spread;
 use catoptric_model::session::NominalFacet;
-use catoptric_model::{Dataset, Deflection, Pose, PoseKind, PoseRecord, Session, Status, Summary};
+use catoptric_model::{Dataset, Deflection, Pose, PoseKind, PoseRecord, Session, Status, Stop, Summary};
 
 /// Number of boards that a solution needs (steps 7–10).
 pub const MIN_BOARDS: usize = 3;
@@ -25,6 +25,8 @@ pub(crate) struct Workspace<'a> {
     pub(crate) rig_from_sensor: Pose,
     pub(crate) mount: &'a MountUncertainty,
     pub(crate) options: &'a Options,
+    /// Looked at per element, and in every step of the least squares.
+    pub(crate) stop: &'a Stop,
     /// Single readings, for the method that goes through them one by one.
     pub(crate) columns: Option<&'a Columns>,
 }

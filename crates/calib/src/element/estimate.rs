@@ -45,8 +45,12 @@ pub(crate) fn estimates(
             columns: Some(&columns),
             ..*work
         };
-        let beams = block.beams.into_par_iter();
-        found.par_extend(beams.map(|beam| of_candidate(&work, solver, beam, &candidates[beam], mirrors)));
+        let of_beam = |beam: usize| {
+            work.stop.check()?;
+            Ok(of_candidate(&work, solver, beam, &candidates[beam], mirrors))
+        };
+        let estimates: Result<Vec<_>, CalibError> = block.beams.into_par_iter().map(of_beam).collect();
+        found.extend(estimates?);
     }
     Ok(found)
 }

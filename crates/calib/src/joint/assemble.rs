@@ -255,6 +255,7 @@ pub(super) fn begin<'w>(
         marker_sd: session.believed.marker_sd_mm * 1e-3,
         flatness: Flatness::default(),
         prior_mean: mean.clone(),
+        stop: work.stop,
     };
     let start = joint.state(planes);
     (joint, start)

@@ -15,7 +15,7 @@ use crate::lsq;
 use crate::options::Options;
 use crate::prepare::{believable, prepare};
 use crate::readings::observations::azimuth;
-use catoptric_model::{Dataset, Deflection, MirrorPlane, frame};
+use catoptric_model::{Dataset, Deflection, MirrorPlane, Stop, frame};
 use nalgebra::{DMatrix, DVector, Matrix2, Unit, Vector3};
 use std::collections::BTreeMap;
 
@@ -44,8 +44,8 @@ pub fn limit(
     let (dataset, _) = believable(dataset)?;
     let dataset = dataset.as_ref();
     let prepared = prepare(dataset)?;
-    let options = Options::default();
-    let work = prepared.workspace(dataset, &options);
+    let (options, stop) = (Options::default(), Stop::default());
+    let work = prepared.workspace(dataset, &options, &stop);
     let session = &dataset.session;
     let mut planes = prepared.drawn.clone();
     let mut flat = Vec::new();

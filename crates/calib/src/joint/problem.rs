@@ -13,7 +13,7 @@ use super::fan::{Flatness, Shape};
 use super::group::{BOARD_ERRORS, Element, FACET_BLOCKS, FIGURE, Group};
 use crate::judge::common::CommonErrors;
 use crate::lsq::{Block, Point};
-use catoptric_model::{MirrorPlane, Pose, RangeBias};
+use catoptric_model::{MirrorPlane, Pose, RangeBias, Stop};
 use nalgebra::{DVector, Dyn, OMatrix, U6};
 
 /// How the shared parameters w move the sensor: motion = M·w about a mounting.
@@ -38,6 +38,7 @@ pub(super) struct Joint<'a> {
     pub(super) flatness: Flatness,
     /// Prior mean of w.
     pub(super) prior_mean: DVector<f64>,
+    pub(super) stop: &'a Stop,
 }
 
 impl Joint<'_> {

@@ -145,6 +145,10 @@ impl Moved<'_> {
 }
 
 impl GroupedProblem for Moved<'_> {
+    fn is_stopped(&self) -> bool {
+        self.joint.is_stopped()
+    }
+
     fn groups(&self) -> usize {
         self.joint.groups()
     }

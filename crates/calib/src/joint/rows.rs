@@ -100,6 +100,10 @@ impl Joint<'_> {
 }
 
 impl GroupedProblem for Joint<'_> {
+    fn is_stopped(&self) -> bool {
+        self.stop.is_requested()
+    }
+
     fn groups(&self) -> usize {
         self.groups.len()
     }

@@ -159,11 +159,20 @@ impl<'a, P: GroupedProblem> Search<'a, P> {
         })
     }
 
+    /// Returns an error if the caller has stopped the search.
+    fn look_up(&self) -> Result<(), ProblemError> {
+        if self.problem.is_stopped() {
+            return Err(ProblemError::Stopped);
+        }
+        Ok(())
+    }
+
     fn run(&mut self, options: &Options) -> Result<Stop, ProblemError> {
         let width = self.state.shared.dimension();
         let mut d = DVector::zeros(0);
         let (mut radius, mut size, mut damping) = (0.0, 0.0, 0.0);
         loop {
+            self.look_up()?;
             let rows = rows(self.problem, &self.state, &self.residuals)?;
             self.iterations += 1;
             let slope = Slope::of(&rows, width, self.norm);
@@ -182,6 +191,7 @@ impl<'a, P: GroupedProblem> Search<'a, P> {
                 radius = options.first_radius * if size > 0.0 { size } else { 1.0 };
             }
             loop {
+                self.look_up()?;
                 let tried = trust_region::step(&linear, &slope.0, &d, radius, damping);
                 damping = tried.damping;
                 let length = d.component_mul(&tried.step).norm();

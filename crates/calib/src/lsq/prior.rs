@@ -93,6 +93,10 @@ impl<P> WithPriors<'_, P> {
 }
 
 impl<P: GroupedProblem> GroupedProblem for WithPriors<'_, P> {
+    fn is_stopped(&self) -> bool {
+        self.problem.is_stopped()
+    }
+
     fn groups(&self) -> usize {
         self.problem.groups() + 1
     }

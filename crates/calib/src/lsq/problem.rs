@@ -45,6 +45,10 @@ pub struct GroupRows {
 ///
 /// Every [`Problem`] is one: a single group without own parameters. Groups are evaluated in parallel, in any order.
 pub trait GroupedProblem: Sync {
+    /// Whether the caller no longer wants a solution; looked at before every evaluation.
+    fn is_stopped(&self) -> bool {
+        false
+    }
     /// Number of groups.
     fn groups(&self) -> usize;
     /// Residuals of one group; see [`Problem::residuals`].
@@ -164,4 +168,7 @@ pub enum ProblemError {
         /// Columns found.
         found_columns: usize,
     },
+    /// The caller stopped the search.
+    #[error("stopped on request")]
+    Stopped,
 }

@@ -14,7 +14,7 @@ use crate::error::CalibError;
 use crate::readings::observations::{BoardInSensor, cone_half_angle};
 use catoptric_model::frame::tangent_basis;
 use catoptric_model::session::BoardSheet;
-use catoptric_model::{Pose, Session};
+use catoptric_model::{Pose, Session, Stop};
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// Minimum distance between a board and the shell of the room, in meters.
@@ -93,6 +93,7 @@ pub fn candidates(
     situation: &Situation,
     facet: &str,
     request: &Request,
+    stop: &Stop,
 ) -> Result<Vec<Candidate>, CalibError> {
     let session = situation.session();
     let fan = situation.fan(facet).ok_or_else(|| CalibError::UnknownFacet {
@@ -114,6 +115,7 @@ pub fn candidates(
     let mut found = Vec::new();
     let mut refused = [0_usize; Refusal::ALL.len()];
     for number in 0..request.tries {
+        stop.check()?;
         match site.candidate(&site.wish(number)) {
             Ok(candidate) => found.push(candidate),
             Err(refusal) => refused[refusal as usize] += 1,

@@ -16,7 +16,7 @@ use crate::judge::covariance::{self, MountUncertainty, Sighting};
 use crate::judge::levers::libm_cos;
 use crate::judge::observability::{self, WEAKEST_SD};
 use crate::readings::observations::BoardView;
-use catoptric_model::Session;
+use catoptric_model::{Session, Stop, Stopped};
 use nalgebra::{DMatrix, DVector, Matrix6};
 
 /// Prior of each angle, in radians (30°): 10⁻⁶ of the information about a determined element.
@@ -70,7 +70,16 @@ impl<'a> Designer<'a> {
     /// # Errors
     /// As [`candidates`].
     pub fn new(situation: &'a Situation, facet: &str, request: &Request) -> Result<Self, CalibError> {
-        let candidates = candidates(situation, facet, request)?;
+        Self::until(situation, facet, request, &Stop::default())
+    }
+
+    pub(super) fn until(
+        situation: &'a Situation,
+        facet: &str,
+        request: &Request,
+        stop: &Stop,
+    ) -> Result<Self, CalibError> {
+        let candidates = candidates(situation, facet, request, stop)?;
         let fan = situation.fan(facet).ok_or_else(|| CalibError::UnknownFacet {
             name: facet.to_owned(),
             known: String::new(),
@@ -85,7 +94,13 @@ impl<'a> Designer<'a> {
             start: Vec::new(),
         };
         designer.start = designer.start(false);
-        designer.rows = (0..designer.len()).map(|c| designer.rows_of(c, false)).collect();
+        let rows_of = |candidate: usize| {
+            stop.check()?;
+            Ok(designer.rows_of(candidate, false))
+        };
+        designer.rows = (0..designer.len())
+            .map(rows_of)
+            .collect::<Result<_, CalibError>>()?;
         Ok(designer)
     }
 
@@ -151,33 +166,41 @@ impl<'a> Designer<'a> {
     /// Poses around those chosen become candidates too, and replace them as long as that improves the set. The same
     /// candidate may be in the set more than once: a board set up anew has its own drift and marker errors.
     pub fn best(&mut self, poses: usize) -> Vec<usize> {
+        self.best_until(poses, &Stop::default())
+            .unwrap_or_else(|_| unreachable!("nobody requests this stop"))
+    }
+
+    pub(super) fn best_until(&mut self, poses: usize, stop: &Stop) -> Result<Vec<usize>, Stopped> {
         let mut chosen = Vec::with_capacity(poses);
         let mut known = self.start.clone();
         for _ in 0..poses {
+            stop.check()?;
             let (best, _) = self.most_useful(&known, 0..self.len());
             add(&mut known, &self.rows[best]);
             chosen.push(best);
         }
-        self.exchange(&mut chosen);
+        self.exchange(&mut chosen, stop)?;
         for round in 0..REFINEMENTS {
             let near = chosen
                 .iter()
                 .flat_map(|c| self.site.near(&self.candidates[*c], round));
             for candidate in near.collect::<Vec<_>>() {
+                stop.check()?;
                 self.candidates.push(candidate);
                 self.rows.push(self.rows_of(self.len() - 1, false));
             }
-            self.exchange(&mut chosen);
+            self.exchange(&mut chosen, stop)?;
         }
-        self.ordered(chosen)
+        Ok(self.ordered(chosen))
     }
 
     /// Exchanges chosen candidates for others until no exchange improves the set.
-    fn exchange(&self, chosen: &mut [usize]) {
+    fn exchange(&self, chosen: &mut [usize], stop: &Stop) -> Result<(), Stopped> {
         let mut cost = self.cost(chosen);
         for _ in 0..MAX_ROUNDS {
             let mut changed = false;
             for place in 0..chosen.len() {
+                stop.check()?;
                 let others: Vec<usize> = (0..chosen.len())
                     .filter(|p| *p != place)
                     .map(|p| chosen[p])
@@ -195,6 +218,7 @@ impl<'a> Designer<'a> {
                 break;
             }
         }
+        Ok(())
     }
 
     /// The elements that are open with some candidates set up, and why; neighbors are merged.

@@ -29,6 +29,7 @@ pub use situation::{Placed, Situation};
 pub use words::facing;
 
 use crate::error::CalibError;
+use catoptric_model::Stop;
 
 /// Plans the next poses in front of each of the named facets, or of all facets.
 ///
@@ -68,9 +69,22 @@ pub fn plan(situation: &Situation, facets: &[String], request: &Request) -> Resu
 /// # Errors
 /// As [`plan`].
 pub fn plan_facet(situation: &Situation, facet: &str, request: &Request) -> Result<FacetPlan, CalibError> {
-    let mut designer = Designer::new(situation, facet, request)?;
+    plan_facet_until(situation, facet, request, &Stop::default())
+}
+
+/// As [`plan_facet`], but can be stopped before it ends.
+///
+/// # Errors
+/// As [`plan_facet`], and [`CalibError::Stopped`].
+pub fn plan_facet_until(
+    situation: &Situation,
+    facet: &str,
+    request: &Request,
+    stop: &Stop,
+) -> Result<FacetPlan, CalibError> {
+    let mut designer = Designer::until(situation, facet, request, stop)?;
     let candidates = designer.len();
-    let chosen = designer.best(request.poses);
+    let chosen = designer.best_until(request.poses, stop)?;
     let mut before = designer.standing(&[]);
     let mut poses = Vec::with_capacity(chosen.len());
     for (number, candidate) in chosen.iter().enumerate() {

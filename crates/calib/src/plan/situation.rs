@@ -14,7 +14,7 @@ use crate::readings::spread;
 use catoptric_model::session::{BoardSheet, NominalFacet};
 use catoptric_model::{
     BoardPlane, Dataset, Deflection, MirrorPlane, Pose, PoseKind, PoseLabel, PoseRecord, Readings, Session,
-    Status, Summary, beam,
+    Status, Stop, Summary, beam,
 };
 use nalgebra::Point3;
 
@@ -123,10 +123,10 @@ impl Situation {
         let (dataset, _) = believable(dataset)?;
         let dataset = dataset.as_ref();
         let session = &dataset.session;
-        let options = Options::default();
+        let (options, stop) = (Options::default(), Stop::default());
         let calibration = calibrate(dataset, Method::BeamGls, &options)?;
         let prepared = prepare(dataset)?;
-        let work = prepared.workspace(dataset, &options);
+        let work = prepared.workspace(dataset, &options, &stop);
         // Boards that could not be placed are in no element's list.
         let mut boards = Vec::new();
         let mut number_of = vec![None; dataset.poses.len()];

@@ -5,7 +5,7 @@ use crate::judge::covariance::{self, MountUncertainty};
 use crate::readings::observations::BoardView;
 use catoptric_model::frame::tangent_basis;
 use catoptric_model::session::*;
-use catoptric_model::{Pose, PoseData, RangeBias, ScanGeometry, beam};
+use catoptric_model::{Pose, PoseData, RangeBias, ScanGeometry, Stop, beam};
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
 const FACET: &str = "up";
@@ -241,7 +241,7 @@ fn every_candidate_is_possible() {
         range_m: [0.8, 2.0],
         ..request(0, Criterion::D)
     };
-    let found = candidates::candidates(&situation, FACET, &asked).expect("there are poses");
+    let found = candidates::candidates(&situation, FACET, &asked, &Stop::default()).expect("there are poses");
     assert!(found.len() > 100);
     let rays = situation.rays(FACET);
     for candidate in &found {

@@ -78,9 +78,9 @@ impl Line {
         );
         let near = enter(0).max(enter(1)).max(enter(2).max(splat(0.0)));
         let far = leave(0).min(leave(1)).min(leave(2));
-        let met = near.simd_le(far.min(splat(limit)));
+        let hits = near.simd_le(far.min(splat(limit)));
         // Eight lanes.
         #[allow(clippy::cast_possible_truncation)]
-        (met.to_bitmask() as u32, near)
+        (hits.to_bitmask() as u32, near)
     }
 }

@@ -146,15 +146,15 @@ fn leaf<S: Simd, const R: usize>(
         |corner: usize| [load(corner, 0), load(corner, 1), load(corner, 2)],
     );
     let corners = [corner(0), corner(1), corner(2)];
-    let mut met = packet.pyramid.triangles(simd, &corners) & ((1 << count) - 1);
-    if met == 0 {
+    let mut hits = packet.pyramid.triangles(simd, &corners) & ((1 << count) - 1);
+    if hits == 0 {
         return;
     }
     let facts = facts(simd, &corners, reach, packet);
     let mut changed = false;
-    while met != 0 {
-        let lane = met.trailing_zeros() as usize & 7;
-        met &= met - 1;
+    while hits != 0 {
+        let lane = hits.trailing_zeros() as usize & 7;
+        hits &= hits - 1;
         changed |= triangle(simd, &facts, lane, leaf.triangles[lane], packet, judge, found);
     }
     if changed {

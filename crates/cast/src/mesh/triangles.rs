@@ -157,7 +157,12 @@ impl Caster<Option<TriangleHit>> for InMesh<'_> {
         self.mesh.follow_each(self.level, ray, hits);
     }
 
-    fn cast_rows<const R: usize>(&self, rays: &Rays, which: Range<usize>, hits: &mut [Option<TriangleHit>]) -> bool {
+    fn cast_rows<const R: usize>(
+        &self,
+        rays: &Rays,
+        which: Range<usize>,
+        hits: &mut [Option<TriangleHit>],
+    ) -> bool {
         dispatch!(self.level, simd => {
             let mut packet = Packet::<R>::new(rays, which);
             let narrow = packet.surround(simd, self.mesh.wide.reach);

@@ -305,10 +305,10 @@ impl Pyramid {
         let e = all(FOUR + 2).max(all(FOUR + 3));
         let outside = a.max(b).max(c.max(d)).max(e.max(all(FAR)));
         let near = all(NEAR) * splat(1.0 - 1e-6);
-        let met = outside.simd_le(splat(0.0)) & near.simd_le(splat(limit));
+        let hits = outside.simd_le(splat(0.0)) & near.simd_le(splat(limit));
         // Eight lanes.
         #[allow(clippy::cast_possible_truncation)]
-        (met.to_bitmask() as u32, near)
+        (hits.to_bitmask() as u32, near)
     }
 
     /// Returns which of eight triangles a ray may hit.
@@ -334,7 +334,7 @@ impl Pyramid {
         }
         // Eight lanes.
         #[allow(clippy::cast_possible_truncation)]
-        let met = outside.simd_le(splat(0.0)).to_bitmask() as u32;
-        met
+        let hits = outside.simd_le(splat(0.0)).to_bitmask() as u32;
+        hits
     }
 }

@@ -33,7 +33,9 @@ impl World {
                 (corner(bounds.mins), corner(bounds.maxs))
             })
             .collect();
-        let reach = boxes.iter().fold(0.0, |m: f64, (a, b)| m.max(a.amax()).max(b.amax()));
+        let reach = boxes
+            .iter()
+            .fold(0.0, |m: f64, (a, b)| m.max(a.amax()).max(b.amax()));
         let reach = upwards(reach);
         Self {
             shapes,

@@ -66,12 +66,7 @@ impl Caster<Option<Hit>> for InWorld<'_> {
         }
     }
 
-    fn cast_rows<const R: usize>(
-        &self,
-        rays: &Rays,
-        which: Range<usize>,
-        hits: &mut [Option<Hit>],
-    ) -> bool {
+    fn cast_rows<const R: usize>(&self, rays: &Rays, which: Range<usize>, hits: &mut [Option<Hit>]) -> bool {
         dispatch!(self.level, simd => {
             let mut packet = Packet::<R>::new(rays, which);
             let narrow = packet.surround(simd, self.world.reach);
@@ -145,7 +140,7 @@ impl World {
             Shape::Mesh(mesh) => {
                 let take = inlined(
                     #[inline(always)]
-                    |met: &RowHits<'_>| nearest.mesh(simd, numbered(surface), met),
+                    |row: &RowHits<'_>| nearest.mesh(simd, numbered(surface), row),
                 );
                 mesh.hits_of_packet::<_, R, true>(simd, packet, take);
                 nearest.set_limit(simd);
@@ -262,20 +257,20 @@ impl<const R: usize> Nearest<R> {
     }
 
     #[inline(always)]
-    fn mesh<S: Simd>(&mut self, simd: S, surface: u32, met: &RowHits<'_>) {
+    fn mesh<S: Simd>(&mut self, simd: S, surface: u32, row: &RowHits<'_>) {
         for second in 0..2 {
             let places = second * HALF..(second + 1) * HALF;
-            let some = mask64x8::from_bitmask(simd, met.some >> (second * HALF) & 0xff);
-            let distance = f64x8::from_slice(simd, &met.distance[places.clone()]);
+            let some = mask64x8::from_bitmask(simd, row.some >> (second * HALF) & 0xff);
+            let distance = f64x8::from_slice(simd, &row.distance[places.clone()]);
             let candidates = Candidates {
                 surface,
                 distance: some.select(distance, f64x8::splat(simd, f64::INFINITY)),
                 of_mesh: Some((
-                    u32x8::from_slice(simd, &met.triangle[places.clone()]),
-                    f64x8::from_slice(simd, &met.closing[places]),
+                    u32x8::from_slice(simd, &row.triangle[places.clone()]),
+                    f64x8::from_slice(simd, &row.closing[places]),
                 )),
             };
-            self.take_half(simd, met.row, second, &candidates);
+            self.take_half(simd, row.row, second, &candidates);
         }
     }
 
@@ -335,11 +330,12 @@ fn distances<S: Simd, const R: usize>(
         origin[1] + direction[1] * distance,
         origin[2] + direction[2] * distance,
     ];
-    let mut met = distance.simd_gt(f64x8::splat(simd, 0.0)) & distance.simd_lt(f64x8::splat(simd, FARTHEST));
+    let mut inside =
+        distance.simd_gt(f64x8::splat(simd, 0.0)) & distance.simd_lt(f64x8::splat(simd, FARTHEST));
     for (inwards, edge) in &polygon.edges {
-        met &= unfused::product(simd, inwards, &point).simd_ge(f64x8::splat(simd, edge - EDGE_SLACK));
+        inside &= unfused::product(simd, inwards, &point).simd_ge(f64x8::splat(simd, edge - EDGE_SLACK));
     }
-    met.select(distance, f64x8::splat(simd, f64::INFINITY))
+    inside.select(distance, f64x8::splat(simd, f64::INFINITY))
 }
 
 /// Returns where the pyramid around the rays crosses a polygon's plane.

@@ -20,6 +20,8 @@ mod trace;
 
 #[cfg(feature = "recording")]
 pub use apply::apply_into;
+#[cfg(feature = "recording")]
+pub use calibrate::read_dataset_with;
 pub use calibrate::{calibrate, calibrate_with, characterize};
 #[cfg(feature = "design")]
 pub use export::{Exported, Format as ExportFormat, export, export_boards};

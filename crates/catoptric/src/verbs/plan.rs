@@ -2,7 +2,7 @@
 
 use crate::{Control, Error, Scene};
 use catoptric_calib::CalibError;
-use catoptric_calib::plan::{FacetPlan, Plan, Request, SCHEMA_VERSION, Situation, plan_facet};
+use catoptric_calib::plan::{FacetPlan, Plan, Request, SCHEMA_VERSION, Situation, plan_facet_until};
 use catoptric_design::plan::{PlanError, completed, situation, with_poses};
 use catoptric_files::scene as scenes;
 use catoptric_model::Dataset;
@@ -115,7 +115,7 @@ pub fn plan(
             control.check()?;
             let found: Result<Vec<FacetPlan>, CalibError> = some
                 .par_iter()
-                .map(|facet| plan_facet(&start.situation, facet, request))
+                .map(|facet| plan_facet_until(&start.situation, facet, request, &control.stop))
                 .collect();
             planned.extend(found.map_err(|e| impossible(&e))?);
             control.report("planning", some.len(), facets.len());
@@ -167,6 +167,9 @@ fn move_meshes(scene: &mut catoptric_sim::Scene, from: &Path, to: &Path) -> Resu
 }
 
 fn impossible(error: &CalibError) -> Error {
+    if let CalibError::Stopped(stopped) = error {
+        return (*stopped).into();
+    }
     Error::invalid(
         error.to_string(),
         Some("a wider range of distances, a larger incidence, or one facet at a time"),

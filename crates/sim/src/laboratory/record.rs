@@ -4,7 +4,7 @@ use super::setup::Laboratory;
 use super::sight::Returns;
 use crate::error::SimError;
 use catoptric_model::dataset::RIG_SUBJECT;
-use catoptric_model::{Dataset, PoseRecord, Stretch};
+use catoptric_model::{Dataset, PoseRecord, Stop, Stretch};
 use rayon::prelude::*;
 
 impl Laboratory {
@@ -59,10 +59,20 @@ impl Laboratory {
     /// # Errors
     /// As for [`Laboratory::pose_record`].
     pub fn dataset(&self) -> Result<Dataset, SimError> {
+        self.dataset_until(&Stop::default())
+    }
+
+    /// As [`Laboratory::dataset`], but can be stopped before it ends.
+    ///
+    /// # Errors
+    /// As for [`Laboratory::pose_record`], and [`SimError::Stopped`].
+    pub fn dataset_until(&self, stop: &Stop) -> Result<Dataset, SimError> {
         let numbers = (0..self.stretches()).into_par_iter();
-        let poses = numbers
-            .map(|number| self.pose_record(number))
-            .collect::<Result<_, _>>()?;
+        let record = |number| {
+            stop.check()?;
+            self.pose_record(number)
+        };
+        let poses = numbers.map(record).collect::<Result<_, _>>()?;
         Ok(Dataset {
             session: self.session()?,
             poses,

@@ -12,7 +12,7 @@ use crate::build::structure::{Back, BuiltFacet, OpaquePart, Structure};
 use crate::error::SimError;
 use crate::scene::Scene;
 use catoptric_cast::Ray;
-use catoptric_cast::{Hit, SurfacePoint, Rays, Shape, World, placed};
+use catoptric_cast::{Hit, Rays, Shape, SurfacePoint, World, placed};
 use catoptric_model::Pose;
 use nalgebra::{Point3, Unit, Vector3};
 use std::borrow::Cow;
@@ -282,8 +282,8 @@ impl<'a> Setting<'a> {
     }
 
     /// Index among all surfaces of one that a leg hit in the room.
-    pub(crate) fn surface_in_room(&self, contact: &Hit) -> usize {
-        contact.surface as usize + self.contents.first_of_room
+    pub(crate) fn surface_in_room(&self, hit: &Hit) -> usize {
+        hit.surface as usize + self.contents.first_of_room
     }
 
     /// Whether a surface belongs to a mirror, on a reflecting side or not.
@@ -359,20 +359,26 @@ impl<'a> Setting<'a> {
     /// The nearest surface along a ray of the sensor frame, except `left`, the one it has just left.
     pub(super) fn cast(&self, ray: &Ray, left: Option<usize>) -> Option<Leg<'_>> {
         let contents = &*self.contents;
-        let unmoved = |hit| self.unmoved(hit, ray.direction);
-        let Some(room) = &contents.room else {
-            return contents.world.cast(ray, left).map(unmoved);
-        };
         let first = contents.first_of_room;
         let own = contents.world.cast(ray, left.filter(|l| *l < first));
-        let moved = self.start_from_sensor.as_ref();
-        let ray_in_room = moved.map_or(*ray, |pose| placed(ray, pose));
-        let past = room.cast(&ray_in_room, left.and_then(|l| l.checked_sub(first)));
-        self.nearer((own, ray), (past, &ray_in_room))
+        let Some(room) = &contents.room else {
+            return Some(self.end_on_structure(&own?, ray));
+        };
+        let in_room = self
+            .start_from_sensor
+            .as_ref()
+            .map_or(*ray, |pose| placed(ray, pose));
+        let past = room.cast(&in_room, left.and_then(|l| l.checked_sub(first)));
+        self.nearer(room, (own, ray), (past, &in_room))
     }
 
     /// The same along every ray of a beam.
-    pub(super) fn cast_packets<'s>(&'s self, rays: &Rays, left: Option<usize>, legs: &mut Vec<Option<Leg<'s>>>) {
+    pub(super) fn cast_packets<'s>(
+        &'s self,
+        rays: &Rays,
+        left: Option<usize>,
+        legs: &mut Vec<Option<Leg<'s>>>,
+    ) {
         legs.clear();
         let contents = &*self.contents;
         let first = contents.first_of_room;
@@ -381,45 +387,48 @@ impl<'a> Setting<'a> {
             world.cast_packets(rays, left, &mut hits);
             hits
         };
-        let world = &contents.world;
-        let own = cast(world, rays, left.filter(|l| *l < first));
+        let own = cast(&contents.world, rays, left.filter(|l| *l < first));
         let own = own.into_iter().zip(rays.iter());
-        let own = own.map(|(contact, ray)| (contact.map(|contact| world.hit(&contact, &ray)), ray));
         let Some(room) = &contents.room else {
-            legs.extend(own.map(|(hit, ray)| Some(self.unmoved(hit?, ray.direction))));
+            legs.extend(own.map(|(hit, ray)| Some(self.end_on_structure(&hit?, &ray))));
             return;
         };
         let mut in_room = Rays::default();
         self.place_in_room(rays, 0..rays.len(), &mut in_room);
         let past = cast(room, &in_room, left.and_then(|l| l.checked_sub(first)));
         let past = past.into_iter().zip(in_room.iter());
-        let past = past.map(|(contact, ray)| (contact.map(|contact| room.hit(&contact, &ray)), ray));
         legs.extend(
             own.zip(past)
-                .map(|((own, ray), (past, in_room))| self.nearer((own, &ray), (past, &in_room))),
+                .map(|((own, ray), (past, in_room))| self.nearer(room, (own, &ray), (past, &in_room))),
         );
     }
 
-    /// The nearer of what a ray hits of the structure and, in the frame of the room, of the room.
+    /// The leg that ends on the nearer of what a ray hits of the structure and, in the frame of the room, of the room.
     fn nearer(
         &self,
-        (own, ray): (Option<SurfacePoint>, &Ray),
-        (past, in_room): (Option<SurfacePoint>, &Ray),
+        room: &World,
+        (own, ray): (Option<Hit>, &Ray),
+        (past, in_room): (Option<Hit>, &Ray),
     ) -> Option<Leg<'_>> {
         match (own, past) {
             (Some(own), Some(past)) if own.distance <= past.distance => {
-                Some(self.unmoved(own, ray.direction))
+                Some(self.end_on_structure(&own, ray))
             }
-            (own, None) => Some(self.unmoved(own?, ray.direction)),
-            (_, Some(past)) => Some(Leg {
-                hit: SurfacePoint {
-                    surface: past.surface + self.contents.first_of_room,
-                    ..past
-                },
-                incoming: in_room.direction,
-                kept_from_sensor: self.start_from_sensor.as_ref(),
-            }),
+            (own, None) => Some(self.end_on_structure(&own?, ray)),
+            (_, Some(past)) => {
+                let mut hit = room.surface_point(&past, in_room);
+                hit.surface += self.contents.first_of_room;
+                Some(Leg {
+                    hit,
+                    incoming: in_room.direction,
+                    kept_from_sensor: self.start_from_sensor.as_ref(),
+                })
+            }
         }
+    }
+
+    fn end_on_structure(&self, hit: &Hit, ray: &Ray) -> Leg<'_> {
+        self.unmoved(self.contents.world.surface_point(hit, ray), ray.direction)
     }
 }
 

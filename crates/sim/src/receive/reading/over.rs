@@ -199,8 +199,5 @@ impl Sensor {
 fn same_surface(in_room: &[Option<Hit>]) -> usize {
     let surface = |hit: &Option<Hit>| hit.as_ref().map(|hit| hit.surface);
     let met = in_room.first().and_then(surface);
-    in_room
-        .iter()
-        .take_while(|hit| surface(hit) == met)
-        .count()
+    in_room.iter().take_while(|hit| surface(hit) == met).count()
 }
