@@ -174,8 +174,7 @@ impl<'a> Designer<'a> {
         let mut chosen = Vec::with_capacity(poses);
         let mut known = self.start.clone();
         for _ in 0..poses {
-            stop.check()?;
-            let (best, _) = self.most_useful(&known, 0..self.len());
+            let (best, _) = self.most_useful(&known, 0..self.len(), stop)?;
             add(&mut known, &self.rows[best]);
             chosen.push(best);
         }
@@ -191,7 +190,7 @@ impl<'a> Designer<'a> {
             }
             self.exchange(&mut chosen, stop)?;
         }
-        Ok(self.ordered(chosen))
+        self.ordered(chosen, stop)
     }
 
     /// Exchanges chosen candidates for others until no exchange improves the set.
@@ -200,13 +199,12 @@ impl<'a> Designer<'a> {
         for _ in 0..MAX_ROUNDS {
             let mut changed = false;
             for place in 0..chosen.len() {
-                stop.check()?;
                 let others: Vec<usize> = (0..chosen.len())
                     .filter(|p| *p != place)
                     .map(|p| chosen[p])
                     .collect();
                 let without = self.with(&others);
-                let (best, gain) = self.most_useful(&without, 0..self.len());
+                let (best, gain) = self.most_useful(&without, 0..self.len(), stop)?;
                 let better = self.total(&without) - gain;
                 if better < cost - MIN_GAIN * cost.abs() {
                     chosen[place] = best;
@@ -259,27 +257,33 @@ impl<'a> Designer<'a> {
     }
 
     /// Sorts by information, the most informative first.
-    fn ordered(&self, mut rest: Vec<usize>) -> Vec<usize> {
+    fn ordered(&self, mut rest: Vec<usize>, stop: &Stop) -> Result<Vec<usize>, Stopped> {
         let mut known = self.start.clone();
         let mut ordered = Vec::with_capacity(rest.len());
         while !rest.is_empty() {
-            let (best, _) = self.most_useful(&known, rest.iter().copied());
+            let (best, _) = self.most_useful(&known, rest.iter().copied(), stop)?;
             add(&mut known, &self.rows[best]);
             ordered.push(best);
             if let Some(place) = rest.iter().position(|c| *c == best) {
                 rest.remove(place);
             }
         }
-        ordered
+        Ok(ordered)
     }
 
     /// The candidate that lowers the cost most (the first of equals), and by how much.
-    fn most_useful(&self, known: &[Known], among: impl Iterator<Item = usize>) -> (usize, f64) {
+    fn most_useful(
+        &self,
+        known: &[Known],
+        mut among: impl Iterator<Item = usize>,
+        stop: &Stop,
+    ) -> Result<(usize, f64), Stopped> {
         let before: Vec<f64> = known
             .iter()
             .map(|k| self.cost_of(corner(&k.covariance), k.boards))
             .collect();
-        among.fold((0, f64::NEG_INFINITY), |best, candidate| {
+        among.try_fold((0, f64::NEG_INFINITY), |best, candidate| {
+            stop.check()?;
             let gain = self.rows[candidate]
                 .iter()
                 .map(|row| {
@@ -288,7 +292,7 @@ impl<'a> Designer<'a> {
                 })
                 .sum::<f64>()
                 / known.len() as f64;
-            if gain > best.1 { (candidate, gain) } else { best }
+            Ok(if gain > best.1 { (candidate, gain) } else { best })
         })
     }
 

@@ -86,18 +86,24 @@ pub fn write_layouts(
     use catoptric_files::{IoError, write_file};
     use catoptric_report::Drawn;
     let out = out.as_ref();
-    let drawn: Vec<Drawn> = layouts
-        .iter()
-        .map(|(scene, analysis)| Drawn::new(scene.resolved(), analysis))
-        .collect::<Result<_, _>>()?;
+    let draw = |(scene, analysis): &(&Scene, &Analysis)| {
+        control.check()?;
+        Ok(Drawn::new(scene.resolved(), analysis)?)
+    };
+    let drawn: Vec<Drawn> = layouts.iter().map(draw).collect::<Result<_, Error>>()?;
+    control.check()?;
     let analyses: Vec<Analysis> = layouts.iter().map(|(_, analysis)| (*analysis).clone()).collect();
     let json = layout_json(&analyses)?;
+    let pictures = catoptric_report::layout_pictures(&drawn);
+    control.check()?;
+    let page = catoptric_report::layout(&drawn);
+    // From here on, everything is written.
+    control.check()?;
     std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
-    for (name, bytes) in catoptric_report::layout_pictures(&drawn) {
-        control.check()?;
+    for (name, bytes) in pictures {
         write_file(out.join(name), &bytes)?;
     }
-    write_file(out.join(LAYOUT_PAGE), catoptric_report::layout(&drawn).as_bytes())?;
+    write_file(out.join(LAYOUT_PAGE), page.as_bytes())?;
     write_file(out.join("layout.json"), json.as_bytes())?;
     Ok(())
 }
