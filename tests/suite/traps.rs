@@ -373,13 +373,9 @@ fn same_direction() {
     let scenery = Scenery::new(&scene).unwrap();
     let tracer = scenery.tracer(8).unwrap();
     let (mut compared, mut folded) = (0, 0);
-    for (preset, sub_rays, own) in [
-        (Preset::Ust20lx, 1, false),
-        (Preset::Ust20lx, 19, false),
-        (Preset::Utm30lxEw, 61, false),
-        (Preset::Ust20lxCooper, 256, false),
-        (Preset::Custom, 7, true),
-    ] {
+    let finite = Preset::ALL.into_iter().zip([19, 256, 61, 7].into_iter().cycle());
+    for (preset, sub_rays) in finite.chain([(Preset::Ust20lx, 1)]) {
+        let own = preset == Preset::Custom;
         let mut scene = scene.clone();
         scene.scanner.preset = preset;
         scene.scanner.sub_rays = sub_rays;

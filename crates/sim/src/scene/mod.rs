@@ -16,6 +16,7 @@ mod preset;
 mod room;
 mod scanner;
 mod shape;
+mod sheet;
 mod superstructure;
 mod test;
 
@@ -29,9 +30,11 @@ pub use meshes::Meshes;
 pub use mishap::{Mishap, Mislabelled};
 pub use parameter::Parameter;
 pub use pattern::{CopyList, Exchange, FacetCopy, MirrorImage, Pattern, Ring};
+pub use preset::Preset;
 pub use room::{Board, BoardPose, Color, Design, Experiment, MarkerNoise, Mocap, MocapProfile, Room};
-pub use scanner::{BeamShape, HousingBox, Light, Limits, Mount, Preset, Scanner};
+pub use scanner::{Light, Mount, Scanner};
 pub use shape::{MeshShape, MeshUnits, PostCylinder, PostShape};
+pub use sheet::{BeamShape, HousingBox, Limits};
 pub use superstructure::{
     AsBuilt, Facet, FacetShape, Glass, Marker, Mirror, Plate, PolygonShape, Post, RectangleShape,
     Superstructure, Wedge,
