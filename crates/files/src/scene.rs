@@ -71,6 +71,16 @@ impl Template {
         }
     }
 
+    /// A one-line description.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Prototype => "Eight facets around the scanner",
+            Self::TwoMirror => "Two mirrors on either side of a 270° scanner",
+            Self::Pyramid => "Half a hexagonal pyramid in front of the scanner",
+            Self::Altimeter => "A small mirror that folds eleven beams straight down",
+        }
+    }
+
     /// The commented scene, as TOML.
     pub fn text(self) -> &'static str {
         match self {

@@ -22,7 +22,7 @@ mod trace;
 pub use apply::apply_into;
 pub use calibrate::{calibrate, calibrate_with, characterize};
 #[cfg(feature = "design")]
-pub use export::{Exported, Format as ExportFormat, export, export_boards};
+pub use export::{ExportOptions, Exported, Format as ExportFormat, export, export_boards};
 #[cfg(all(feature = "design", feature = "report"))]
 pub use layout::write_layouts;
 #[cfg(feature = "design")]
