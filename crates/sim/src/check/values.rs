@@ -1,7 +1,7 @@
 //! Checks of names, colors, tables and pairs of limits.
 
-use super::findings::{Findings, suggestion};
 use crate::build::color;
+use crate::findings::{Findings, suggestion};
 use crate::scene::{Detector, EchoChoice, MocapProfile, NoiseTable, Preset, Principle, Scene};
 use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::place::Path;
