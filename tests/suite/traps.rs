@@ -391,13 +391,14 @@ fn same_direction() {
             narrow_aperture_mm: 0.0,
             turns: false,
         });
+        let scan = scene.scanner.scan().unwrap();
         let returns = Laboratory::new(&scene, 1).unwrap().returns(ROOM).unwrap();
         for (index, found) in returns.iter().enumerate() {
             let Some(found) = found.as_ref().filter(|r| (r.share - 1.0).abs() < 1e-12) else {
                 continue;
             };
             let mut vertices = Vec::new();
-            let direction = beam::direction(ust20lx::azimuth(index));
+            let direction = beam::direction(scan.azimuth(index));
             let origin = Point3::new(0.0, 0.0, 2.0);
             assert_eq!(
                 tracer.follow(&Ray { origin, direction }, &mut vertices),

@@ -163,6 +163,9 @@ mod tests {
         );
         let (_, cut) = (ply::ROW.samples)().swap_remove(1);
         assert!(said(&cut[..cut.len() - 1], "a.ply").contains("ends before its last element"));
-        assert!(said(b"x", "a.step").contains(".stl, .obj and .ply"));
+        let unknown = said(b"x", "a.step");
+        for format in MeshFormat::ALL {
+            assert!(unknown.contains(&format!(".{}", format.extension())), "{unknown}");
+        }
     }
 }
