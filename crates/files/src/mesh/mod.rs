@@ -1,8 +1,9 @@
 //! Mesh files: STL, OBJ and PLY, as text and binary; and a lossless PLY writer.
 //!
-//! To add a format, write its file with its [`Row`] and add a row to [`MeshFormat`]. The extension determines the format. Damaged files give an error that names the line, or the byte in a binary file;
-//! no content can crash the reader, and sizes stated in a file are not trusted before the bytes are read. Polygons of
-//! more than three corners are split into a fan.
+//! The extension determines the format: to add one, write its file with its row, and add its variant to [`MeshFormat`].
+//! Damaged files give an error that names the line, or the byte in a binary file; no content can crash the reader, and
+//! sizes stated in a file are not trusted before the bytes are read. Polygons of more than three corners are split into a
+//! fan.
 
 mod obj;
 mod ply;
