@@ -1,6 +1,6 @@
 //! `catoptric apply`: turns a stretch of scans into a point cloud, given a calibration.
 
-use super::Context;
+use super::context::Context;
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print};

@@ -1,6 +1,6 @@
 //! `catoptric calibrate`: estimates a calibration from a dataset. The truth is never read.
 
-use super::Context;
+use super::context::Context;
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print, quoted};

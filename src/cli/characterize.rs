@@ -1,6 +1,6 @@
 //! `catoptric characterize`: measures the range errors of the bare sensor (step 1), from a dataset or a scene.
 
-use super::Context;
+use super::context::Context;
 use super::error::CliError;
 use super::output::{print, print_json, quoted};
 use catoptric::model::{Characterization, RangeBias};

@@ -1,6 +1,6 @@
 //! `catoptric compare`: tabulates several calibrations of one dataset, ours and third-party ones.
 
-use super::Context;
+use super::context::Context;
 use super::error::CliError;
 use super::output::{counted, print};
 use super::score::figure;

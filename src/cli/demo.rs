@@ -1,7 +1,7 @@
 //! `catoptric demo`: simulates, calibrates, scores and reports on the built-in scene.
 
-use super::Context;
 use super::calibrate::summary;
+use super::context::Context;
 use super::error::CliError;
 use super::output::{counted, grouped, print, quoted};
 use super::score::figure;

@@ -1,6 +1,6 @@
 //! `catoptric export`: writes a layout as files for manufacturing and use, or a dataset's boards as a table.
 
-use super::Context;
+use super::context::Context;
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print, quoted};

@@ -1,6 +1,6 @@
 //! `catoptric layout`: analyzes the coverage, losses and attainable accuracy of mirror layouts, several side by side.
 
-use super::Context;
+use super::context::Context;
 use super::error::CliError;
 use super::output::{print, quoted};
 use catoptric::layout::{Analysis, Class, FacetView, Requirement, RequirementError};

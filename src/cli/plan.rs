@@ -1,6 +1,6 @@
 //! `catoptric plan`: plans which board poses to record next, from the drawing or for what a dataset lacks.
 
-use super::Context;
+use super::context::Context;
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print, print_json, quoted};

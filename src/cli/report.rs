@@ -1,6 +1,6 @@
 //! `catoptric report`: writes one HTML page about calibrations and their scores.
 
-use super::Context;
+use super::context::Context;
 use super::error::CliError;
 use super::output::print;
 use catoptric::apply::{CloudSketch, Lift};

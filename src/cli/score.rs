@@ -1,6 +1,6 @@
 //! `catoptric score`: compares a calibration with the truth or, on blind data, with boards and walls.
 
-use super::Context;
+use super::context::Context;
 use super::error::CliError;
 use super::output::{print, quoted};
 use catoptric::{Error, Score, Verdict, read_calibration_for, read_truth, score};
