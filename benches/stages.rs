@@ -5,7 +5,7 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use catoptric::calib::observations::{BoardView, Observation};
-use catoptric::calib::solve::{self, BareDistance, Element};
+use catoptric::calib::solve::{self, BareDistance, SoleElement};
 use catoptric::calib::{self, Method, Options};
 use catoptric::files::RecordingWriter;
 use catoptric::layout::{Detail, Layout, analyze};
@@ -212,7 +212,7 @@ fn fit(c: &mut Criterion) {
     };
     let v = truth.exit_direction(0.3).into_inner();
     let boards: Vec<Observation> = (0..10).map(|i| board(&truth, &v, i)).collect();
-    let element = Element {
+    let element = SoleElement {
         azimuth: 0.3,
         observations: &boards,
         distance: BareDistance {

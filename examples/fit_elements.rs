@@ -9,7 +9,7 @@
 
 use catoptric::calib::Options;
 use catoptric::calib::observations::{BoardView, Observation};
-use catoptric::calib::solve::{BareDistance, Element, Solution, batch};
+use catoptric::calib::solve::{BareDistance, SoleElement, Solution, batch};
 use catoptric::model::{BoardPlane, Deflection, RangeBias, RawRange};
 use nalgebra::{Point3, Unit, Vector3};
 use std::error::Error;
@@ -45,7 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         solutions = given
             .iter()
             .map(|one| {
-                let element = Element {
+                let element = SoleElement {
                     azimuth: one.azimuth,
                     observations: &one.observations,
                     distance: BareDistance {

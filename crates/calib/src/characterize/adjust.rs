@@ -19,7 +19,7 @@ const MAX_STEPS: usize = 30;
 const MIN_PIVOT: f64 = 1e-10;
 
 /// What is known of the mounting before any board is read.
-pub(super) struct Prior {
+pub(super) struct RigPrior {
     nominal: Pose,
     /// 1σ of each motion, three shifts and three rotations; 0 for one that is known exactly.
     sd: Vector6<f64>,
@@ -35,7 +35,7 @@ pub(super) struct Adjustment {
     pub(super) fit: Fit,
 }
 
-impl Prior {
+impl RigPrior {
     /// The drawing's tolerance, and the uncertainty of the rig in motion capture.
     pub(super) fn of(session: &Session) -> Self {
         let markers: Vec<Vector3<f64>> = session.rig_markers.iter().map(|m| m.position().coords).collect();
@@ -85,7 +85,7 @@ pub(super) fn adjust(
     selector: &Selector,
     chosen: &[DirectBoard],
     design: &Design,
-    prior: &Prior,
+    prior: &RigPrior,
     start: &Pose,
 ) -> Result<Adjustment, CalibError> {
     let fail = |what: &str| CalibError::Characterization {

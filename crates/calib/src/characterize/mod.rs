@@ -27,7 +27,7 @@ use crate::mount::mount_data::{DirectBoard, Selection, Selector};
 use crate::mount::pose;
 use crate::prepare::check_session;
 use crate::readings::locate;
-use adjust::{Adjustment, Prior, adjust};
+use adjust::{Adjustment, RigPrior, adjust};
 use catoptric_model::characterization::{
     Characterization, Fit, Law, Parameter, SCHEMA_VERSION, Scatter, StretchRow,
 };
@@ -66,7 +66,7 @@ pub fn characterize(dataset: &Dataset) -> Result<Characterization, CalibError> {
     let summaries = locate::summaries(dataset)?;
     let none = RangeBias::default();
     let selector = Selector::new(dataset, &summaries).with_bias(&none, LARGEST_BIAS);
-    let prior = Prior::of(session);
+    let prior = RigPrior::of(session);
     let mut stage = Selection::initial(&session.mount_tolerance);
     let mut mount = Pose::from(&session.nominal_rig_from_sensor);
     let select = |mount: &Pose, stage: &Selection| {

@@ -5,7 +5,7 @@
 //! mirrored at that plane: this happens for boards whose tilts, as vectors tan α across the beam, are on one line.
 //! Vertical boards are the well-known case, e = z: φ and −φ cannot be distinguished.
 
-use crate::element::attempt::{Attempt, Fit};
+use crate::element::attempt::{Attempt, ElementFit};
 use crate::element::initial::FARTHEST_START;
 use crate::element::solve;
 use catoptric_model::{Deflection, beam};
@@ -21,7 +21,7 @@ const ONE_DIRECTION: f64 = 1e-6;
 const MIN_SD: f64 = 1e-6;
 
 /// Another direction that agrees with both the readings and the drawing.
-pub(crate) fn second_direction(attempt: &Attempt, fit: &Fit) -> Option<Deflection> {
+pub(crate) fn second_direction(attempt: &Attempt, fit: &ElementFit) -> Option<Deflection> {
     let observations = attempt.observations(&fit.poses);
     let at = &fit.solution.deflection;
     let v = at.exit_direction(attempt.azimuth);

@@ -1,6 +1,6 @@
 //! The state of an element while it is being estimated: its readings, its boards and its error budgets.
 
-use crate::element::solve::{BareDistance, Element, Solution};
+use crate::element::solve::{BareDistance, SoleElement, Solution};
 use crate::judge::covariance::{self, Budget, MountUncertainty};
 use crate::judge::observability::{self, Weakness};
 use crate::options::Options;
@@ -119,11 +119,11 @@ impl<'a> Attempt<'a> {
         locate::kept(columns.unwrap_or_default(), self.summary(pose), self.noise)
     }
 
-    pub(crate) fn element<'o>(&self, observations: &'o [Observation<'o>]) -> Element<'o>
+    pub(crate) fn element<'o>(&self, observations: &'o [Observation<'o>]) -> SoleElement<'o>
     where
         'a: 'o,
     {
-        Element {
+        SoleElement {
             azimuth: self.azimuth,
             observations,
             distance: self.distance,
@@ -150,7 +150,7 @@ impl<'a> Attempt<'a> {
 }
 
 /// A solution and the boards used for it.
-pub(crate) struct Fit {
+pub(crate) struct ElementFit {
     pub(crate) poses: Vec<usize>,
     pub(crate) solution: Solution,
     pub(crate) start: Deflection,
@@ -162,7 +162,7 @@ pub(crate) struct Failure {
     pub(crate) reason: String,
 }
 
-impl Fit {
+impl ElementFit {
     /// Root-mean-square residual over the boards, in meters.
     pub(crate) fn rms(&self) -> f64 {
         let sum: f64 = self.solution.residuals.iter().map(|r| r * r).sum();

@@ -1,10 +1,10 @@
 //! Estimates one element from its readings: boards and angles are chosen alternately until neither changes.
 
-use crate::element::attempt::{Attempt, Failure, Fit, MIN_BOARDS, Workspace, lost};
+use crate::element::attempt::{Attempt, ElementFit, Failure, MIN_BOARDS, Workspace, lost};
 use crate::element::choose::choose;
 use crate::element::initial::{self, FARTHEST_START};
 use crate::element::single::blocks;
-use crate::element::solve::{self, Element, Solution};
+use crate::element::solve::{self, SoleElement, Solution};
 use crate::element::solver::{Solver, Task};
 use crate::element::verdict::{judge, residuals_agree};
 use crate::error::CalibError;
@@ -129,8 +129,8 @@ fn estimate(
 }
 
 /// Chooses boards and solves, with a decreasing allowance, until the choice no longer changes.
-fn fit(solver: &Solver, attempt: &Attempt, nominal: &Deflection) -> Result<Fit, Failure> {
-    let mut at = Element::place(&attempt.element(&[]), nominal.azimuth, nominal.elevation);
+fn fit(solver: &Solver, attempt: &Attempt, nominal: &Deflection) -> Result<ElementFit, Failure> {
+    let mut at = SoleElement::place(&attempt.element(&[]), nominal.azimuth, nominal.elevation);
     let mut poses = Vec::new();
     let mut start = at;
     for (round, stage) in STAGES.iter().enumerate() {
@@ -169,7 +169,7 @@ fn solved_by(
     poses: Vec<usize>,
     start: &Deflection,
     at: &Deflection,
-) -> Result<Fit, Failure> {
+) -> Result<ElementFit, Failure> {
     let observations = attempt.observations(&poses);
     let element = attempt.element(&observations);
     let run = |from: &Deflection| {
@@ -189,7 +189,7 @@ fn solved_by(
         s.converged && beam::angle_between(&a, &b) < FARTHEST_END
     };
     let solution = run(start).filter(near).or_else(|| run(at)).ok_or_else(lost)?;
-    Ok(Fit {
+    Ok(ElementFit {
         poses,
         solution,
         start: *start,
@@ -197,7 +197,7 @@ fn solved_by(
 }
 
 /// The start in closed form if it is credible, else the drawing.
-fn first_guess(attempt: &Attempt, element: &Element, nominal: &Deflection) -> Deflection {
+fn first_guess(attempt: &Attempt, element: &SoleElement, nominal: &Deflection) -> Deflection {
     let found = initial::closed_form(nominal, attempt.azimuth, element.observations, element.bias);
     let v = nominal.exit_direction(attempt.azimuth);
     found
@@ -208,7 +208,7 @@ fn first_guess(attempt: &Attempt, element: &Element, nominal: &Deflection) -> De
 }
 
 /// A consistent solution without one of the boards, if that board is then clearly not what the element read.
-fn without_one(solver: &Solver, attempt: &Attempt, fit: &Fit) -> Option<Fit> {
+fn without_one(solver: &Solver, attempt: &Attempt, fit: &ElementFit) -> Option<ElementFit> {
     let fits = fit.poses.iter().filter_map(|omitted| {
         let rest: Vec<usize> = fit.poses.iter().copied().filter(|p| p != omitted).collect();
         let observations = attempt.observations(&rest);

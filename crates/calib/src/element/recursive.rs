@@ -5,7 +5,7 @@
 //!
 //! Unlike the paper, whose "RLS" is the batch form of Eq. (8), this is the recursion; both reach the same estimate.
 
-use crate::element::solve::{Element, Solution};
+use crate::element::solve::{SoleElement, Solution};
 use crate::judge::levers::{levers, libm_cos};
 use crate::options::Options;
 use catoptric_model::Deflection;
@@ -47,13 +47,14 @@ enum State {
 ///     mean: RawRange(z[0]),
 /// }).collect();
 /// let distance = solve::BareDistance { distance: 0.07, thickness: 0.0 };
-/// let element = solve::Element { azimuth: 0.3, observations: &observations, distance, bias: &RangeBias::default() };
+/// let bias = RangeBias::default();
+/// let element = solve::SoleElement { azimuth: 0.3, observations: &observations, distance, bias: &bias };
 /// let start = Deflection { azimuth: 0.25, elevation: 0.85, distance: 0.07 };
 /// let found = recursive::recursive(&element, &readings, &start, &Options::default()).expect("three boards suffice");
 /// assert!((found.deflection.azimuth - 0.2).abs() < 1e-12 && (found.deflection.elevation - 0.9).abs() < 1e-12);
 /// ```
 pub fn recursive(
-    element: &Element,
+    element: &SoleElement,
     readings: &[Vec<f64>],
     start: &Deflection,
     options: &Options,
@@ -71,7 +72,7 @@ pub fn recursive(
 
 /// One sweep: the change of (θ_a, φ) after the last reading.
 fn sweep(
-    element: &Element,
+    element: &SoleElement,
     readings: &[Vec<f64>],
     at: &Deflection,
     options: &Options,

@@ -53,7 +53,7 @@ impl BareDistance {
 
 /// One element to be solved.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Element<'a> {
+pub struct SoleElement<'a> {
     /// Base azimuth θ_b, in radians.
     pub azimuth: f64,
     /// Its readings of the boards it hits.
@@ -94,7 +94,7 @@ pub(crate) struct Row {
     pub(crate) bias: f64,
 }
 
-impl Element<'_> {
+impl SoleElement<'_> {
     /// The estimate with its distance d updated.
     pub fn place(&self, azimuth: f64, elevation: f64) -> Deflection {
         let bare = Deflection {
@@ -230,7 +230,7 @@ impl Element<'_> {
 /// The mean of a board's readings, weighted by their number, gives the same sums as the individual readings. `None` if
 /// the ray misses a board during the iteration.
 #[doc(alias = "RLS")]
-pub fn batch(element: &Element, start: &Deflection, options: &Options) -> Option<Solution> {
+pub fn batch(element: &SoleElement, start: &Deflection, options: &Options) -> Option<Solution> {
     let known = element.known();
     let (mut at, mut ray) = element.aim(&known, start.azimuth, start.elevation);
     for iteration in 1..=options.max_iterations {

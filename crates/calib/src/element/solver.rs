@@ -1,7 +1,7 @@
 //! A solver for one element alone: its angles from a start, and the effect of range errors on them.
 
 use crate::element::attempt::Attempt;
-use crate::element::solve::{Element, Solution};
+use crate::element::solve::{SoleElement, Solution};
 use crate::judge::covariance::Budget;
 use crate::options::Options;
 use catoptric_model::Deflection;
@@ -16,13 +16,13 @@ pub(crate) struct Solver {
     /// Covariance of the residuals that the solution leaves.
     pub(crate) residuals: fn(&Budget) -> Option<DMatrix<f64>>,
     /// Covariance of (θ_a, φ) at the solution.
-    pub(crate) covariance: fn(&Element, &Deflection, &Budget) -> Option<Matrix2<f64>>,
+    pub(crate) covariance: fn(&SoleElement, &Deflection, &Budget) -> Option<Matrix2<f64>>,
 }
 
 /// The problem to be solved.
 pub(crate) struct Task<'a> {
     pub(crate) attempt: &'a Attempt<'a>,
-    pub(crate) element: &'a Element<'a>,
+    pub(crate) element: &'a SoleElement<'a>,
     /// The stretches whose boards are used, in the order of the element's observations.
     pub(crate) poses: &'a [usize],
     /// Start of the iteration.

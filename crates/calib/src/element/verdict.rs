@@ -1,7 +1,7 @@
 //! Is an estimate credible? Checks its residuals, its weakest direction and the known room (step 13).
 
 use crate::element::ambiguity::second_direction;
-use crate::element::attempt::{Attempt, Failure, Fit, lost, rejected};
+use crate::element::attempt::{Attempt, ElementFit, Failure, lost, rejected};
 use crate::element::choose::{GATE_FLOOR, GATE_SIGMAS};
 use crate::element::solver::Solver;
 use crate::judge::levers::libm_cos;
@@ -19,7 +19,7 @@ const RESIDUAL_FACTOR: f64 = 5.0;
 const RESIDUAL_FLOOR: f64 = 4e-3;
 
 /// Largest credible rms residual of a fit, and the expected one, in meters.
-fn residual_limit(solver: &Solver, attempt: &Attempt, fit: &Fit) -> Option<(f64, f64)> {
+fn residual_limit(solver: &Solver, attempt: &Attempt, fit: &ElementFit) -> Option<(f64, f64)> {
     let observations = attempt.observations(&fit.poses);
     let budget = attempt.budget(&fit.solution.deflection, &observations)?;
     let residuals = (solver.residuals)(&budget)?;
@@ -28,12 +28,12 @@ fn residual_limit(solver: &Solver, attempt: &Attempt, fit: &Fit) -> Option<(f64,
 }
 
 /// Whether a fit's residuals are as small as all believed errors predict.
-pub(crate) fn residuals_agree(solver: &Solver, attempt: &Attempt, fit: &Fit) -> bool {
+pub(crate) fn residuals_agree(solver: &Solver, attempt: &Attempt, fit: &ElementFit) -> bool {
     residual_limit(solver, attempt, fit).is_some_and(|(limit, _)| fit.rms() <= limit)
 }
 
 /// The estimate, if it passes every check.
-pub(crate) fn judge(solver: &Solver, attempt: &Attempt, fit: &Fit) -> Result<BeamEstimate, Failure> {
+pub(crate) fn judge(solver: &Solver, attempt: &Attempt, fit: &ElementFit) -> Result<BeamEstimate, Failure> {
     let solution = &fit.solution;
     let observations = attempt.observations(&fit.poses);
     let readings: usize = observations.iter().map(|o| o.board.count).sum();

@@ -3,7 +3,7 @@
 //! Given the other parameters x, an element's deviation is normal about L(y − A·x) with L = τ²(I + τ²HᵀH)⁻¹Hᵀ. With C
 //! the covariance of x, that of the direction is (G − LA)·C·(G − LA)ᵀ + τ²(I + τ²HᵀH)⁻¹.
 
-use super::group::{Element, FACET_PARAMETERS, Group};
+use super::group::{FACET_PARAMETERS, Group, JointElement};
 use super::linear::Linear;
 use super::placed::Boards;
 use super::problem::Joint;
@@ -70,7 +70,7 @@ struct Spread {
 pub(super) struct Linearized<'g> {
     pub(super) group: usize,
     pub(super) facet: usize,
-    pub(super) element: &'g Element,
+    pub(super) element: &'g JointElement,
     pub(super) linear: Linear,
     pub(super) by: GroupJacobian,
 }
@@ -120,7 +120,7 @@ impl Joint<'_> {
     pub(super) fn derivatives(
         &self,
         group: &Group,
-        element: &Element,
+        element: &JointElement,
         boards: &Boards,
         linear: &Linear,
     ) -> GroupJacobian {

@@ -1,14 +1,14 @@
 //! Builds the joint problem from a dataset: groups of facets, boards in front of undeflected beams, and the mounting.
 
 use super::fan::Flatness;
-use super::group::{BareFacet, Board, Element, Facet, Group, Sight};
+use super::group::{BareFacet, Board, Facet, Group, JointElement, Sight};
 use super::problem::{Joint, Mounting};
 use crate::element::attempt::Workspace;
 use crate::element::choose::boards_hit;
 use crate::judge::common::CommonErrors;
 use crate::lsq::State;
 use crate::mount::mount_data::DirectBoard;
-use crate::mount::pose::{self, Mount, Prior};
+use crate::mount::pose::{self, Mount, MountPrior};
 use crate::readings::observations::azimuth;
 use crate::readings::spread;
 use crate::screen::ScreenClass;
@@ -158,7 +158,7 @@ pub(super) fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) 
             }
         }
         let azimuth = azimuth(session, element.beam);
-        group.elements.push(Element {
+        group.elements.push(JointElement {
             beam: element.beam,
             azimuth,
             u: beam::direction(azimuth),
@@ -185,7 +185,7 @@ pub(super) fn direct_group(work: &Workspace, selected: &DirectBoard) -> Option<G
     // Readings believed to be noise-free are not rounded either.
     let exact = work.dataset.session.believed.range_noise_sd_mm == 0.0;
     let floored = |sd: f64| if exact { MIN_SD } else { sd.max(MIN_SD) };
-    let elements = selected.rays.iter().map(|ray| Element {
+    let elements = selected.rays.iter().map(|ray| JointElement {
         beam: ray.beam,
         azimuth: ray.azimuth,
         u: beam::direction(ray.azimuth),
@@ -220,7 +220,7 @@ pub(super) fn mounting_as_found(work: &Workspace, mount: &Mount) -> (Mounting, D
 pub(super) fn mounting_as_drawn(work: &Workspace, mount: &Mount) -> (Mounting, DVector<f64>) {
     let session = &work.dataset.session;
     let count = CommonErrors::of(session).len();
-    let drawn = Prior::of(
+    let drawn = MountPrior::of(
         &Pose::from(&session.nominal_rig_from_sensor),
         &session.mount_tolerance,
     );

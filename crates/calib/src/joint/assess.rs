@@ -5,7 +5,7 @@
 //! The standard deviation of σ̂ is σ̂/√(2Σ(1 − C_uu)).
 
 use super::answer::Answer;
-use super::fit::Fit;
+use super::fit::JointFit;
 use super::group::{BOARD_ERRORS, FACET_PARAMETERS};
 use super::problem::Joint;
 use crate::lsq::Solution;
@@ -30,7 +30,7 @@ pub(super) fn upper_tail(chi_squared: f64, freedom: f64) -> f64 {
 
 impl Joint<'_> {
     /// The assessment of a solution.
-    pub(super) fn assess(&self, session: &Session, fit: &Fit, answers: &[Answer]) -> Assessment {
+    pub(super) fn assess(&self, session: &Session, fit: &JointFit, answers: &[Answer]) -> Assessment {
         let solution = &fit.solution;
         let freedom = solution.degrees_of_freedom();
         let global_test = ChiSquaredTest {

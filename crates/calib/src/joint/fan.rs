@@ -1,6 +1,6 @@
 //! Deflection of a beam by a facet: its plane gives the distance, its local normal at the beam gives the direction.
 
-use super::group::{Element, FIGURE, FIGURE_ORDERS};
+use super::group::{FIGURE, FIGURE_ORDERS, JointElement};
 use catoptric_model::{frame, mirror};
 use nalgebra::{DVector, Unit, Vector3};
 
@@ -49,7 +49,7 @@ impl Fan {
     /// A facet's deflection of a beam; `None` if the facet does not face it.
     ///
     /// The plane gives the distance, its local normal at the beam gives the direction.
-    pub(super) fn of(element: &Element, shape: &Shape, flatness: &Flatness) -> Option<Self> {
+    pub(super) fn of(element: &JointElement, shape: &Shape, flatness: &Flatness) -> Option<Self> {
         let u = &element.u;
         let (a, b) = frame::tangent_basis(&shape.normal);
         let orders = orders(element.along).map(|p| p * flatness.figure);

@@ -9,7 +9,7 @@
 use super::fan::Flatness;
 use super::group::{BOARD_ERRORS, FACET_BLOCKS, FACET_PARAMETERS, FIGURE, Group};
 use super::problem::Joint;
-use crate::lsq::{self, Block, Point, Prior, ProblemError, Reduced, Solution, State, WithPriors};
+use crate::lsq::{self, ParameterBlock, Point, Prior, ProblemError, Reduced, Solution, State, WithPriors};
 use catoptric_model::MirrorPlane;
 use nalgebra::DVector;
 
@@ -28,7 +28,7 @@ const CLOSE: f64 = 0.1;
 const TIE: f64 = 1e-6;
 
 /// A solution and the flatness of the facets.
-pub(super) struct Fit {
+pub(super) struct JointFit {
     pub(super) solution: Solution,
     /// L(0, 0) − L(σ̂, τ̂), never negative.
     pub(super) deviation_statistic: f64,
@@ -36,7 +36,7 @@ pub(super) struct Fit {
 
 impl Joint<'_> {
     /// Solves from a state with the present τ.
-    pub(super) fn solve(&self, start: State, options: &lsq::Options) -> Result<Solution, ProblemError> {
+    pub(super) fn solve(&self, start: State, options: &lsq::SolverOptions) -> Result<Solution, ProblemError> {
         let problem = self.with_priors(self);
         lsq::minimize(&problem, start, options)
     }
@@ -67,9 +67,9 @@ impl Joint<'_> {
     }
 
     /// Solves with flat facets, then estimates σ and τ from that solution.
-    pub(super) fn fit(&mut self, start: State) -> Result<Fit, ProblemError> {
-        let exact = lsq::Options::default();
-        let rough = lsq::Options {
+    pub(super) fn fit(&mut self, start: State) -> Result<JointFit, ProblemError> {
+        let exact = lsq::SolverOptions::default();
+        let rough = lsq::SolverOptions {
             reduction_tolerance: 1e-6,
             ..exact
         };
@@ -89,7 +89,7 @@ impl Joint<'_> {
             (figure, lowest)
         };
         self.flatness = Flatness { figure, tau };
-        Ok(Fit {
+        Ok(JointFit {
             solution: self.solve(state, &exact)?,
             deviation_statistic: (plane - lowest).max(0.0),
         })
@@ -99,7 +99,7 @@ impl Joint<'_> {
     fn without_figure(&self, mut state: State) -> State {
         for (group, own) in self.groups.iter().zip(&mut state.own) {
             for facet in 0..group.facets.len() {
-                own.blocks[FACET_BLOCKS * facet + 2] = Block::Vector(DVector::zeros(FIGURE));
+                own.blocks[FACET_BLOCKS * facet + 2] = ParameterBlock::Vector(DVector::zeros(FIGURE));
             }
         }
         state
@@ -126,7 +126,7 @@ impl Joint<'_> {
     pub(super) fn state(&self, planes: &[MirrorPlane]) -> State {
         State {
             shared: Point {
-                blocks: vec![Block::Vector(DVector::zeros(self.shared_dimension()))],
+                blocks: vec![ParameterBlock::Vector(DVector::zeros(self.shared_dimension()))],
             },
             own: self.groups.iter().map(|g| Self::start(g, planes)).collect(),
         }
@@ -151,7 +151,7 @@ impl Deviating {
 /// A prior of independent standard normal numbers about a mean.
 fn standard(block: usize, mean: DVector<f64>) -> Prior {
     let sd = vec![1.0; mean.len()];
-    Prior::independent(block, Block::Vector(mean), &sd)
+    Prior::independent(block, ParameterBlock::Vector(mean), &sd)
 }
 
 /// The σ of minimal L, and that L. 0 unless some σ beats `none`, the L without it.

@@ -44,7 +44,7 @@ pub(super) struct Sight {
 
 /// An element and its readings; without a facet it is an undeflected beam.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Element {
+pub(super) struct JointElement {
     pub(super) beam: usize,
     pub(super) azimuth: f64,
     pub(super) u: Unit<Vector3<f64>>,
@@ -78,7 +78,7 @@ pub(super) struct Facet {
 pub(super) struct Group {
     pub(super) facets: Vec<Facet>,
     pub(super) boards: Vec<Board>,
-    pub(super) elements: Vec<Element>,
+    pub(super) elements: Vec<JointElement>,
 }
 
 impl Group {

@@ -32,7 +32,7 @@ impl Joint<'_> {
                     sight.sd *= LEFT_OUT;
                 }
             }
-            let solution = rest.solve(from.clone(), &lsq::Options::default())?;
+            let solution = rest.solve(from.clone(), &lsq::SolverOptions::default())?;
             for answer in rest.answers(&solution) {
                 // Without boards of its own an element's direction is that of its facet; without a covariance it is
                 // open.

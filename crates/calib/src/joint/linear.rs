@@ -1,7 +1,7 @@
 //! One element linearized at a point: its predicted readings, its deviation from its facet, and their derivatives.
 
 use super::fan::Fan;
-use super::group::{BOARD_ERRORS, Element, FACET_PARAMETERS, FIGURE_ORDERS, Group};
+use super::group::{BOARD_ERRORS, FACET_PARAMETERS, FIGURE_ORDERS, Group, JointElement};
 use super::placed::{Boards, Placed};
 use super::problem::Joint;
 use crate::lsq::{GroupJacobian, Point};
@@ -93,7 +93,7 @@ impl Joint<'_> {
     /// An element linearized at a point; `None` if it meets none of its boards.
     pub(super) fn element(
         &self,
-        element: &Element,
+        element: &JointElement,
         shared: &Point,
         own: &Point,
         boards: &Boards,
@@ -175,7 +175,7 @@ impl Joint<'_> {
     pub(super) fn differentiate(
         &self,
         group: &Group,
-        element: &Element,
+        element: &JointElement,
         boards: &Boards,
         linear: &Linear,
         into: &mut GroupJacobian,

@@ -27,7 +27,7 @@ use crate::mount::pose::Mount;
 use assemble::{Assigned, begin, components, direct_group, group, mounting_as_drawn, mounting_as_found};
 use catoptric_model::calibration::{FacetEstimate, MountEstimate};
 use catoptric_model::{Assessment, BeamEstimate, Calibration, MirrorPlane, RangeBias};
-use fit::Fit;
+use fit::JointFit;
 use group::Group;
 use nalgebra::DVector;
 use problem::{Joint, Mounting};
@@ -131,9 +131,9 @@ fn solve(
 ) -> Result<Outcome, ProblemError> {
     let session = &work.dataset.session;
     let (mut joint, start) = begin(work, groups, mounting, mean, planes);
-    let exact = lsq::Options::default();
+    let exact = lsq::SolverOptions::default();
     let rigid = |joint: &Joint, from: State| {
-        joint.solve(from, &exact).map(|solution| Fit {
+        joint.solve(from, &exact).map(|solution| JointFit {
             solution,
             deviation_statistic: 0.0,
         })

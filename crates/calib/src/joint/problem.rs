@@ -10,9 +10,9 @@
 //! weight of its rows.
 
 use super::fan::{Flatness, Shape};
-use super::group::{BOARD_ERRORS, Element, FACET_BLOCKS, FIGURE, Group};
+use super::group::{BOARD_ERRORS, FACET_BLOCKS, FIGURE, Group, JointElement};
 use crate::judge::common::CommonErrors;
-use crate::lsq::{Block, Point};
+use crate::lsq::{ParameterBlock, Point};
 use catoptric_model::{MirrorPlane, Pose, RangeBias, Stop};
 use nalgebra::{DVector, Dyn, OMatrix, U6};
 
@@ -63,7 +63,7 @@ impl Joint<'_> {
     }
 
     /// 1σ of an element's deviation from its facet's plane; 0 for an undeflected beam.
-    pub(super) fn deviation(&self, element: &Element) -> f64 {
+    pub(super) fn deviation(&self, element: &JointElement) -> f64 {
         if element.facet.is_some() {
             self.flatness.tau
         } else {
@@ -76,11 +76,13 @@ impl Joint<'_> {
         let mut blocks = Vec::new();
         for facet in &group.facets {
             let plane = &planes[facet.facet];
-            blocks.push(Block::Direction(plane.normal));
-            blocks.push(Block::Vector(DVector::from_element(1, plane.offset)));
-            blocks.push(Block::Vector(DVector::zeros(FIGURE)));
+            blocks.push(ParameterBlock::Direction(plane.normal));
+            blocks.push(ParameterBlock::Vector(DVector::from_element(1, plane.offset)));
+            blocks.push(ParameterBlock::Vector(DVector::zeros(FIGURE)));
         }
-        blocks.push(Block::Vector(DVector::zeros(group.boards.len() * BOARD_ERRORS)));
+        blocks.push(ParameterBlock::Vector(DVector::zeros(
+            group.boards.len() * BOARD_ERRORS,
+        )));
         Point { blocks }
     }
 }

@@ -6,10 +6,10 @@
 //! and Watts, "Nonlinear Regression Analysis and Its Applications", 1988, section 6.1): over k standard deviations it
 //! rises by k² if the problem is linear, and by k²(1 ± 1/q)² if it is curved, with q = δ̂ over the standard deviation.
 
-use super::group::Element;
+use super::group::JointElement;
 use super::linear::Linear;
 use super::problem::Joint;
-use crate::lsq::{self, GroupJacobian, GroupedProblem, Point, Solution};
+use crate::lsq::{self, GroupJacobian, GroupedResiduals, Point, Solution};
 use catoptric_model::frame;
 use nalgebra::{DVector, Matrix2, Vector2, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
@@ -28,7 +28,7 @@ pub(super) const STRAIGHT_SD: f64 = 0.1 * std::f64::consts::PI / 180.0;
 const HELD: f64 = 1e-2;
 
 /// Accuracy of a profile: its rise is compared with a quarter.
-const SEARCH: lsq::Options = lsq::Options {
+const SEARCH: lsq::SolverOptions = lsq::SolverOptions {
     reduction_tolerance: 1e-6,
     step_tolerance: 1e-9,
     gradient_tolerance: 1e-9,
@@ -41,7 +41,7 @@ const SEARCH: lsq::Options = lsq::Options {
 struct Moved<'a> {
     joint: &'a Joint<'a>,
     group: usize,
-    element: &'a Element,
+    element: &'a JointElement,
     /// Unit vector across the direction found, along which it is moved.
     axis: Vector3<f64>,
     /// Angle to which it is moved, and how closely it is held there, in radians.
@@ -51,7 +51,7 @@ struct Moved<'a> {
 
 /// The least certain direction of a facet.
 struct Weakest<'a> {
-    element: &'a Element,
+    element: &'a JointElement,
     sd: f64,
     axis: Vector3<f64>,
     /// The direction as a combination of parameters.
@@ -144,7 +144,7 @@ impl Moved<'_> {
     }
 }
 
-impl GroupedProblem for Moved<'_> {
+impl GroupedResiduals for Moved<'_> {
     fn is_stopped(&self) -> bool {
         self.joint.is_stopped()
     }

@@ -3,7 +3,7 @@
 use super::fan::Shape;
 use super::group::{BareFacet, FACET_PARAMETERS};
 use super::problem::Joint;
-use crate::lsq::{GroupJacobian, GroupRows, GroupedProblem, Point};
+use crate::lsq::{GroupJacobian, GroupRows, GroupedResiduals, Point};
 use catoptric_model::frame;
 use nalgebra::{DMatrix, DVector};
 
@@ -99,7 +99,7 @@ impl Joint<'_> {
     }
 }
 
-impl GroupedProblem for Joint<'_> {
+impl GroupedResiduals for Joint<'_> {
     fn is_stopped(&self) -> bool {
         self.stop.is_requested()
     }

@@ -8,7 +8,7 @@
 //! ```
 
 use crate::judge::levers::libm_cos;
-use crate::lsq::{Information, Point, Problem, linearize};
+use crate::lsq::{Information, Point, Residuals, linearize};
 use crate::readings::jacobian;
 use catoptric_model::{BoardPlane, Deflection, MirrorPlane, beam, frame, range};
 use nalgebra::{DMatrix, DVector, Point3, Unit, Vector3};
@@ -164,7 +164,7 @@ struct Geometry {
     jacobian: DMatrix<f64>,
 }
 
-impl Problem for Geometry {
+impl Residuals for Geometry {
     fn residuals(&self, at: &Point) -> Option<DVector<f64>> {
         Some(&self.jacobian * at.numbers(0)?)
     }

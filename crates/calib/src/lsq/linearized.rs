@@ -2,8 +2,8 @@
 
 use super::elimination::{Elimination, Rows};
 use super::information::Information;
-use super::minimize::{Options, of_groups};
-use super::problem::{GroupedProblem, ProblemError, State};
+use super::minimize::{SolverOptions, of_groups};
+use super::problem::{GroupedResiduals, ProblemError, State};
 use nalgebra::DVector;
 
 /// A problem linearized at a state.
@@ -42,11 +42,11 @@ impl Reduced {
     /// # Errors
     ///
     /// If the residuals or their derivatives are undefined there, or the shapes do not fit.
-    pub fn new<P: GroupedProblem>(problem: &P, state: &State) -> Result<Self, ProblemError> {
+    pub fn new<P: GroupedResiduals>(problem: &P, state: &State) -> Result<Self, ProblemError> {
         Self::with_threshold(problem, state, 0.0)
     }
 
-    fn with_threshold<P: GroupedProblem>(
+    fn with_threshold<P: GroupedResiduals>(
         problem: &P,
         state: &State,
         threshold: f64,
@@ -94,7 +94,7 @@ impl Reduced {
         );
         let linear = self
             .linear
-            .changed(factors, weights, Options::default().rank_threshold);
+            .changed(factors, weights, SolverOptions::default().rank_threshold);
         self.solved(linear)
     }
 
@@ -115,7 +115,7 @@ impl Reduced {
 /// # Errors
 ///
 /// As [`minimize`](super::minimize()), of the state.
-pub fn linearize<P: GroupedProblem>(problem: &P, state: &State) -> Result<Linearized, ProblemError> {
-    let reduced = Reduced::with_threshold(problem, state, Options::default().rank_threshold)?;
+pub fn linearize<P: GroupedResiduals>(problem: &P, state: &State) -> Result<Linearized, ProblemError> {
+    let reduced = Reduced::with_threshold(problem, state, SolverOptions::default().rank_threshold)?;
     Ok(reduced.solved(reduced.linear.clone()))
 }

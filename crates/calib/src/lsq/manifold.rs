@@ -18,7 +18,7 @@ const SMALL_TURN: f64 = 1e-4;
 
 /// One parameter block.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Block {
+pub enum ParameterBlock {
     /// Numbers, Rⁿ.
     Vector(DVector<f64>),
     /// A unit vector, S²; two radians.
@@ -33,10 +33,10 @@ pub enum Block {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Point {
     /// The blocks; tangent coordinates are in the same order.
-    pub blocks: Vec<Block>,
+    pub blocks: Vec<ParameterBlock>,
 }
 
-impl Block {
+impl ParameterBlock {
     /// Dimension of the tangent space.
     pub fn dimension(&self) -> usize {
         match self {
@@ -156,18 +156,18 @@ impl Point {
     /// A point with one block of numbers.
     pub fn vector(values: &[f64]) -> Self {
         Self {
-            blocks: vec![Block::Vector(DVector::from_column_slice(values))],
+            blocks: vec![ParameterBlock::Vector(DVector::from_column_slice(values))],
         }
     }
 
     /// Dimension of the tangent space.
     pub fn dimension(&self) -> usize {
-        self.blocks.iter().map(Block::dimension).sum()
+        self.blocks.iter().map(ParameterBlock::dimension).sum()
     }
 
     /// First tangent coordinate of a block.
     pub fn offset(&self, block: usize) -> usize {
-        self.blocks[..block].iter().map(Block::dimension).sum()
+        self.blocks[..block].iter().map(ParameterBlock::dimension).sum()
     }
 
     /// x ⊞ δ, block by block.
@@ -189,39 +189,39 @@ impl Point {
         Self { blocks }
     }
 
-    /// Scale of each tangent coordinate; see [`Block::extent`].
+    /// Scale of each tangent coordinate; see [`ParameterBlock::extent`].
     pub fn extent(&self) -> Vec<f64> {
-        self.blocks.iter().flat_map(Block::extent).collect()
+        self.blocks.iter().flat_map(ParameterBlock::extent).collect()
     }
 
-    /// The numbers of a [`Block::Vector`]; `None` if the block is of another kind or absent.
+    /// The numbers of a [`ParameterBlock::Vector`]; `None` if the block is of another kind or absent.
     pub fn numbers(&self, block: usize) -> Option<&DVector<f64>> {
         match self.blocks.get(block) {
-            Some(Block::Vector(values)) => Some(values),
+            Some(ParameterBlock::Vector(values)) => Some(values),
             _ => None,
         }
     }
 
-    /// The unit vector of a [`Block::Direction`]; `None` if the block is of another kind or absent.
+    /// The unit vector of a [`ParameterBlock::Direction`]; `None` if the block is of another kind or absent.
     pub fn direction(&self, block: usize) -> Option<&Unit<Vector3<f64>>> {
         match self.blocks.get(block) {
-            Some(Block::Direction(n)) => Some(n),
+            Some(ParameterBlock::Direction(n)) => Some(n),
             _ => None,
         }
     }
 
-    /// The rotation of a [`Block::Rotation`]; `None` if the block is of another kind or absent.
+    /// The rotation of a [`ParameterBlock::Rotation`]; `None` if the block is of another kind or absent.
     pub fn rotation(&self, block: usize) -> Option<&UnitQuaternion<f64>> {
         match self.blocks.get(block) {
-            Some(Block::Rotation(r)) => Some(r),
+            Some(ParameterBlock::Rotation(r)) => Some(r),
             _ => None,
         }
     }
 
-    /// The pose of a [`Block::Pose`]; `None` if the block is of another kind or absent.
+    /// The pose of a [`ParameterBlock::Pose`]; `None` if the block is of another kind or absent.
     pub fn pose(&self, block: usize) -> Option<&Pose> {
         match self.blocks.get(block) {
-            Some(Block::Pose(pose)) => Some(pose),
+            Some(ParameterBlock::Pose(pose)) => Some(pose),
             _ => None,
         }
     }

@@ -6,7 +6,7 @@
 
 use super::elimination::{Elimination, Rows};
 use super::information::Information;
-use super::problem::{GroupedProblem, ProblemError, State};
+use super::problem::{GroupedResiduals, ProblemError, State};
 use super::trust_region;
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -19,7 +19,7 @@ const MIN_GAIN: f64 = 1e-4;
 
 /// When to stop, and what counts as dependent.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Options {
+pub struct SolverOptions {
     /// Relative reduction of ‖f‖², predicted and actual, that is not worth another step.
     pub reduction_tolerance: f64,
     /// Radius of the trust region, relative to the scaled parameters, that is not worth another step.
@@ -34,7 +34,7 @@ pub struct Options {
     pub rank_threshold: f64,
 }
 
-impl Default for Options {
+impl Default for SolverOptions {
     fn default() -> Self {
         Self {
             reduction_tolerance: 1e-15,
@@ -49,7 +49,7 @@ impl Default for Options {
 
 /// Why the iteration ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stop {
+pub enum Termination {
     /// The residuals are zero, or perpendicular to every column of the Jacobian.
     Gradient,
     /// A step brings no reduction worth having.
@@ -62,7 +62,7 @@ pub enum Stop {
     Limit,
 }
 
-impl Stop {
+impl Termination {
     /// Whether the iteration converged.
     pub fn converged(self) -> bool {
         self != Self::Limit
@@ -79,7 +79,7 @@ pub struct Solution {
     /// ‖f‖².
     pub sum_of_squares: f64,
     /// Why the iteration ended.
-    pub stop: Stop,
+    pub stop: Termination,
     /// Linearizations used.
     pub iterations: usize,
     /// Evaluations of the residuals used.
@@ -107,10 +107,10 @@ impl Solution {
 /// # Panics
 ///
 /// If the state has own parameters for more groups than the problem has.
-pub fn minimize<P: GroupedProblem>(
+pub fn minimize<P: GroupedResiduals>(
     problem: &P,
     start: impl Into<State>,
-    options: &Options,
+    options: &SolverOptions,
 ) -> Result<Solution, ProblemError> {
     let start = start.into();
     assert!(start.own.len() <= problem.groups(), "own parameters need a group");
@@ -143,7 +143,7 @@ struct Search<'a, P> {
 /// Jᵀf.
 struct Slope(DVector<f64>);
 
-impl<'a, P: GroupedProblem> Search<'a, P> {
+impl<'a, P: GroupedResiduals> Search<'a, P> {
     fn begin(problem: &'a P, state: State) -> Result<Self, ProblemError> {
         let residuals = evaluate(problem, &state).map_err(|group| ProblemError::Undefined {
             group,
@@ -167,7 +167,7 @@ impl<'a, P: GroupedProblem> Search<'a, P> {
         Ok(())
     }
 
-    fn run(&mut self, options: &Options) -> Result<Stop, ProblemError> {
+    fn run(&mut self, options: &SolverOptions) -> Result<Termination, ProblemError> {
         let width = self.state.shared.dimension();
         let mut d = DVector::zeros(0);
         let (mut radius, mut size, mut damping) = (0.0, 0.0, 0.0);
@@ -183,7 +183,7 @@ impl<'a, P: GroupedProblem> Search<'a, P> {
             }
             let cosine = slope.cosine(linear.scale(), self.norm);
             if cosine <= options.gradient_tolerance {
-                return Ok(Stop::Gradient);
+                return Ok(Termination::Gradient);
             }
             d = d.zip_map(linear.scale(), f64::max);
             if first {
@@ -239,16 +239,16 @@ impl<'a, P: GroupedProblem> Search<'a, P> {
                 let little =
                     |tolerance: f64| actual.abs() <= tolerance && promised <= tolerance && 0.5 * ratio <= 1.0;
                 if little(options.reduction_tolerance) {
-                    return Ok(Stop::Reduction);
+                    return Ok(Termination::Reduction);
                 }
                 if radius <= options.step_tolerance * size {
-                    return Ok(Stop::Step);
+                    return Ok(Termination::Step);
                 }
                 if little(f64::EPSILON) || radius <= f64::EPSILON * size || radius < f64::MIN_POSITIVE {
-                    return Ok(Stop::Rounding);
+                    return Ok(Termination::Rounding);
                 }
                 if self.evaluations >= options.max_evaluations {
-                    return Ok(Stop::Limit);
+                    return Ok(Termination::Limit);
                 }
                 if taken {
                     break;
@@ -301,7 +301,7 @@ pub(super) fn of_groups<T: Send, E: Send>(
 }
 
 /// Residuals of all groups, or the group where they are undefined or not finite.
-fn evaluate<P: GroupedProblem>(problem: &P, state: &State) -> Result<Vec<DVector<f64>>, usize> {
+fn evaluate<P: GroupedResiduals>(problem: &P, state: &State) -> Result<Vec<DVector<f64>>, usize> {
     of_groups(problem.groups(), |group| {
         problem
             .residuals(group, &state.shared, state.own(group))
@@ -311,7 +311,7 @@ fn evaluate<P: GroupedProblem>(problem: &P, state: &State) -> Result<Vec<DVector
 }
 
 /// Rows of all groups, with −f on the right.
-fn rows<P: GroupedProblem>(
+fn rows<P: GroupedResiduals>(
     problem: &P,
     state: &State,
     residuals: &[DVector<f64>],

@@ -1,14 +1,14 @@
 //! Gaussian priors as rows: L·(x ⊟ x̄), LᵀL the inverse covariance of a block about its mean.
 
-use super::manifold::{Block, Point};
-use super::problem::{GroupJacobian, GroupRows, GroupedProblem};
+use super::manifold::{ParameterBlock, Point};
+use super::problem::{GroupJacobian, GroupRows, GroupedResiduals};
 use nalgebra::{DMatrix, DVector};
 
 /// Gaussian prior of one block.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Prior {
     block: usize,
-    mean: Block,
+    mean: ParameterBlock,
     root: DMatrix<f64>,
 }
 
@@ -20,7 +20,7 @@ impl Prior {
     /// # Panics
     ///
     /// If the numbers do not fit the block or are not positive.
-    pub fn independent(block: usize, mean: Block, standard_deviations: &[f64]) -> Self {
+    pub fn independent(block: usize, mean: ParameterBlock, standard_deviations: &[f64]) -> Self {
         assert_eq!(
             standard_deviations.len(),
             mean.dimension(),
@@ -92,7 +92,7 @@ impl<P> WithPriors<'_, P> {
     }
 }
 
-impl<P: GroupedProblem> GroupedProblem for WithPriors<'_, P> {
+impl<P: GroupedResiduals> GroupedResiduals for WithPriors<'_, P> {
     fn is_stopped(&self) -> bool {
         self.problem.is_stopped()
     }

@@ -1,6 +1,6 @@
 //! The problem to be minimized: residuals and their Jacobian, supplied by the caller.
 //!
-//! A [`Problem`] has no structure. A [`GroupedProblem`] has an arrow-shaped Jacobian: each group of residuals depends
+//! [`Residuals`] have no structure. [`GroupedResiduals`] have an arrow-shaped Jacobian: each group of residuals depends
 //! on the shared parameters and on its own, which no other group depends on, so that they can be eliminated group by
 //! group.
 
@@ -13,7 +13,7 @@ use thiserror::Error;
 /// Residuals are best given in units of their standard deviations: then covariances need no further factor. A residual
 /// function that is undefined at a point (a ray that misses its board) returns `None`; the solver then tries a shorter
 /// step.
-pub trait Problem: Sync {
+pub trait Residuals: Sync {
     /// f(x), m numbers; the same m at every point.
     fn residuals(&self, at: &Point) -> Option<DVector<f64>>;
     /// ∂f(x ⊞ δ)/∂δ at δ = 0, m × n, with n the dimension of the point's tangent space.
@@ -43,17 +43,17 @@ pub struct GroupRows {
 
 /// Residuals in groups, each depending on the shared parameters and on the group's own.
 ///
-/// Every [`Problem`] is one: a single group without own parameters. Groups are evaluated in parallel, in any order.
-pub trait GroupedProblem: Sync {
+/// [`Residuals`] are a single group without own parameters. Groups are evaluated in parallel, in any order.
+pub trait GroupedResiduals: Sync {
     /// Whether the caller no longer wants a solution; looked at before every evaluation.
     fn is_stopped(&self) -> bool {
         false
     }
     /// Number of groups.
     fn groups(&self) -> usize;
-    /// Residuals of one group; see [`Problem::residuals`].
+    /// Residuals of one group; see [`Residuals::residuals`].
     fn residuals(&self, group: usize, shared: &Point, own: &Point) -> Option<DVector<f64>>;
-    /// Derivatives of one group; see [`Problem::jacobian`].
+    /// Derivatives of one group; see [`Residuals::jacobian`].
     fn jacobian(&self, group: usize, shared: &Point, own: &Point) -> Option<GroupJacobian>;
     /// Both at a point.
     fn linearized(&self, group: usize, shared: &Point, own: &Point) -> Option<GroupRows> {
@@ -65,17 +65,17 @@ pub trait GroupedProblem: Sync {
     }
 }
 
-impl<P: Problem> GroupedProblem for P {
+impl<P: Residuals> GroupedResiduals for P {
     fn groups(&self) -> usize {
         1
     }
 
     fn residuals(&self, _group: usize, shared: &Point, _own: &Point) -> Option<DVector<f64>> {
-        Problem::residuals(self, shared)
+        Residuals::residuals(self, shared)
     }
 
     fn jacobian(&self, _group: usize, shared: &Point, _own: &Point) -> Option<GroupJacobian> {
-        let shared = Problem::jacobian(self, shared)?;
+        let shared = Residuals::jacobian(self, shared)?;
         let own = DMatrix::zeros(shared.nrows(), 0);
         Some(GroupJacobian { shared, own })
     }

@@ -58,7 +58,7 @@ struct NormalEquations {
 }
 
 /// The mounting by the drawing, used only along motions that the boards leave open.
-pub(crate) struct Prior {
+pub(crate) struct MountPrior {
     pub(crate) nominal: Pose,
     /// 1σ of each motion: shifts, then rotations.
     pub(crate) sd: Vector6<f64>,
@@ -70,7 +70,7 @@ pub(crate) struct Prior {
 /// tolerance, and its covariance reflects that. A well-determined mounting is not pulled toward the nominal one.
 pub fn estimate(dataset: &Dataset, summaries: &[Vec<Summary>]) -> Mount {
     let session = &dataset.session;
-    let prior = Prior::of(
+    let prior = MountPrior::of(
         &Pose::from(&session.nominal_rig_from_sensor),
         &session.mount_tolerance,
     );
@@ -151,7 +151,7 @@ pub(crate) fn same_beams(a: &[DirectBoard], b: &[DirectBoard]) -> bool {
 }
 
 /// Gauss–Newton over a fixed selection of beams.
-fn solve(selection: &[DirectBoard], start: &Pose, prior: &Prior, selector: &Selector) -> Pose {
+fn solve(selection: &[DirectBoard], start: &Pose, prior: &MountPrior, selector: &Selector) -> Pose {
     let mut pose = *start;
     let mut last = f64::INFINITY;
     for _ in 0..MAX_STEPS {
@@ -199,7 +199,7 @@ fn normal_equations(
     sums
 }
 
-impl Prior {
+impl MountPrior {
     pub(crate) fn of(nominal: &Pose, tolerance: &MountTolerance) -> Self {
         // A tolerance of zero means that the mounting is known, not that it was drawn with care.
         let floored = |sd: f64, floor: f64| if sd == 0.0 { NO_TOLERANCE } else { sd.max(floor) };

@@ -9,7 +9,7 @@
 //! k·σ_δ²/(2p), which no belief of a session covers; where that exceeds `UNMODELED` a longer lever gains nothing.
 
 use super::request::Request;
-use super::situation::{Element, Fan, Situation, in_sensor};
+use super::situation::{Fan, PlannedElement, Situation, in_sensor};
 use crate::error::CalibError;
 use crate::readings::observations::{BoardInSensor, cone_half_angle};
 use catoptric_model::frame::tangent_basis;
@@ -43,7 +43,7 @@ const HALF_HEIGHT: f64 = 1.177_410_022_515_474_7;
 
 /// A possible pose of a board.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Candidate {
+pub struct PoseCandidate {
     /// The board.
     pub board: String,
     /// Its pose.
@@ -94,7 +94,7 @@ pub fn candidates(
     facet: &str,
     request: &Request,
     stop: &Stop,
-) -> Result<Vec<Candidate>, CalibError> {
+) -> Result<Vec<PoseCandidate>, CalibError> {
     let session = situation.session();
     let fan = situation.fan(facet).ok_or_else(|| CalibError::UnknownFacet {
         name: facet.to_owned(),
@@ -224,7 +224,7 @@ impl<'a> Site<'a> {
     }
 
     /// The possible ones among some poses around another; later rounds try closer ones.
-    pub(super) fn near(&self, center: &Candidate, round: i32) -> Vec<Candidate> {
+    pub(super) fn near(&self, center: &PoseCandidate, round: i32) -> Vec<PoseCandidate> {
         let elements = &self.fan.elements;
         let boards = &self.situation.session().boards;
         let Some(board) = boards.iter().position(|b| b.name == center.board) else {
@@ -280,7 +280,7 @@ impl<'a> Site<'a> {
     }
 
     /// Distance along an element's ray to the shell of the room, in meters.
-    fn reach(&self, element: &Element) -> f64 {
+    fn reach(&self, element: &PlannedElement) -> f64 {
         let (origin, v) = self.ray(element);
         let room = self.situation.session().room.as_ref();
         room.and_then(|room| Some(room.cast(&origin, &v)?.0))
@@ -288,14 +288,14 @@ impl<'a> Site<'a> {
     }
 
     /// An element's ray in the room.
-    fn ray(&self, element: &Element) -> (Point3<f64>, Unit<Vector3<f64>>) {
+    fn ray(&self, element: &PlannedElement) -> (Point3<f64>, Unit<Vector3<f64>>) {
         let room_from_sensor = self.situation.room_from_sensor();
         let origin = element.deflection.deflection_point(element.azimuth);
         let v = element.deflection.exit_direction(element.azimuth);
         (room_from_sensor * origin, room_from_sensor.rotation * v)
     }
 
-    fn candidate(&self, wish: &Wish) -> Result<Candidate, Refusal> {
+    fn candidate(&self, wish: &Wish) -> Result<PoseCandidate, Refusal> {
         let session = self.situation.session();
         let sheet = &session.boards[wish.board];
         let aimed = &self.fan.elements[wish.element];
@@ -325,7 +325,7 @@ impl<'a> Site<'a> {
         if served.is_empty() {
             return Err(Refusal::Unserved);
         }
-        Ok(Candidate {
+        Ok(PoseCandidate {
             board: sheet.name.clone(),
             room_from_board,
             beam: aimed.beam,

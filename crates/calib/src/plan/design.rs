@@ -5,9 +5,9 @@
 //! elements without boards have a large but finite cost.
 
 use super::answer::{Open, Standing};
-use super::candidates::{Candidate, Site, candidates};
+use super::candidates::{PoseCandidate, Site, candidates};
 use super::request::{Criterion, Request};
-use super::situation::{Element, Fan, Situation};
+use super::situation::{Fan, PlannedElement, Situation};
 use super::words;
 use crate::element::attempt::MIN_BOARDS;
 use crate::error::CalibError;
@@ -58,7 +58,7 @@ pub struct Designer<'a> {
     fan: &'a Fan,
     request: Request,
     site: Site<'a>,
-    candidates: Vec<Candidate>,
+    candidates: Vec<PoseCandidate>,
     rows: Vec<Vec<Row>>,
     /// With the boards already recorded or planned.
     start: Vec<Known>,
@@ -115,7 +115,7 @@ impl<'a> Designer<'a> {
     }
 
     /// A candidate by its index.
-    pub fn candidate(&self, number: usize) -> &Candidate {
+    pub fn candidate(&self, number: usize) -> &PoseCandidate {
         &self.candidates[number]
     }
 
@@ -233,7 +233,7 @@ impl<'a> Designer<'a> {
     /// Why each element is open; `None` for one that is not.
     fn reasons(&self, chosen: &[usize]) -> Vec<Option<String>> {
         let session = self.situation.session();
-        let of_one = |(number, element): (usize, &Element)| {
+        let of_one = |(number, element): (usize, &PlannedElement)| {
             let mut views = self.views(element);
             views.extend(
                 chosen
@@ -357,7 +357,7 @@ impl<'a> Designer<'a> {
             .collect()
     }
 
-    fn row(&self, number: usize, element: &Element, view: &BoardView, mounting: bool) -> Option<Row> {
+    fn row(&self, number: usize, element: &PlannedElement, view: &BoardView, mounting: bool) -> Option<Row> {
         let session = self.situation.session();
         let known = MountUncertainty::none();
         let mount = if mounting { &self.situation.mount } else { &known };
@@ -387,13 +387,13 @@ impl<'a> Designer<'a> {
         })
     }
 
-    fn view<'c>(&self, candidate: &'c Candidate) -> BoardView<'c> {
+    fn view<'c>(&self, candidate: &'c PoseCandidate) -> BoardView<'c> {
         let noise = noise(self.situation.session());
         candidate.in_sensor.view(noise, self.request.readings)
     }
 
     /// The boards that an element already reads.
-    fn views<'s>(&'s self, element: &Element) -> Vec<BoardView<'s>> {
+    fn views<'s>(&'s self, element: &PlannedElement) -> Vec<BoardView<'s>> {
         let boards = &self.situation.boards;
         element
             .read

@@ -22,7 +22,7 @@ mod tests;
 mod words;
 
 pub use answer::{FacetPlan, Open, Plan, PlannedPose, SCHEMA_VERSION, Standing};
-pub use candidates::Candidate;
+pub use candidates::PoseCandidate;
 pub use design::Designer;
 pub use request::{Criterion, Request};
 pub use situation::{Placed, Situation};

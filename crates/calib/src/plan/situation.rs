@@ -41,7 +41,7 @@ pub struct Placed {
 
 /// One element of a facet.
 #[derive(Debug, Clone)]
-pub(crate) struct Element {
+pub(crate) struct PlannedElement {
     pub(crate) beam: usize,
     pub(crate) azimuth: f64,
     pub(crate) deflection: Deflection,
@@ -52,7 +52,7 @@ pub(crate) struct Element {
 /// A facet with its elements.
 #[derive(Debug, Clone)]
 pub(crate) struct Fan {
-    pub(crate) elements: Vec<Element>,
+    pub(crate) elements: Vec<PlannedElement>,
     /// Elements that no board can help, and why.
     pub(crate) excluded: Vec<(usize, String)>,
     /// Direction error allowed, in radians.
@@ -235,7 +235,7 @@ impl Fan {
                 fan.excluded.push((beam, reason));
                 continue;
             };
-            let element = Element {
+            let element = PlannedElement {
                 beam,
                 azimuth,
                 deflection,
@@ -250,7 +250,7 @@ impl Fan {
     }
 }
 
-impl Element {
+impl PlannedElement {
     /// Whether a board holds the element's whole spot on its face, for direction errors up to `margin`.
     pub(crate) fn is_held(&self, board: &BoardInSensor, cone: f64, margin: f64) -> bool {
         /// Margin of board required around a spot, in meters.

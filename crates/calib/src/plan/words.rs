@@ -1,13 +1,13 @@
 //! Describes a pose to a person, and merges beams into runs.
 
 use super::answer::{Open, PlannedPose, Standing};
-use super::candidates::Candidate;
+use super::candidates::PoseCandidate;
 use catoptric_model::Pose;
 use catoptric_model::frame::tangent_basis;
 use nalgebra::{Unit, Vector3};
 
 /// A chosen pose and its effect.
-pub(super) fn planned(candidate: &Candidate, before: Standing, after: Standing) -> PlannedPose {
+pub(super) fn planned(candidate: &PoseCandidate, before: Standing, after: Standing) -> PlannedPose {
     let pose = &candidate.room_from_board;
     let (normal, turn_deg) = facing(pose);
     let axes = pose.rotation.to_rotation_matrix();

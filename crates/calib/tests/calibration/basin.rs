@@ -2,7 +2,7 @@
 
 use crate::synthetic::Draw;
 use catoptric_calib::observations::{BoardView, Observation};
-use catoptric_calib::solve::{BareDistance, Element};
+use catoptric_calib::solve::{BareDistance, SoleElement};
 use catoptric_calib::{Options, initial, solve};
 use catoptric_model::{BoardPlane, Deflection, RangeBias, RawRange, beam, frame, range};
 use nalgebra::{Unit, Vector3};
@@ -61,7 +61,7 @@ fn found(noise: f64, angle: f64, closed_form: bool) -> usize {
                 }
             })
             .collect();
-        let element = Element {
+        let element = SoleElement {
             azimuth: AZIMUTH,
             observations: &observations,
             distance: BareDistance {

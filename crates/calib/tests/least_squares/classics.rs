@@ -1,7 +1,7 @@
 //! Problems of Moré, Garbow, Hillstrom (1981), from their starts and from starts 10 and 100 times as far.
 
 use super::duals::{ByDuals, Formula};
-use catoptric_calib::lsq::{Options, Point, Solution, Stop, minimize};
+use catoptric_calib::lsq::{Point, Solution, SolverOptions, Termination, minimize};
 use num_dual::DualNumCopy;
 
 struct Rosenbrock;
@@ -126,7 +126,8 @@ impl Formula for BrownBadlyScaled {
 }
 
 fn solve<F: Formula>(formula: F, start: &[f64]) -> Solution {
-    minimize(&ByDuals(formula), Point::vector(start), &Options::default()).expect("the residuals are defined")
+    minimize(&ByDuals(formula), Point::vector(start), &SolverOptions::default())
+        .expect("the residuals are defined")
 }
 
 fn values(solution: &Solution) -> &[f64] {
@@ -175,7 +176,7 @@ fn a_singular_minimum_is_reached_and_reported_as_singular() {
     }
     // At the minimum itself the two squares have no slope.
     let found = solve(PowellSingular, &[0.0; 4]);
-    assert_eq!((found.stop, found.information.rank()), (Stop::Gradient, 2));
+    assert_eq!((found.stop, found.information.rank()), (Termination::Gradient, 2));
     assert_eq!(found.information.standard_deviations(), [None; 4]);
 }
 
@@ -208,13 +209,13 @@ fn a_local_minimum_has_a_perpendicular_residual() {
 
 #[test]
 fn the_limit_is_reported() {
-    let options = Options {
+    let options = SolverOptions {
         max_evaluations: 3,
-        ..Options::default()
+        ..SolverOptions::default()
     };
     let found = minimize(&ByDuals(Rosenbrock), Point::vector(&[-1.2, 1.0]), &options)
         .expect("the residuals are defined");
-    assert_eq!((found.stop, found.evaluations), (Stop::Limit, 3));
+    assert_eq!((found.stop, found.evaluations), (Termination::Limit, 3));
     assert!(!found.stop.converged() && found.gradient_cosine > 1e-3);
 }
 

@@ -1,6 +1,6 @@
 //! Problems written once for numbers and dual numbers, so that the Jacobian is exact.
 
-use catoptric_calib::lsq::{Point, Problem};
+use catoptric_calib::lsq::{Point, Residuals};
 use nalgebra::{DMatrix, DVector};
 use num_dual::{Dual64, DualNumCopy};
 
@@ -12,7 +12,7 @@ pub(crate) trait Formula: Sync {
 /// A formula of the numbers in block 0.
 pub(crate) struct ByDuals<F>(pub(crate) F);
 
-impl<F: Formula> Problem for ByDuals<F> {
+impl<F: Formula> Residuals for ByDuals<F> {
     fn residuals(&self, at: &Point) -> Option<DVector<f64>> {
         Some(DVector::from_vec(self.0.residuals(at.numbers(0)?.as_slice())))
     }

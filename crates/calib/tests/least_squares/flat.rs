@@ -1,6 +1,6 @@
 //! A grouped problem as a plain one: the result that elimination has to reproduce.
 
-use catoptric_calib::lsq::{GroupedProblem, Point, Problem, State};
+use catoptric_calib::lsq::{GroupedResiduals, Point, Residuals, State};
 use nalgebra::{DMatrix, DVector};
 
 /// A grouped problem as a plain one: all parameters in one point, one dense Jacobian.
@@ -11,7 +11,7 @@ pub(crate) struct Flat<'a, P> {
     own_blocks: Vec<usize>,
 }
 
-impl<'a, P: GroupedProblem> Flat<'a, P> {
+impl<'a, P: GroupedResiduals> Flat<'a, P> {
     /// The problem, and the state as one point: blocks of `shared`, then of each group.
     pub(crate) fn new(problem: &'a P, state: &State) -> (Self, Point) {
         let blocks = state
@@ -50,7 +50,7 @@ impl<'a, P: GroupedProblem> Flat<'a, P> {
     }
 }
 
-impl<P: GroupedProblem> Problem for Flat<'_, P> {
+impl<P: GroupedResiduals> Residuals for Flat<'_, P> {
     fn residuals(&self, at: &Point) -> Option<DVector<f64>> {
         let state = self.state(at);
         let mut all = Vec::new();

@@ -3,8 +3,8 @@
 use super::flat::Flat;
 use super::sample::Sample;
 use catoptric_calib::lsq::{
-    Block, GroupJacobian, GroupedProblem, Options, Point, Prior, Problem, Reduced, State, WithPriors,
-    linearize, minimize,
+    GroupJacobian, GroupedResiduals, ParameterBlock, Point, Prior, Reduced, Residuals, SolverOptions, State,
+    WithPriors, linearize, minimize,
 };
 use catoptric_model::Pose;
 use nalgebra::{DMatrix, DVector, Translation3, Unit, UnitQuaternion, Vector3};
@@ -51,9 +51,9 @@ impl Boards {
         let facet = Unit::new_normalize(Vector3::new(-0.6, 0.1, 0.75));
         let shared = Point {
             blocks: vec![
-                Block::Pose(mount),
-                Block::Direction(facet),
-                Block::Vector(DVector::from_vec(vec![0.004, 0.001])),
+                ParameterBlock::Pose(mount),
+                ParameterBlock::Direction(facet),
+                ParameterBlock::Vector(DVector::from_vec(vec![0.004, 0.001])),
             ],
         };
         let (noise_sd, mut own, mut boards) = (0.001, Vec::new(), Vec::new());
@@ -93,10 +93,14 @@ impl Boards {
     fn with_priors(&self) -> WithPriors<'_, Self> {
         let own = Prior::independent(
             0,
-            Block::Vector(DVector::zeros(4)),
+            ParameterBlock::Vector(DVector::zeros(4)),
             &[0.0005, 0.001, 0.001, 0.001],
         );
-        let mount = Prior::independent(0, Block::Pose(Pose::identity()), &[0.2, 0.2, 0.2, 0.1, 0.1, 0.1]);
+        let mount = Prior::independent(
+            0,
+            ParameterBlock::Pose(Pose::identity()),
+            &[0.2, 0.2, 0.2, 0.1, 0.1, 0.1],
+        );
         WithPriors {
             problem: self,
             shared: vec![mount],
@@ -105,7 +109,7 @@ impl Boards {
     }
 }
 
-impl GroupedProblem for Boards {
+impl GroupedResiduals for Boards {
     fn groups(&self) -> usize {
         self.boards.len()
     }
@@ -151,9 +155,9 @@ impl GroupedProblem for Boards {
 
 fn start(truth: &State) -> State {
     let mut shared = truth.shared.clone();
-    shared.blocks[0] = Block::Pose(Pose::identity());
+    shared.blocks[0] = ParameterBlock::Pose(Pose::identity());
     shared.blocks[1] = shared.blocks[1].retract(&[0.05, -0.04]);
-    shared.blocks[2] = Block::Vector(DVector::zeros(2));
+    shared.blocks[2] = ParameterBlock::Vector(DVector::zeros(2));
     State {
         shared,
         own: vec![Point::vector(&[0.0; 4]); truth.own.len()],
@@ -164,7 +168,7 @@ fn start(truth: &State) -> State {
 fn elimination_agrees_with_the_dense_matrix() {
     let (boards, truth) = Boards::simulated(12, 10, &mut Sample::new(8));
     let problem = boards.with_priors();
-    let options = Options::default();
+    let options = SolverOptions::default();
     let grouped = minimize(&problem, start(&truth), &options).expect("the residuals are defined");
     let (flat, at) = Flat::new(&problem, &start(&truth));
     let dense = minimize(&flat, at, &options).expect("the residuals are defined");
@@ -189,7 +193,8 @@ fn elimination_agrees_with_the_dense_matrix() {
 fn the_step_along_a_combination_is_the_most_probable_change_by_one_sd() {
     let (boards, truth) = Boards::simulated(6, 12, &mut Sample::new(11));
     let problem = boards.with_priors();
-    let found = minimize(&problem, start(&truth), &Options::default()).expect("the residuals are defined");
+    let found =
+        minimize(&problem, start(&truth), &SolverOptions::default()).expect("the residuals are defined");
     let covariance = found.information.covariance().expect("priors hold all");
     let mut sample = Sample::new(12);
     let g = DVector::from_fn(covariance.nrows(), |_, _| sample.normal());
@@ -207,7 +212,8 @@ fn a_covariance_within_a_group_is_that_among_all() {
     let shared = DMatrix::from_fn(3, truth.shared.dimension(), |_, _| sample.normal());
     let own = DMatrix::from_fn(3, 4, |_, _| sample.normal());
     let problem = boards.with_priors();
-    let found = minimize(&problem, start(&truth), &Options::default()).expect("the residuals are defined");
+    let found =
+        minimize(&problem, start(&truth), &SolverOptions::default()).expect("the residuals are defined");
     for group in 0..boards.boards.len() {
         let mut all = DMatrix::zeros(3, truth.dimension());
         all.columns_mut(0, shared.ncols()).copy_from(&shared);
@@ -220,10 +226,10 @@ fn a_covariance_within_a_group_is_that_among_all() {
         assert!((within - &among).norm() < 1e-12 * among.norm(), "group {group}");
     }
     // Without priors each drift is indistinguishable from its board's offset and the bias.
-    let options = Options {
+    let options = SolverOptions {
         max_evaluations: 1,
         rank_threshold: 1e-8,
-        ..Options::default()
+        ..SolverOptions::default()
     };
     let open = minimize(&boards, truth, &options).expect("the residuals are defined");
     assert_eq!(open.information.covariance_within(0, &shared, &own), None);
@@ -264,11 +270,11 @@ fn open_directions_of_a_group_agree_with_the_dense_matrix() {
     // Without priors a rotation of the facet is indistinguishable from one of the mounting, and each drift from its
     // board's offset and the bias.
     let (boards, truth) = Boards::simulated(6, 12, &mut Sample::new(9));
-    let options = Options {
+    let options = SolverOptions {
         max_evaluations: 1,
         // The derivatives have an error of some 1e-12.
         rank_threshold: 1e-8,
-        ..Options::default()
+        ..SolverOptions::default()
     };
     let grouped = minimize(&boards, truth.clone(), &options).expect("the residuals are defined");
     let (flat, at) = Flat::new(&boards, &truth);
@@ -284,7 +290,7 @@ fn open_directions_of_a_group_agree_with_the_dense_matrix() {
     let difference = a * a.transpose() - b * b.transpose();
     assert!(difference.norm() < 1e-5, "{}", difference.norm());
     for vector in a.column_iter() {
-        let image = Problem::jacobian(&flat, &Flat::new(&boards, &grouped.state).1)
+        let image = Residuals::jacobian(&flat, &Flat::new(&boards, &grouped.state).1)
             .expect("the residuals are defined")
             * vector;
         assert!(image.norm() < 1e-6, "{}", image.norm());
@@ -296,7 +302,8 @@ fn estimates_of_a_whole_session_have_honest_covariances() {
     // 60 boards of 160 readings: 9600 residuals, 10 shared and 240 own parameters.
     let (boards, truth) = Boards::simulated(60, 160, &mut Sample::new(10));
     let problem = boards.with_priors();
-    let found = minimize(&problem, start(&truth), &Options::default()).expect("the residuals are defined");
+    let found =
+        minimize(&problem, start(&truth), &SolverOptions::default()).expect("the residuals are defined");
     assert!(
         found.stop.converged() && found.iterations < 30,
         "{}",

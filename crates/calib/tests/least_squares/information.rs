@@ -1,7 +1,7 @@
 //! Rank, open directions and covariance, against finite differences and known null spaces.
 
 use super::duals::{ByDuals, Formula};
-use catoptric_calib::lsq::{Options, Point, ProblemError, Solution, minimize};
+use catoptric_calib::lsq::{Point, ProblemError, Solution, SolverOptions, minimize};
 use nalgebra::{DMatrix, DVector};
 use num_dual::DualNumCopy;
 
@@ -34,7 +34,8 @@ impl Formula for Gains {
 }
 
 fn solve<F: Formula>(formula: F, start: &[f64]) -> Solution {
-    minimize(&ByDuals(formula), Point::vector(start), &Options::default()).expect("the residuals are defined")
+    minimize(&ByDuals(formula), Point::vector(start), &SolverOptions::default())
+        .expect("the residuals are defined")
 }
 
 #[test]
@@ -144,19 +145,23 @@ fn unsolvable_problems_are_errors() {
         }
     }
     let start = Point::vector(&[-1.0]);
-    let found = minimize(&ByDuals(Undefined), start, &Options::default());
+    let found = minimize(&ByDuals(Undefined), start, &SolverOptions::default());
     let undefined = ProblemError::Undefined {
         group: 0,
         place: "start",
     };
     assert_eq!(found, Err(undefined));
     // A step from inside into the undefined region is only shortened.
-    let found = minimize(&ByDuals(Undefined), Point::vector(&[20.0]), &Options::default());
+    let found = minimize(
+        &ByDuals(Undefined),
+        Point::vector(&[20.0]),
+        &SolverOptions::default(),
+    );
     let found = found.expect("the start is defined");
     assert!((found.state.shared.numbers(0).expect("numbers")[0] - 1.0).abs() < 1e-12);
 
     struct Narrow;
-    impl catoptric_calib::lsq::Problem for Narrow {
+    impl catoptric_calib::lsq::Residuals for Narrow {
         fn residuals(&self, _: &Point) -> Option<DVector<f64>> {
             Some(DVector::zeros(2))
         }
@@ -164,8 +169,8 @@ fn unsolvable_problems_are_errors() {
             Some(DMatrix::zeros(2, 1))
         }
     }
-    let error =
-        minimize(&Narrow, Point::vector(&[0.0, 0.0]), &Options::default()).expect_err("a column is missing");
+    let error = minimize(&Narrow, Point::vector(&[0.0, 0.0]), &SolverOptions::default())
+        .expect_err("a column is missing");
     assert_eq!(
         error.to_string(),
         "the Jacobian of group 0 is 2 × 1 for its shared parameters; needed are 2 × 2"

@@ -1,7 +1,7 @@
 //! Properties of the retractions, and their derivatives against dual numbers.
 
 use super::sample::Sample;
-use catoptric_calib::lsq::{Block, Options, Point, Problem, Stop, minimize};
+use catoptric_calib::lsq::{ParameterBlock, Point, Residuals, SolverOptions, Termination, minimize};
 use catoptric_model::Pose;
 use nalgebra::{DMatrix, DVector, Translation3, Unit, UnitQuaternion, Vector3};
 use num_dual::{Dual64, DualNumCopy};
@@ -10,24 +10,24 @@ fn vector(sample: &mut Sample) -> Vector3<f64> {
     Vector3::new(sample.normal(), sample.normal(), sample.normal())
 }
 
-fn blocks(sample: &mut Sample) -> Vec<Block> {
+fn blocks(sample: &mut Sample) -> Vec<ParameterBlock> {
     let turn = UnitQuaternion::from_scaled_axis(vector(sample));
     vec![
-        Block::Vector(DVector::from_fn(4, |_, _| sample.normal())),
-        Block::Direction(Unit::new_normalize(vector(sample))),
-        Block::Direction(Vector3::z_axis()),
-        Block::Rotation(turn),
-        Block::Pose(Pose::from_parts(Translation3::from(vector(sample)), turn)),
+        ParameterBlock::Vector(DVector::from_fn(4, |_, _| sample.normal())),
+        ParameterBlock::Direction(Unit::new_normalize(vector(sample))),
+        ParameterBlock::Direction(Vector3::z_axis()),
+        ParameterBlock::Rotation(turn),
+        ParameterBlock::Pose(Pose::from_parts(Translation3::from(vector(sample)), turn)),
     ]
 }
 
-fn step(sample: &mut Sample, block: &Block, size: f64) -> DVector<f64> {
+fn step(sample: &mut Sample, block: &ParameterBlock, size: f64) -> DVector<f64> {
     // No rotation by half a circle or more: there the shortest step is another one.
     let step = DVector::from_fn(block.dimension(), |_, _| sample.normal());
     &step * (size / step.norm())
 }
 
-fn distance(a: &Block, b: &Block) -> f64 {
+fn distance(a: &ParameterBlock, b: &ParameterBlock) -> f64 {
     a.difference(b).norm()
 }
 
@@ -49,7 +49,7 @@ fn retraction_and_difference_undo_each_other() {
                 let again = block.retract(block.difference(&moved).as_slice());
                 assert!(distance(&moved, &again) < 1e-13);
                 let back = moved.difference(&block);
-                if !matches!(block, Block::Pose(_)) {
+                if !matches!(block, ParameterBlock::Pose(_)) {
                     assert!((back.norm() - step.norm()).abs() < 1e-13);
                 }
             }
@@ -109,9 +109,9 @@ fn dual_numbers_agree_with_the_steps_of_each_block() {
     for _ in 0..20 {
         let (p, t) = (vector(&mut sample), vector(&mut sample));
         let r = UnitQuaternion::from_scaled_axis(vector(&mut sample));
-        let pose = Block::Pose(Pose::from_parts(Translation3::from(t), r));
+        let pose = ParameterBlock::Pose(Pose::from_parts(Translation3::from(t), r));
         let carried = |step: &[f64]| match pose.retract(step) {
-            Block::Pose(pose) => pose * nalgebra::Point3::from(p),
+            ParameterBlock::Pose(pose) => pose * nalgebra::Point3::from(p),
             other => panic!("{other:?} is not a pose"),
         };
         for varied in 0..6 {
@@ -140,7 +140,7 @@ struct Seen {
     points: Vec<(Vector3<f64>, Vector3<f64>)>,
 }
 
-impl Problem for Seen {
+impl Residuals for Seen {
     fn residuals(&self, at: &Point) -> Option<DVector<f64>> {
         let pose = at.pose(0)?;
         let rows = self.points.iter().flat_map(|(p, q)| {
@@ -182,15 +182,15 @@ fn a_pose_is_found_from_any_rotation() {
             })
             .collect();
         let start = Point {
-            blocks: vec![Block::Pose(Pose::identity())],
+            blocks: vec![ParameterBlock::Pose(Pose::identity())],
         };
         let found =
-            minimize(&Seen { points }, start, &Options::default()).expect("the residuals are defined");
+            minimize(&Seen { points }, start, &SolverOptions::default()).expect("the residuals are defined");
         let error = found.state.shared.blocks[0]
-            .difference(&Block::Pose(truth))
+            .difference(&ParameterBlock::Pose(truth))
             .norm();
         assert!(
-            error < 1e-12 && found.stop != Stop::Limit,
+            error < 1e-12 && found.stop != Termination::Limit,
             "{error} {:?}",
             found.stop
         );

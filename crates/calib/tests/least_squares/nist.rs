@@ -4,7 +4,7 @@
 //! precision can reach, so its standard deviations are compared with the certified ‖f‖².
 
 use super::duals::{ByDuals, Formula};
-use catoptric_calib::lsq::{Options, Point, minimize};
+use catoptric_calib::lsq::{Point, SolverOptions, minimize};
 use num_dual::DualNumCopy;
 use std::fs;
 use std::path::Path;
@@ -163,8 +163,12 @@ fn all_from_both_starts() {
     let mut solved = 0;
     for problem in NAMES.map(Certified::read) {
         for (number, start) in problem.starts.iter().enumerate() {
-            let found = minimize(&ByDuals(&problem), Point::vector(start), &Options::default())
-                .expect("the residuals are defined");
+            let found = minimize(
+                &ByDuals(&problem),
+                Point::vector(start),
+                &SolverOptions::default(),
+            )
+            .expect("the residuals are defined");
             let values = found
                 .state
                 .shared

@@ -1,7 +1,9 @@
 //! Priors against closed forms.
 
 use super::sample::Sample;
-use catoptric_calib::lsq::{Block, Options, Point, Prior, Problem, State, WithPriors, minimize};
+use catoptric_calib::lsq::{
+    ParameterBlock, Point, Prior, Residuals, SolverOptions, State, WithPriors, minimize,
+};
 use catoptric_model::Pose;
 use nalgebra::{DMatrix, DVector, Translation3, Unit, UnitQuaternion, Vector3};
 
@@ -11,7 +13,7 @@ struct Linear {
     b: DVector<f64>,
 }
 
-impl Problem for Linear {
+impl Residuals for Linear {
     fn residuals(&self, at: &Point) -> Option<DVector<f64>> {
         Some(&self.a * at.numbers(0)? - &self.b)
     }
@@ -37,15 +39,15 @@ fn measurements_and_belief_are_weighted_by_their_inverse_covariances() {
         .cholesky()
         .expect("a covariance is positive definite")
         .solve(&(a.transpose() * &b + &inverse * &mean));
-    let prior = Prior::independent(0, Block::Vector(mean), &deviations);
+    let prior = Prior::independent(0, ParameterBlock::Vector(mean), &deviations);
     let linear = Linear { a, b };
     let problem = WithPriors {
         problem: &linear,
         shared: vec![prior],
         own: Vec::new(),
     };
-    let found =
-        minimize(&problem, Point::vector(&[0.0; 3]), &Options::default()).expect("the residuals are defined");
+    let found = minimize(&problem, Point::vector(&[0.0; 3]), &SolverOptions::default())
+        .expect("the residuals are defined");
     assert!((found.state.shared.numbers(0).expect("numbers") - expected).norm() < 1e-13);
     let covariance = found.information.covariance().expect("nothing is open");
     assert!((covariance * information - DMatrix::identity(3, 3)).norm() < 1e-13);
@@ -55,9 +57,9 @@ fn measurements_and_belief_are_weighted_by_their_inverse_covariances() {
 fn blocks_with_only_a_prior_take_its_mean_and_covariance() {
     let mut sample = Sample::new(7);
     let mut vector = || Vector3::new(sample.normal(), sample.normal(), sample.normal());
-    let direction = Block::Direction(Unit::new_normalize(vector()));
+    let direction = ParameterBlock::Direction(Unit::new_normalize(vector()));
     let turn = UnitQuaternion::from_scaled_axis(vector() * 0.7);
-    let pose = Block::Pose(Pose::from_parts(Translation3::from(vector()), turn));
+    let pose = ParameterBlock::Pose(Pose::from_parts(Translation3::from(vector()), turn));
     let linear = Linear {
         a: DMatrix::identity(1, 1),
         b: DVector::from_vec(vec![3.0]),
@@ -73,13 +75,13 @@ fn blocks_with_only_a_prior_take_its_mean_and_covariance() {
     };
     let start = Point {
         blocks: vec![
-            Block::Vector(DVector::zeros(1)),
+            ParameterBlock::Vector(DVector::zeros(1)),
             direction.retract(&[0.9, -1.4]),
             pose.retract(&[1.0, 2.0, 3.0, 0.5, -1.0, 1.0]),
         ],
     };
     let found =
-        minimize(&problem, State::from(start), &Options::default()).expect("the residuals are defined");
+        minimize(&problem, State::from(start), &SolverOptions::default()).expect("the residuals are defined");
     let blocks = &found.state.shared.blocks;
     assert!(direction.difference(&blocks[1]).norm() < 1e-12);
     assert!(pose.difference(&blocks[2]).norm() < 1e-12);
