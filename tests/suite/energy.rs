@@ -10,7 +10,7 @@ use catoptric::sim::build::color;
 use catoptric::sim::light::{Mirrors, Role, Setting, Target};
 use catoptric::sim::noise::{Draws, Purpose};
 use catoptric::sim::receive::phase;
-use catoptric::sim::receive::{Return, Sensor, Stop, SubRayEnd};
+use catoptric::sim::receive::{Return, Sensor, SubRayEnd, SubRayStop};
 use catoptric::sim::scene::{
     Detector, ErrorModel, Facet, FacetShape, Glass, Post, PostCylinder, PostShape, Principle, RectangleShape,
 };
@@ -98,8 +98,8 @@ fn random_scene(draws: &mut Draws, round: usize) -> Scene {
 /// Power that a path returns.
 fn power(end: &SubRayEnd) -> f64 {
     match end.stop {
-        Stop::Hit { power, .. } => power,
-        Stop::Escaped | Stop::Trapped => 0.0,
+        SubRayStop::Hit { power, .. } => power,
+        SubRayStop::Escaped | SubRayStop::Trapped => 0.0,
     }
 }
 
@@ -138,8 +138,8 @@ fn the_energy_of_a_beam_is_fully_accounted_for() {
             );
             compared += 1;
             split += usize::from(shares.len() > 1);
-            escaped += ends.iter().filter(|e| e.stop == Stop::Escaped).count();
-            trapped += ends.iter().filter(|e| e.stop == Stop::Trapped).count();
+            escaped += ends.iter().filter(|e| e.stop == SubRayStop::Escaped).count();
+            trapped += ends.iter().filter(|e| e.stop == SubRayStop::Trapped).count();
         }
     }
     // The random scenes contain the intended cases.

@@ -9,7 +9,7 @@ use catoptric::cast::{Polygon, Shape};
 use catoptric::model::{MirrorPlane, beam};
 use catoptric::sim::build::Structure;
 use catoptric::sim::build::color;
-use catoptric::sim::light::{End, Mirrors, Path, Role, Setting, Target};
+use catoptric::sim::light::{End, Mirrors, RayPath, Role, Setting, Target};
 use catoptric::sim::noise::{Draws, Purpose};
 use catoptric::sim::scene::{ErrorModel, Facet, FacetShape, PolygonShape};
 use catoptric::sim::{Laboratory, Scene};
@@ -128,7 +128,7 @@ fn traced(
     facets: &[Vec<Point3<f64>>],
     board: &[Point3<f64>],
     direction: Unit<Vector3<f64>>,
-) -> (Path, Vec<usize>) {
+) -> (RayPath, Vec<usize>) {
     let mut scene = scene(BARE);
     scene.superstructure.facet = facets
         .iter()

@@ -329,7 +329,7 @@ position_m = [0, 0.05, 1.76]
     let left = ust20lx::nearest(std::f64::consts::FRAC_PI_2).unwrap();
     let ends = sight.sub_ray_ends(0, left);
     let hits_intruder = ends.iter().any(|end| match end.stop {
-        catoptric::sim::receive::Stop::Hit { surface, .. } => names[surface] == "intruder",
+        catoptric::sim::receive::SubRayStop::Hit { surface, .. } => names[surface] == "intruder",
         _ => false,
     });
     assert!(hits_intruder, "{ends:?}");

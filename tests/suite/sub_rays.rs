@@ -7,7 +7,7 @@ use crate::common::{VALID, folder_with, run, stderr};
 use crate::scenes::{BARE, scene};
 use catoptric::sim::build::Structure;
 use catoptric::sim::light::{Mirrors, Setting};
-use catoptric::sim::receive::{Sensor, Stop, SubRayLight};
+use catoptric::sim::receive::{Sensor, SubRayLight, SubRayStop};
 use catoptric::sim::scene::{Facet, FacetShape, RectangleShape};
 use catoptric_fixtures::ust20lx;
 use std::collections::BTreeMap;
@@ -215,7 +215,7 @@ fn light_that_hits_nothing_has_no_position() {
     let ahead = sensor.sub_ray_ends(&setting, ust20lx::FORWARD);
     assert_eq!(ahead.len(), 19);
     for end in &ahead {
-        assert_eq!((&end.stop, end.light), (&Stop::Trapped, SubRayLight::Beam));
+        assert_eq!((&end.stop, end.light), (&SubRayStop::Trapped, SubRayLight::Beam));
         assert_eq!(end.facets, [0]);
         assert!((end.path - 0.08).abs() < 1e-3 && end.path > 0.0);
     }
@@ -225,7 +225,7 @@ fn light_that_hits_nothing_has_no_position() {
     assert!(
         behind
             .iter()
-            .all(|e| e.stop == Stop::Escaped && e.facets.is_empty() && e.path == 0.0)
+            .all(|e| e.stop == SubRayStop::Escaped && e.facets.is_empty() && e.path == 0.0)
     );
     let weights: f64 = behind.iter().map(|e| e.sub_ray.weight).sum();
     assert!((weights - 1.0).abs() < 1e-12);

@@ -10,7 +10,7 @@ use catoptric::files::scene;
 use catoptric::model::beam;
 use catoptric::sim::light::Role;
 use catoptric::sim::light::footprint::{SubRay, sub_rays};
-use catoptric::sim::receive::{Return, Stop};
+use catoptric::sim::receive::{Return, SubRayStop};
 use catoptric::sim::scene::{BeamShape, Limits, Preset};
 use catoptric::sim::trace::{Fate, Scenery, Vertex};
 use catoptric::sim::truth::BeamClass;
@@ -212,7 +212,7 @@ fn tied_distances() {
         "the trap is set: {} distances",
         distances.len()
     );
-    assert!(ends.iter().all(|e| matches!(e.stop, Stop::Hit { .. })));
+    assert!(ends.iter().all(|e| matches!(e.stop, SubRayStop::Hit { .. })));
     // Eq. (1) with τ_o = 0.9, D_R = 20 mm, ρ_t = 0.9, P_t = 10 W, θ_R = π; face on, the cosine is 5 m over the path
     // length.
     let term =

@@ -15,13 +15,13 @@ pub enum Segment {
 
 /// The path of a value, written `superstructure.facet[2].name`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
-pub struct Path(pub Vec<Segment>);
+pub struct KeyPath(pub Vec<Segment>);
 
 /// A problem with a value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
     /// The value's path.
-    pub path: Path,
+    pub path: KeyPath,
     /// What was found and what is allowed.
     pub message: String,
     /// What to do about it.
@@ -47,7 +47,7 @@ pub fn nearest<'a>(found: &str, names: impl IntoIterator<Item = &'a str>) -> Opt
         .map(|(_, name)| name)
 }
 
-impl Path {
+impl KeyPath {
     /// The path of a key of the outermost table.
     pub fn of(key: &str) -> Self {
         Self::default().key(key)
@@ -72,7 +72,7 @@ impl Path {
     }
 }
 
-impl fmt::Display for Path {
+impl fmt::Display for KeyPath {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (i, segment) in self.0.iter().enumerate() {
             match segment {

@@ -1,6 +1,6 @@
 //! The problems that the checks find, and how they are worded.
 
-use catoptric_model::place::{Path, Problem, nearest};
+use catoptric_model::place::{KeyPath, Problem, nearest};
 use std::fmt;
 
 /// The problems found so far.
@@ -8,7 +8,12 @@ pub(crate) struct Findings(pub(crate) Vec<Problem>);
 
 impl Findings {
     /// Records a problem; the message continues from the name of the key.
-    pub(crate) fn add(&mut self, path: &Path, message: impl fmt::Display, help: impl Into<Option<String>>) {
+    pub(crate) fn add(
+        &mut self,
+        path: &KeyPath,
+        message: impl fmt::Display,
+        help: impl Into<Option<String>>,
+    ) {
         self.0.push(Problem {
             path: path.clone(),
             message: format!("`{path}` {message}"),

@@ -11,7 +11,7 @@
 use catoptric_cast::Ray;
 use catoptric_sim::Scene;
 use catoptric_sim::build::color;
-use catoptric_sim::light::{End, Path, Setting, Trail};
+use catoptric_sim::light::{End, RayPath, Setting, Trail};
 use catoptric_sim::receive::{Sensor, class};
 use catoptric_sim::truth::BeamClass;
 use nalgebra::{Unit, Vector3};
@@ -80,7 +80,7 @@ impl Class {
 /// The paths of one beam.
 pub(crate) struct Traced {
     pub(crate) beam: usize,
-    pub(crate) chief: Path,
+    pub(crate) chief: RayPath,
     pub(crate) status: BeamClass,
     pub(crate) chief_energy: f64,
     /// What two passes leave of the light on the chief ray's path.
@@ -107,12 +107,12 @@ impl Traced {
 }
 
 /// Returns the exit direction of a path; `None` if it does not leave.
-pub(crate) fn exit(path: &Path) -> Option<Unit<Vector3<f64>>> {
+pub(crate) fn exit(path: &RayPath) -> Option<Unit<Vector3<f64>>> {
     matches!(path.end, End::Escaped).then_some(path.last.direction)
 }
 
 /// Returns the length of a path to its last mirror, in meters.
-pub(super) fn mirror_at(path: &Path) -> f64 {
+pub(super) fn mirror_at(path: &RayPath) -> f64 {
     match path.end {
         End::Escaped | End::Trapped => path.length,
         End::Hit(hit) => path.length - hit.distance,

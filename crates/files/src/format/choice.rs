@@ -2,12 +2,12 @@
 
 use super::super::tree::{Node, Value};
 use super::Walk;
-use catoptric_model::place::{Path, nearest};
+use catoptric_model::place::{KeyPath, nearest};
 use serde_json::Value as Json;
 
 impl<'a> Walk<'a> {
     /// A choice: one of several words, or a table with one of several keys.
-    pub(super) fn variant(&mut self, node: &Node, variants: &'a [Json], path: &Path) {
+    pub(super) fn variant(&mut self, node: &Node, variants: &'a [Json], path: &KeyPath) {
         let words: Vec<&str> = variants
             .iter()
             .filter_map(|v| v.get("const").and_then(Json::as_str))
@@ -50,7 +50,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    pub(super) fn word(&mut self, node: &Node, words: &[&str], path: &Path) {
+    pub(super) fn word(&mut self, node: &Node, words: &[&str], path: &KeyPath) {
         match &node.value {
             Value::String(word) if words.contains(&word.as_str()) => {}
             Value::String(word) => {

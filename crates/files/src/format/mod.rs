@@ -6,14 +6,14 @@ mod table;
 mod units;
 
 use super::tree::{Node, Source, Value};
-use catoptric_model::place::{Path, Segment};
+use catoptric_model::place::{KeyPath, Segment};
 use serde_json::Value as Json;
 
 /// A violation of the schema.
 #[derive(Debug)]
 pub(super) struct Finding {
     pub(super) source: Source,
-    pub(super) path: Path,
+    pub(super) path: KeyPath,
     pub(super) message: String,
     pub(super) help: Option<String>,
     /// Whether something is missing, as much is after a syntax error.
@@ -26,7 +26,7 @@ pub(super) fn check(root: &Node, schema: &Json) -> Vec<Finding> {
         schema,
         found: Vec::new(),
     };
-    walk.value(root, schema, &Path::default());
+    walk.value(root, schema, &KeyPath::default());
     walk.found
 }
 
@@ -36,7 +36,7 @@ struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    fn add(&mut self, source: &Source, path: &Path, message: String, help: Option<String>) {
+    fn add(&mut self, source: &Source, path: &KeyPath, message: String, help: Option<String>) {
         self.found.push(Finding {
             source: source.clone(),
             path: path.clone(),
@@ -51,7 +51,7 @@ impl<'a> Walk<'a> {
         self.schema.pointer(pointer)
     }
 
-    fn value(&mut self, node: &Node, schema: &'a Json, path: &Path) {
+    fn value(&mut self, node: &Node, schema: &'a Json, path: &KeyPath) {
         if let Some(target) = self.resolve(schema) {
             self.value(node, target, path);
         }
@@ -82,7 +82,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn typed(&mut self, node: &Node, kind: &str, schema: &'a Json, path: &Path) {
+    fn typed(&mut self, node: &Node, kind: &str, schema: &'a Json, path: &KeyPath) {
         match (kind, &node.value) {
             // The word itself is examined together with the list of words.
             ("string", Value::String(_)) | ("boolean", Value::Boolean(_)) => {}
@@ -96,7 +96,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    fn wrong_type(&mut self, node: &Node, kind: &str, schema: &Json, path: &Path) {
+    fn wrong_type(&mut self, node: &Node, kind: &str, schema: &Json, path: &KeyPath) {
         let needed = match kind {
             "string" => "a string",
             "boolean" => "true or false",

@@ -3,11 +3,11 @@
 use super::super::tree::Node;
 use super::Walk;
 use super::units::{split_unit, unit_sign};
-use catoptric_model::place::{Path, Segment};
+use catoptric_model::place::{KeyPath, Segment};
 use serde_json::Value as Json;
 
 impl Walk<'_> {
-    pub(super) fn integer(&mut self, node: &Node, value: i128, schema: &Json, path: &Path) {
+    pub(super) fn integer(&mut self, node: &Node, value: i128, schema: &Json, path: &KeyPath) {
         let (least, greatest) = match schema.get("format").and_then(Json::as_str) {
             Some("uint32") => (0, u32::MAX.into()),
             Some("uint64" | "uint") => (0, u64::MAX.into()),
@@ -24,7 +24,7 @@ impl Walk<'_> {
         }
     }
 
-    pub(super) fn number(&mut self, node: &Node, schema: &Json, path: &Path) {
+    pub(super) fn number(&mut self, node: &Node, schema: &Json, path: &KeyPath) {
         let Some(value) = node.value.number() else { return };
         if !value.is_finite() {
             return self.not_finite(node, path);
@@ -58,13 +58,13 @@ impl Walk<'_> {
         self.add(&node.source, path, message, help);
     }
 
-    pub(super) fn not_finite(&mut self, node: &Node, path: &Path) {
+    pub(super) fn not_finite(&mut self, node: &Node, path: &KeyPath) {
         let message = format!("`{path}` is {}; a finite number is needed", node.value.describe());
         self.add(&node.source, path, message, None);
     }
 }
 
-fn last_key(path: &Path) -> &str {
+fn last_key(path: &KeyPath) -> &str {
     let keys = path.0.iter().rev();
     keys.filter_map(|s| match s {
         Segment::Key(key) => Some(key.as_str()),

@@ -3,11 +3,11 @@
 use super::super::tree::{Node, Value};
 use super::units::{other_unit, split_unit};
 use super::{Finding, Walk};
-use catoptric_model::place::{Path, nearest};
+use catoptric_model::place::{KeyPath, nearest};
 use serde_json::Value as Json;
 
 impl<'a> Walk<'a> {
-    pub(super) fn list(&mut self, node: &Node, items: &[Node], schema: &'a Json, path: &Path) {
+    pub(super) fn list(&mut self, node: &Node, items: &[Node], schema: &'a Json, path: &KeyPath) {
         let limit = |name: &str| schema.get(name).and_then(Json::as_u64);
         let (least, most) = (limit("minItems"), limit("maxItems"));
         let count = items.len() as u64;
@@ -28,7 +28,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    pub(super) fn table(&mut self, node: &Node, schema: &'a Json, path: &Path) {
+    pub(super) fn table(&mut self, node: &Node, schema: &'a Json, path: &KeyPath) {
         let Value::Table(entries) = &node.value else {
             return;
         };
@@ -131,12 +131,12 @@ impl<'a> Walk<'a> {
 }
 
 /// The table that contains a key.
-fn node_path(path: &Path) -> Option<Path> {
+fn node_path(path: &KeyPath) -> Option<KeyPath> {
     let (_, before) = path.0.split_last()?;
-    Some(Path(before.to_vec()))
+    Some(KeyPath(before.to_vec()))
 }
 
-fn table_name(path: Option<&Path>) -> String {
+fn table_name(path: Option<&KeyPath>) -> String {
     match path.filter(|p| !p.0.is_empty()) {
         Some(path) => format!("`{path}`"),
         None => "the outermost table".to_owned(),

@@ -4,7 +4,7 @@ mod json;
 mod set;
 mod toml;
 
-use catoptric_model::place::{Path, Segment};
+use catoptric_model::place::{KeyPath, Segment};
 use std::ops::Range;
 
 pub(super) use self::json::from_json;
@@ -86,7 +86,7 @@ impl Node {
     }
 
     /// The value at a path, or the last value along that path that was written down.
-    pub(crate) fn nearest(&self, path: &Path) -> &Node {
+    pub(crate) fn nearest(&self, path: &KeyPath) -> &Node {
         let mut at = self;
         for segment in &path.0 {
             match at.child(segment) {

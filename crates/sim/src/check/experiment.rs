@@ -6,7 +6,7 @@ use crate::findings::{Findings, suggestion};
 use crate::scene::facet::outline::{reach, rounded};
 use crate::scene::{Board, BoardPose, Scene, SensorTest};
 use catoptric_model::frame::yaw_pitch_roll;
-use catoptric_model::place::Path;
+use catoptric_model::place::KeyPath;
 use catoptric_model::{BoardPlane, Pose, Rectangle, ScanGeometry, beam};
 use nalgebra::{Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
@@ -34,7 +34,7 @@ pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     for (i, pose) in scene.experiment.pose.iter().enumerate() {
         bench.check_pose(
             pose,
-            &Path::of("experiment").key("pose").index(i),
+            &KeyPath::of("experiment").key("pose").index(i),
             rig_has_its_place,
             found,
         );
@@ -42,7 +42,7 @@ pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     for (i, test) in scene.experiment.test.iter().enumerate() {
         bench.check_test(
             test,
-            &Path::of("experiment").key("test").index(i),
+            &KeyPath::of("experiment").key("test").index(i),
             rig_has_its_place,
             found,
         );
@@ -50,7 +50,7 @@ pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     let chosen = scene.experiment.pose.is_empty() && scene.experiment.direct_poses > 0;
     if chosen && !scene.board.is_empty() && bench.met.iter().all(Option::is_some) {
         found.add(
-            &Path::of("experiment").key("direct_poses"),
+            &KeyPath::of("experiment").key("direct_poses"),
             format_args!(
                 "asks for {} boards in front of undeflected beams, but there is no such beam",
                 scene.experiment.direct_poses
@@ -62,7 +62,7 @@ pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
 
 fn check_rig(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     let room = &scene.room;
-    let path = Path::of("room").key("rig_position_m");
+    let path = KeyPath::of("room").key("rig_position_m");
     let rig = Point3::from(Vector3::from(room.rig_position_m));
     if let Some((wall, beyond)) = outside(&rig, &room.size_m) {
         found.add(
@@ -92,7 +92,7 @@ fn check_rig(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
             .find_map(|c| outside(&(room_from_sensor * c), &room.size_m));
         if let Some((wall, beyond)) = beyond {
             found.add(
-                &Path::of("superstructure").key("facet").index(i),
+                &KeyPath::of("superstructure").key("facet").index(i),
                 format_args!("has a corner {} m beyond the {wall}", rounded(beyond)),
                 room_extent(&room.size_m),
             );
@@ -105,13 +105,13 @@ fn check_boards(scene: &Scene, found: &mut Findings) {
         let experiment = &scene.experiment;
         if scene.superstructure.facet.is_empty() {
             found.add(
-                &Path::of("board"),
+                &KeyPath::of("board"),
                 "is empty and so is `superstructure.facet`: there would be nothing to record",
                 "add a table [[board]], [[superstructure.facet]] or [[flight]]".to_owned(),
             );
         } else if experiment.pose.is_empty() {
             found.add(
-                &Path::of("board"),
+                &KeyPath::of("board"),
                 "is empty; the experiment needs at least 1 board to place",
                 "add a table [[board]] with name, width_mm and height_mm".to_owned(),
             );
@@ -123,7 +123,7 @@ fn check_boards(scene: &Scene, found: &mut Findings) {
             let [x, y, _] = marker.position_mm;
             if x.abs() > half[0] || y.abs() > half[1] {
                 found.add(
-                    &Path::of("board")
+                    &KeyPath::of("board")
                         .index(i)
                         .key("marker")
                         .index(m)
@@ -186,7 +186,7 @@ struct Bench<'a> {
 }
 
 impl Bench<'_> {
-    fn check_pose(&self, pose: &BoardPose, path: &Path, place: bool, found: &mut Findings) {
+    fn check_pose(&self, pose: &BoardPose, path: &KeyPath, place: bool, found: &mut Findings) {
         let scene = self.scene;
         let boards = scene.board.iter().map(|b| b.name.as_str());
         let board = scene.board.iter().find(|b| b.name == pose.board);
@@ -249,7 +249,7 @@ impl Bench<'_> {
     }
 
     /// Checks boards in front of one beam of the bare sensor.
-    fn check_test(&self, test: &SensorTest, path: &Path, place: bool, found: &mut Findings) {
+    fn check_test(&self, test: &SensorTest, path: &KeyPath, place: bool, found: &mut Findings) {
         let scene = self.scene;
         let mut boards = Vec::new();
         for (i, name) in test.board.iter().enumerate() {
@@ -309,7 +309,13 @@ impl Bench<'_> {
     }
 
     /// Checks a board in front of undeflected beams.
-    fn check_direct(&self, outline: &Rectangle, sensor_from_board: &Pose, path: &Path, found: &mut Findings) {
+    fn check_direct(
+        &self,
+        outline: &Rectangle,
+        sensor_from_board: &Pose,
+        path: &KeyPath,
+        found: &mut Findings,
+    ) {
         let center = sensor_from_board.translation.vector;
         let azimuth = libm::atan2(center.y, center.x).to_degrees();
         if self.scan.nearest(azimuth.to_radians()).is_none() {
@@ -350,7 +356,7 @@ impl Bench<'_> {
         facet: usize,
         outline: &Rectangle,
         sensor_from_board: &Pose,
-        path: &Path,
+        path: &KeyPath,
         found: &mut Findings,
     ) {
         let Some(face) = &self.obstacles.facets[facet] else {
@@ -398,7 +404,7 @@ impl Bench<'_> {
         }
     }
 
-    fn add_back(&self, path: &Path, seen_from: &str, found: &mut Findings) {
+    fn add_back(&self, path: &KeyPath, seen_from: &str, found: &mut Findings) {
         found.add(
             &path.key("normal"),
             format_args!("turns the back of the board to {seen_from}"),

@@ -8,7 +8,7 @@ use crate::findings::Findings;
 use crate::scene::facet::outline::rounded;
 use crate::scene::{Flight, Scene};
 use catoptric_model::ScanGeometry;
-use catoptric_model::place::Path;
+use catoptric_model::place::KeyPath;
 use nalgebra::{Point3, Vector3};
 
 /// The turn between two waypoints must be this much less than half a turn, in degrees; there both arcs are equally
@@ -19,7 +19,7 @@ const HALF_TURN_MARGIN_DEG: f64 = 1.0;
 const STEPS: u32 = 32;
 
 pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
-    let flights = Path::of("flight");
+    let flights = KeyPath::of("flight");
     distinct(&flights, scene.flight.iter().map(|f| f.name.as_str()), found);
     for (i, flight) in scene.flight.iter().enumerate() {
         let path = flights.index(i);
@@ -35,7 +35,7 @@ pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     }
 }
 
-fn check_times(flight: &Flight, path: &Path, found: &mut Findings) {
+fn check_times(flight: &Flight, path: &KeyPath, found: &mut Findings) {
     let waypoints = path.key("waypoint");
     if flight.waypoint.len() < 2 {
         found.add(
@@ -61,7 +61,7 @@ fn check_times(flight: &Flight, path: &Path, found: &mut Findings) {
     }
 }
 
-fn check_turns(flight: &Flight, path: &Path, found: &mut Findings) {
+fn check_turns(flight: &Flight, path: &KeyPath, found: &mut Findings) {
     for (i, pair) in flight.waypoint.windows(2).enumerate() {
         let [from, to] = [&pair[0], &pair[1]].map(|w| trajectory::pose(w).rotation);
         let turn = from.angle_to(&to).to_degrees();
@@ -78,7 +78,7 @@ fn check_turns(flight: &Flight, path: &Path, found: &mut Findings) {
     }
 }
 
-fn check_scans(scan: &ScanGeometry, flight: &Flight, path: &Path, found: &mut Findings) {
+fn check_scans(scan: &ScanGeometry, flight: &Flight, path: &KeyPath, found: &mut Findings) {
     let period = scan.scan_period_s();
     let whole = flight.whole_scans(period);
     let duration = rounded(flight.duration_s());
@@ -99,7 +99,13 @@ fn check_scans(scan: &ScanGeometry, flight: &Flight, path: &Path, found: &mut Fi
 }
 
 /// Checks that the rig, the sensor and the mirrors stay inside the walls during the whole flight.
-fn check_trajectory(scene: &Scene, scan: &ScanGeometry, flight: &Flight, path: &Path, found: &mut Findings) {
+fn check_trajectory(
+    scene: &Scene,
+    scan: &ScanGeometry,
+    flight: &Flight,
+    path: &KeyPath,
+    found: &mut Findings,
+) {
     let Some(trajectory) = Trajectory::of(flight) else {
         return;
     };

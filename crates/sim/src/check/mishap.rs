@@ -4,7 +4,7 @@
 use crate::build::board::board_markers;
 use crate::findings::{Findings, suggestion};
 use crate::scene::{Mishap, Scene};
-use catoptric_model::place::Path;
+use catoptric_model::place::KeyPath;
 
 pub(super) fn check(scene: &Scene, found: &mut Findings) {
     let mishaps = &scene.experiment.mishap;
@@ -16,7 +16,7 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
     known.sort();
     known.dedup();
     for (i, mishap) in mishaps.iter().enumerate() {
-        let path = Path::of("experiment").key("mishap").index(i);
+        let path = KeyPath::of("experiment").key("mishap").index(i);
         if mishaps[..i].iter().any(|m| m.pose == mishap.pose) {
             found.add(
                 &path.key("pose"),
@@ -46,7 +46,7 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
 }
 
 /// Checks that a mishap is exactly one of an exchange, a wrong label or a movement.
-fn check_kind(mishap: &Mishap, path: &Path, found: &mut Findings) {
+fn check_kind(mishap: &Mishap, path: &KeyPath, found: &mut Findings) {
     let kinds = [
         mishap.swapped_markers.is_some(),
         mishap.mislabelled.is_some(),

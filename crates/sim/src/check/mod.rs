@@ -16,7 +16,7 @@ pub use outline::{Outline, ServedFacet, outline};
 
 use crate::findings::Findings;
 use crate::scene::Scene;
-use catoptric_model::place::{Path, Problem};
+use catoptric_model::place::{KeyPath, Problem};
 
 /// All problems of a scene.
 pub fn problems(scene: &Scene) -> Vec<Problem> {
@@ -26,7 +26,7 @@ pub fn problems(scene: &Scene) -> Vec<Problem> {
     let scan = match scene.scanner.scan() {
         Ok(scan) => scan,
         Err(error) => {
-            let path = Path::of("scanner").key("custom").key(error.key);
+            let path = KeyPath::of("scanner").key("custom").key(error.key);
             found.add(&path, error.problem, None);
             // Nothing can be said of beams that there are not.
             return found.0;

@@ -6,11 +6,11 @@ use crate::build::stage;
 use crate::findings::Findings;
 use crate::scene::facet::outline::check_outline;
 use crate::scene::{PlaneRectangle, PlaneShape, Scene, SurfaceShape};
-use catoptric_model::place::Path;
+use catoptric_model::place::KeyPath;
 use nalgebra::{Point3, Vector3};
 
 pub(super) fn check(scene: &Scene, found: &mut Findings) {
-    let room = Path::of("room");
+    let room = KeyPath::of("room");
     let (mirrors, surfaces) = (&scene.room.mirror, &scene.room.surface);
     if scene.has_no_laboratory() {
         if mirrors.is_empty() && surfaces.is_empty() {
@@ -61,7 +61,7 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
         }
     }
     let material = &scene.superstructure.mirror;
-    let path = Path::of("superstructure").key("mirror");
+    let path = KeyPath::of("superstructure").key("mirror");
     if let Some(glass) = &material.glass {
         check_glass(
             glass.thickness_mm,
@@ -84,7 +84,7 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
 }
 
 /// Checks that the glass is no thicker than the mirror, of which it is a part.
-fn check_glass(glass_mm: f64, body_mm: f64, path: &Path, found: &mut Findings) {
+fn check_glass(glass_mm: f64, body_mm: f64, path: &KeyPath, found: &mut Findings) {
     if glass_mm > body_mm {
         found.add(
             &path.key("thickness_mm"),
@@ -94,7 +94,7 @@ fn check_glass(glass_mm: f64, body_mm: f64, path: &Path, found: &mut Findings) {
     }
 }
 
-fn check_normal(rectangle: &PlaneRectangle, shape: &Path, found: &mut Findings) {
+fn check_normal(rectangle: &PlaneRectangle, shape: &KeyPath, found: &mut Findings) {
     if stage::rectangle_corners(rectangle).is_none() {
         found.add(
             &shape.key("rectangle").key("normal"),
@@ -104,7 +104,7 @@ fn check_normal(rectangle: &PlaneRectangle, shape: &Path, found: &mut Findings) 
     }
 }
 
-fn check_corners(corners_m: &[[f64; 3]], shape: &Path, found: &mut Findings) {
+fn check_corners(corners_m: &[[f64; 3]], shape: &KeyPath, found: &mut Findings) {
     // The schema requires at least three.
     if corners_m.len() >= 3 {
         let corners: Vec<Point3<f64>> = corners_m.iter().map(|c| Vector3::from(*c).into()).collect();

@@ -5,7 +5,7 @@ use super::values::distinct;
 use crate::findings::Findings;
 use crate::scene::facet::outline::{reach, rounded, spread};
 use crate::scene::{Facet, Marker, Scanner, Scene};
-use catoptric_model::place::Path;
+use catoptric_model::place::KeyPath;
 use catoptric_model::{ScanGeometry, beam};
 use nalgebra::{Point3, Vector3};
 
@@ -14,7 +14,7 @@ use nalgebra::{Point3, Vector3};
 const MARKER_SPREAD_M: f64 = 1e-3;
 
 pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
-    let structure = Path::of("superstructure");
+    let structure = KeyPath::of("superstructure");
     if !scene.superstructure.pattern.is_empty() {
         found.add(
             &structure.key("pattern"),
@@ -67,14 +67,14 @@ pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     for (i, board) in scene.board.iter().enumerate() {
         // Without any, the laboratory places five markers itself.
         if !board.marker.is_empty() {
-            let path = Path::of("board").index(i).key("marker");
+            let path = KeyPath::of("board").index(i).key("marker");
             check_markers(&board.marker, &path, &format!("board {:?}", board.name), found);
         }
     }
 }
 
 fn check_housing(scanner: &Scanner, found: &mut Findings) {
-    let path = Path::of("scanner").key("housing_box");
+    let path = KeyPath::of("scanner").key("housing_box");
     let boxes = scanner.housing_box.as_deref().unwrap_or_default();
     if !scanner.housing && !boxes.is_empty() {
         found.add(
@@ -106,7 +106,7 @@ fn check_reach(
     if met.contains(&Some(Meets::Facet(index))) {
         return;
     }
-    let path = Path::of("superstructure").key("facet").index(index);
+    let path = KeyPath::of("superstructure").key("facet").index(index);
     let name = |facet: &Facet| format!("{:?}", facet.name);
     let reached: Vec<usize> = (0..scan.beams())
         .filter(|i| face.distance(&beam::direction(scan.azimuth(*i))).is_some())
@@ -149,7 +149,7 @@ fn check_reach(
     );
 }
 
-fn check_markers(markers: &[Marker], path: &Path, body: &str, found: &mut Findings) {
+fn check_markers(markers: &[Marker], path: &KeyPath, body: &str, found: &mut Findings) {
     distinct(path, markers.iter().map(|m| m.name.as_str()), found);
     let points: Vec<Point3<f64>> = markers
         .iter()

@@ -4,7 +4,7 @@ use crate::build::color;
 use crate::findings::{Findings, suggestion};
 use crate::scene::{Detector, EchoChoice, MocapProfile, NoiseTable, Preset, Principle, Scene};
 use catoptric_model::dataset::RIG_SUBJECT;
-use catoptric_model::place::Path;
+use catoptric_model::place::KeyPath;
 
 pub(super) fn check(scene: &Scene, found: &mut Findings) {
     names(scene, found);
@@ -13,7 +13,7 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
     tables(scene, found);
     shares(scene, found);
     detection(scene, found);
-    let experiment = Path::of("experiment");
+    let experiment = KeyPath::of("experiment");
     order(
         &scene.experiment.tilt_deg,
         &experiment.key("tilt_deg"),
@@ -24,7 +24,7 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
 }
 
 /// Checks that names are not empty and not used twice, which would be ambiguous.
-pub(super) fn distinct<'a>(list: &Path, names: impl Iterator<Item = &'a str>, found: &mut Findings) {
+pub(super) fn distinct<'a>(list: &KeyPath, names: impl Iterator<Item = &'a str>, found: &mut Findings) {
     let mut seen: Vec<&str> = Vec::new();
     for (i, name) in names.enumerate() {
         let path = list.index(i).key("name");
@@ -44,7 +44,7 @@ pub(super) fn distinct<'a>(list: &Path, names: impl Iterator<Item = &'a str>, fo
 /// Checks the limits between which a parameter is searched.
 fn parameters(scene: &Scene, found: &mut Findings) {
     for (name, parameter) in &scene.parameters {
-        let path = Path::of("parameters").key(name);
+        let path = KeyPath::of("parameters").key(name);
         match (parameter.low, parameter.high) {
             (Some(low), Some(high)) if low >= high => found.add(
                 &path,
@@ -69,12 +69,12 @@ fn parameters(scene: &Scene, found: &mut Findings) {
 fn names(scene: &Scene, found: &mut Findings) {
     if scene.name.trim().is_empty() {
         found.add(
-            &Path::of("name"),
+            &KeyPath::of("name"),
             "is empty; a name needs at least one letter",
             None,
         );
     }
-    let structure = Path::of("superstructure");
+    let structure = KeyPath::of("superstructure");
     let facets = &scene.superstructure.facet;
     let posts = &scene.superstructure.post;
     distinct(
@@ -87,7 +87,7 @@ fn names(scene: &Scene, found: &mut Findings) {
         posts.iter().map(|p| p.name.as_str()),
         found,
     );
-    let boards = Path::of("board");
+    let boards = KeyPath::of("board");
     distinct(&boards, scene.board.iter().map(|b| b.name.as_str()), found);
     for (i, board) in scene.board.iter().enumerate() {
         let path = boards.index(i).key("name");
@@ -115,20 +115,20 @@ fn colors(scene: &Scene, found: &mut Findings) {
         .into_iter()
         .chain(scene.color.keys().map(String::as_str))
         .collect();
-    let mut used = vec![(Path::of("room").key("color"), scene.room.color.as_str())];
+    let mut used = vec![(KeyPath::of("room").key("color"), scene.room.color.as_str())];
     for (i, post) in scene.superstructure.post.iter().enumerate() {
-        let path = Path::of("superstructure").key("post").index(i).key("color");
+        let path = KeyPath::of("superstructure").key("post").index(i).key("color");
         used.push((path, &post.color));
     }
     for (i, board) in scene.board.iter().enumerate() {
-        used.push((Path::of("board").index(i).key("color"), &board.color));
+        used.push((KeyPath::of("board").index(i).key("color"), &board.color));
     }
     for (i, surface) in scene.room.surface.iter().enumerate() {
-        let path = Path::of("room").key("surface").index(i).key("color");
+        let path = KeyPath::of("room").key("surface").index(i).key("color");
         used.push((path, &surface.color));
     }
     for name in scene.errors.color.keys() {
-        used.push((Path::of("errors").key("color").key(name), name));
+        used.push((KeyPath::of("errors").key("color").key(name), name));
     }
     for (path, name) in used {
         if !known.contains(&name) {
@@ -143,14 +143,14 @@ fn colors(scene: &Scene, found: &mut Findings) {
 }
 
 fn tables(scene: &Scene, found: &mut Findings) {
-    let errors = Path::of("errors");
-    let noise = |table: &NoiseTable, path: &Path, found: &mut Findings| {
+    let errors = KeyPath::of("errors");
+    let noise = |table: &NoiseTable, path: &KeyPath, found: &mut Findings| {
         columns(&table.range_m, &table.sd_mm, path, "sd_mm", found);
     };
     noise(&scene.errors.noise, &errors.key("noise"), found);
     for (name, color) in &scene.color {
         if let Some(table) = &color.noise {
-            noise(table, &Path::of("color").key(name).key("noise"), found);
+            noise(table, &KeyPath::of("color").key(name).key("noise"), found);
         }
     }
     let distance = &scene.errors.distance;
@@ -171,7 +171,7 @@ fn tables(scene: &Scene, found: &mut Findings) {
 /// Checks settings that only pulsed light or only a custom scanner has, and the order of limits.
 fn detection(scene: &Scene, found: &mut Findings) {
     let detection = &scene.detection;
-    let path = Path::of("detection");
+    let path = KeyPath::of("detection");
     if detection.principle == Principle::Phase {
         let pulsed = [
             ("detector", detection.detector != Detector::default()),
@@ -228,10 +228,10 @@ fn detection(scene: &Scene, found: &mut Findings) {
                 "omit `mocap.marker`, or set the profile to \"custom\"",
             )
         };
-        found.add(&Path::of("mocap").key("profile"), what, remedy.to_owned());
+        found.add(&KeyPath::of("mocap").key("profile"), what, remedy.to_owned());
     }
     let custom = scene.scanner.preset == Preset::Custom;
-    let path = Path::of("scanner");
+    let path = KeyPath::of("scanner");
     if custom && scene.scanner.beam.is_none() {
         found.add(
             &path.key("preset"),
@@ -261,7 +261,7 @@ fn detection(scene: &Scene, found: &mut Findings) {
     }
 }
 
-fn columns(range_m: &[f64], values: &[f64], path: &Path, column: &str, found: &mut Findings) {
+fn columns(range_m: &[f64], values: &[f64], path: &KeyPath, column: &str, found: &mut Findings) {
     increasing(("range_m", " m", range_m), values, path, column, found);
     let path = path.key("range_m");
     if let Some(first) = range_m.first().filter(|r| **r < 0.0) {
@@ -278,7 +278,7 @@ fn columns(range_m: &[f64], values: &[f64], path: &Path, column: &str, found: &m
 fn increasing(
     (name, unit, nodes): (&str, &str, &[f64]),
     values: &[f64],
-    path: &Path,
+    path: &KeyPath,
     column: &str,
     found: &mut Findings,
 ) {
@@ -311,12 +311,12 @@ fn increasing(
 
 /// Checks shares that must not be zero, which would leave nothing to detect.
 fn shares(scene: &Scene, found: &mut Findings) {
-    let light = Path::of("light");
+    let light = KeyPath::of("light");
     for (path, value) in [
         (light.key("optics_transmission"), scene.light.optics_transmission),
         (light.key("air_transmission"), scene.light.air_transmission),
         (
-            Path::of("detection").key("threshold_reflectivity"),
+            KeyPath::of("detection").key("threshold_reflectivity"),
             scene.detection.threshold_reflectivity,
         ),
     ] {
@@ -330,7 +330,7 @@ fn shares(scene: &Scene, found: &mut Findings) {
     }
 }
 
-fn order(limits: &[f64; 2], path: &Path, unit: &str, found: &mut Findings) {
+fn order(limits: &[f64; 2], path: &KeyPath, unit: &str, found: &mut Findings) {
     let [low, high] = limits;
     if low > high {
         found.add(

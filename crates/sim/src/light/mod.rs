@@ -6,5 +6,5 @@ pub(crate) mod optics;
 pub mod power;
 
 pub use optics::{
-    Bounce, Course, Edit, End, MAX_BOUNCES, Meeting, Mirrors, Path, Rig, Role, Setting, Target, Trail,
+    Bounce, Course, Edit, End, MAX_BOUNCES, Meeting, Mirrors, RayPath, Rig, Role, Setting, Target, Trail,
 };

@@ -7,5 +7,6 @@ pub(crate) mod reading;
 mod spot;
 
 pub use reading::{
-    BeamClass, MAX_ECHOES, Parts, RandomEffects, Return, Sensor, Share, Stop, SubRayEnd, SubRayLight, class,
+    BeamClass, MAX_ECHOES, Parts, RandomEffects, Return, Sensor, Share, SubRayEnd, SubRayLight, SubRayStop,
+    class,
 };

@@ -5,7 +5,7 @@ use crate::Error;
 use catoptric_sim::Laboratory;
 use catoptric_sim::laboratory::Sight;
 use catoptric_sim::light::Setting;
-use catoptric_sim::receive::{Stop, SubRayEnd, SubRayLight};
+use catoptric_sim::receive::{SubRayEnd, SubRayLight, SubRayStop};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -76,7 +76,7 @@ fn row(setting: &Setting<'_>, names: &[&str], mirrors: &[&str], end: &SubRayEnd)
     let (sub_ray, number, path) = (&end.sub_ray, end.number, end.path);
     let (wide, narrow, weight) = (sub_ray.wide, sub_ray.narrow, sub_ray.weight);
     let stop = match &end.stop {
-        Stop::Hit {
+        SubRayStop::Hit {
             surface,
             point,
             cos_incidence,
@@ -86,8 +86,8 @@ fn row(setting: &Setting<'_>, names: &[&str], mirrors: &[&str], end: &SubRayEnd)
             let [x, y, z] = point.coords.into();
             format!("hit,{role},{name},{path},{cos_incidence},{power},{x},{y},{z}")
         }
-        Stop::Escaped => format!("escaped,,,{path},,0,,,"),
-        Stop::Trapped => format!("trapped,,,{path},,0,,,"),
+        SubRayStop::Escaped => format!("escaped,,,{path},,0,,,"),
+        SubRayStop::Trapped => format!("trapped,,,{path},,0,,,"),
     };
     format!("{number},{wide},{narrow},{weight},{light},{facets},{stop}\n")
 }

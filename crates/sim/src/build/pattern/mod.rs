@@ -2,7 +2,7 @@
 
 use crate::scene::{Exchange, Facet, Pattern, Scene};
 use catoptric_model::ScanGeometry;
-use catoptric_model::place::{Path, Problem, Segment, nearest};
+use catoptric_model::place::{KeyPath, Problem, Segment, nearest};
 
 /// A scene with its patterns expanded, and the origin of its facets.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,7 +17,7 @@ pub struct Expanded {
 
 impl Expanded {
     /// The pattern that made the facet to which a path leads, and the name of the copy.
-    pub fn origin(&self, path: &Path) -> Option<(Path, &str)> {
+    pub fn origin(&self, path: &KeyPath) -> Option<(KeyPath, &str)> {
         let [Segment::Key(a), Segment::Key(b), Segment::Index(i), ..] = path.0.as_slice() else {
             return None;
         };
@@ -61,15 +61,15 @@ pub fn expand(scene: &Scene) -> Result<Expanded, Vec<Problem>> {
     }
 }
 
-fn pattern_path(number: usize) -> Path {
-    Path::of("superstructure").key("pattern").index(number)
+fn pattern_path(number: usize) -> KeyPath {
+    KeyPath::of("superstructure").key("pattern").index(number)
 }
 
 fn copies(
     facets: &[Facet],
     pattern: &Pattern,
     scan: &ScanGeometry,
-    path: &Path,
+    path: &KeyPath,
 ) -> Result<Vec<Facet>, Problem> {
     match pattern {
         Pattern::Ring(ring) => {
@@ -111,7 +111,7 @@ fn copies(
     }
 }
 
-fn find<'a>(facets: &'a [Facet], name: &str, path: &Path) -> Result<&'a Facet, Problem> {
+fn find<'a>(facets: &'a [Facet], name: &str, path: &KeyPath) -> Result<&'a Facet, Problem> {
     facets.iter().find(|f| f.name == name).ok_or_else(|| {
         let help = match nearest(name, facets.iter().map(|f| f.name.as_str())) {
             Some(near) => format!("did you mean {near:?}?"),

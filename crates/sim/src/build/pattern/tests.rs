@@ -61,7 +61,7 @@ fn patterns_make_facets_in_order_and_may_build_on_one_another() {
     assert_eq!(wedge(2), ([102.0, 117.0], 100.0, 50.0));
     assert_eq!(wedge(3), ([-97.0, -82.0], -80.0, -50.0));
     assert_eq!(wedge(4), ([-117.0, -102.0], -100.0, 50.0));
-    let of_last = Path::of("superstructure").key("facet").index(4).key("shape");
+    let of_last = KeyPath::of("superstructure").key("facet").index(4).key("shape");
     let (pattern, name) = expanded.origin(&of_last).expect("a pattern made it");
     assert_eq!(
         (pattern.to_string().as_str(), name),

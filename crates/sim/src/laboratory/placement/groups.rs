@@ -1,6 +1,6 @@
 //! Groups of beams that one board serves.
 
-use crate::light::optics::{End, Path};
+use crate::light::optics::{End, RayPath};
 use crate::scene::Board;
 use catoptric_cast::Ray;
 use catoptric_model::{Pose, Rectangle, ScanGeometry};
@@ -23,7 +23,7 @@ pub(super) struct Group {
 const MIN_SECTOR: f64 = 20.0 * std::f64::consts::PI / 180.0;
 
 /// The facet by which a chief ray leaves, if it leaves by exactly one.
-fn leaves_by(path: &Path) -> Option<usize> {
+fn leaves_by(path: &RayPath) -> Option<usize> {
     match (path.end, path.facets()) {
         (End::Escaped, &[facet]) => Some(facet),
         _ => None,
@@ -31,7 +31,7 @@ fn leaves_by(path: &Path) -> Option<usize> {
 }
 
 /// First and last beam of every facet in the drawing.
-pub fn served_beams(paths: &[Path], facets: usize, scan: &ScanGeometry) -> Vec<Option<[usize; 2]>> {
+pub fn served_beams(paths: &[RayPath], facets: usize, scan: &ScanGeometry) -> Vec<Option<[usize; 2]>> {
     (0..facets)
         .map(|facet| {
             let served = (0..paths.len()).filter(|&b| leaves_by(&paths[b]) == Some(facet));
@@ -42,7 +42,7 @@ pub fn served_beams(paths: &[Path], facets: usize, scan: &ScanGeometry) -> Vec<O
 
 /// Each facet's beams, cut into equal groups no wider than the span.
 pub(super) fn facet_groups(
-    paths: &[Path],
+    paths: &[RayPath],
     scan: &ScanGeometry,
     facets: usize,
     span_deg: f64,
@@ -72,7 +72,7 @@ fn cut(scan: &ScanGeometry, run: [usize; 2], span_deg: f64) -> Vec<[usize; 2]> {
 
 /// Runs of undeflected beams around the board centers, spread over the free sectors.
 pub(super) fn direct_groups(
-    paths: &[Path],
+    paths: &[RayPath],
     scan: &ScanGeometry,
     count: usize,
     span_deg: f64,
@@ -111,7 +111,7 @@ pub(super) fn direct_groups(
 }
 
 /// The beams of every undeflected sector that is wide enough for a board, in the order of the scan.
-fn free_sectors(paths: &[Path], scan: &ScanGeometry) -> Vec<Vec<usize>> {
+fn free_sectors(paths: &[RayPath], scan: &ScanGeometry) -> Vec<Vec<usize>> {
     let free = |b: usize| matches!(paths[b].end, End::Escaped) && paths[b].facets().is_empty();
     let mut sectors: Vec<Vec<usize>> = Vec::new();
     for b in (0..paths.len()).filter(|&b| free(b)) {
@@ -141,10 +141,10 @@ impl Group {
         facet: Option<usize>,
         scan: &ScanGeometry,
         [first, last]: [usize; 2],
-        paths: &[Path],
+        paths: &[RayPath],
         room_from_sensor: &Pose,
     ) -> Self {
-        let leaves = |path: &Path| match facet {
+        let leaves = |path: &RayPath| match facet {
             Some(_) => leaves_by(path) == facet,
             None => path.facets().is_empty() && matches!(path.end, End::Escaped),
         };

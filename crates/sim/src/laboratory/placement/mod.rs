@@ -16,7 +16,7 @@ use crate::build::board::attitude;
 use crate::build::room::room_from_rig;
 use crate::build::structure::{self, Structure};
 use crate::error::SimError;
-use crate::light::optics::{Mirrors, Path, Setting};
+use crate::light::optics::{Mirrors, RayPath, Setting};
 use crate::noise::{Draws, Purpose};
 use crate::receive::reading::Sensor;
 use crate::scene::{BoardPose, Design, Scene};
@@ -54,7 +54,7 @@ fn procedure(scene: &Scene, sensor: &Sensor, seed: u64) -> Result<Vec<Planned>, 
     let structure = Structure::nominal(scene)?;
     let setting = Setting::new(scene, &structure, Mirrors::Attached, Vec::new())?;
     let room_from_sensor = room_from_rig(&scene.room) * structure::nominal_mount(scene);
-    let paths: Vec<Path> = (0..sensor.scan().beams())
+    let paths: Vec<RayPath> = (0..sensor.scan().beams())
         .map(|b| sensor.chief_path(&setting, b))
         .collect();
     let experiment = &scene.experiment;
@@ -161,7 +161,7 @@ fn no_place(scene: &Scene, board: usize, group: &Group, reason: String) -> SimEr
 fn given(
     scene: &Scene,
     scan: &ScanGeometry,
-    paths: &[Path],
+    paths: &[RayPath],
     pose: &BoardPose,
     index: usize,
 ) -> Result<Planned, SimError> {

@@ -4,7 +4,7 @@
 //! its legs. So moving a facet affects the paths that hit it where it was, and those that pass through the box around
 //! where it is now.
 
-use super::path::{End, Path};
+use super::path::{End, RayPath};
 use super::setting::Setting;
 use catoptric_cast::Ray;
 use nalgebra::{Point3, Vector3};
@@ -34,7 +34,7 @@ const SLACK: f64 = 1e-6;
 
 impl Setting<'_> {
     /// The paths of the rays of a beam, as from [`Setting::trace_beam`], and their trail.
-    pub fn trace_with_trail(&self, rays: &[Ray]) -> (Vec<Path>, Trail) {
+    pub fn trace_with_trail(&self, rays: &[Ray]) -> (Vec<RayPath>, Trail) {
         let mut trail = Trail::default();
         let mut last = rays.to_vec();
         let paths = self.trace_and_visit(rays, |ray, bounce| {

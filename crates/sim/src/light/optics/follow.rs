@@ -1,6 +1,6 @@
 //! Follows a ray from mirror to mirror, and the ghosts that glass makes of it.
 
-use super::path::{Bounce, Course, End, Meeting, Path};
+use super::path::{Bounce, Course, End, Meeting, RayPath};
 use super::setting::{Leg, Setting};
 use crate::light::glass;
 use catoptric_cast::Ray;
@@ -11,7 +11,7 @@ impl Setting<'_> {
     /// Follows a ray from mirror to mirror, always to the nearest surface.
     ///
     /// A mirror reflects with its face; its back is opaque, unless the mirror has two sides.
-    pub fn trace(&self, ray: &Ray) -> Path {
+    pub fn trace(&self, ray: &Ray) -> RayPath {
         self.path(ray, None)
     }
 
@@ -20,14 +20,14 @@ impl Setting<'_> {
     ///
     /// Light that is reflected by two fronts or repeatedly within a glass is omitted, and so is light that goes out
     /// along one path and returns along another: the energy of all paths together is less than what was emitted.
-    pub fn ghosts(&self, ray: &Ray, path: &Path) -> impl Iterator<Item = Path> {
+    pub fn ghosts(&self, ray: &Ray, path: &RayPath) -> impl Iterator<Item = RayPath> {
         let fronts = path.facets().iter().enumerate();
         let fronts = fronts.filter(|(_, f)| self.contents.facets[**f].glass.is_some_and(|g| g.ghost));
         fronts.map(|(bounce, _)| self.path(ray, Some(bounce)))
     }
 
-    fn path(&self, ray: &Ray, ghost: Option<usize>) -> Path {
-        let mut path = Path::begin(ray);
+    fn path(&self, ray: &Ray, ghost: Option<usize>) -> RayPath {
+        let mut path = RayPath::begin(ray);
         let course = self.follow(ray, self.contents.max_bounces, ghost, |bounce| path.add(bounce));
         path.end(&course);
         path

@@ -9,7 +9,7 @@ mod setting;
 mod together;
 
 pub use edit::{Edit, Trail};
-pub use path::{Bounce, Course, End, MAX_BOUNCES, Meeting, Path};
+pub use path::{Bounce, Course, End, MAX_BOUNCES, Meeting, RayPath};
 pub use rig::Rig;
 pub(crate) use rig::{BeamPaths, Run, Then};
 pub(crate) use setting::Beyond;

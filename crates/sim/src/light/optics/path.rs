@@ -74,7 +74,7 @@ pub struct Course {
 
 /// The path of a ray.
 #[derive(Debug, Clone, Copy)]
-pub struct Path {
+pub struct RayPath {
     count: usize,
     facets: [usize; MAX_BOUNCES],
     points: [Point3<f64>; MAX_BOUNCES],
@@ -91,7 +91,7 @@ pub struct Path {
     pub end: End,
 }
 
-impl Path {
+impl RayPath {
     /// The facets hit, in order.
     pub fn facets(&self) -> &[usize] {
         &self.facets[..self.count]

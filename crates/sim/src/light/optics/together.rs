@@ -1,19 +1,23 @@
 //! Follows the rays of a beam together, leg by leg: rays that have left the same mirror are a beam again.
 
-use super::path::{Bounce, Course, Path};
+use super::path::{Bounce, Course, RayPath};
 use super::setting::Setting;
 use catoptric_cast::Ray;
 use catoptric_cast::Rays;
 
 impl Setting<'_> {
     /// The paths of some rays, as [`Setting::trace`] follows each of them; faster if they are a narrow beam.
-    pub fn trace_beam(&self, rays: &[Ray]) -> Vec<Path> {
+    pub fn trace_beam(&self, rays: &[Ray]) -> Vec<RayPath> {
         self.trace_and_visit(rays, |_, _| {})
     }
 
     /// The same, visiting every bounce with the number of its ray.
-    pub(super) fn trace_and_visit(&self, rays: &[Ray], mut visit: impl FnMut(usize, &Bounce)) -> Vec<Path> {
-        let mut paths: Vec<Path> = rays.iter().map(Path::begin).collect();
+    pub(super) fn trace_and_visit(
+        &self,
+        rays: &[Ray],
+        mut visit: impl FnMut(usize, &Bounce),
+    ) -> Vec<RayPath> {
+        let mut paths: Vec<RayPath> = rays.iter().map(RayPath::begin).collect();
         let courses = self.follow_beam(rays, self.contents.max_bounces, |ray, bounce| {
             visit(ray, bounce);
             paths[ray].add(bounce);

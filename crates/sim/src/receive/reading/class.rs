@@ -2,7 +2,7 @@
 
 use super::sensor::Sensor;
 use crate::light::footprint::SubRay;
-use crate::light::optics::{End, Path, Setting};
+use crate::light::optics::{End, RayPath, Setting};
 use serde::{Deserialize, Serialize};
 
 /// What the structure does to a beam.
@@ -36,8 +36,11 @@ impl Sensor {
 
 /// What the structure does to a beam, given the paths of its chief ray and its sub-rays, and the share of its energy
 /// that takes the path of the chief ray.
-pub fn class<'p>(chief: &Path, paths: impl IntoIterator<Item = (&'p SubRay, &'p Path)>) -> (BeamClass, f64) {
-    let of = |path: &Path| match path.end {
+pub fn class<'p>(
+    chief: &RayPath,
+    paths: impl IntoIterator<Item = (&'p SubRay, &'p RayPath)>,
+) -> (BeamClass, f64) {
+    let of = |path: &RayPath| match path.end {
         End::Hit(_) => BeamClass::Blocked,
         End::Trapped => BeamClass::Lost,
         End::Escaped => match path.facets().len() {

@@ -18,4 +18,4 @@ pub use part::Parts;
 pub use report::RandomEffects;
 pub use returned::{MAX_ECHOES, Return};
 pub use sensor::Sensor;
-pub use sub_ray::{Light as SubRayLight, Stop, SubRayEnd};
+pub use sub_ray::{Light as SubRayLight, SubRayEnd, SubRayStop};

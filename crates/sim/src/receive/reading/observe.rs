@@ -5,7 +5,7 @@ use super::returned::Return;
 use super::sensor::{Sensor, is_chief};
 use super::sub_ray::Arrival;
 use crate::light::footprint::SubRay;
-use crate::light::optics::{End, Path, Role, Setting};
+use crate::light::optics::{End, RayPath, Role, Setting};
 use crate::light::power;
 use catoptric_cast::Ray;
 
@@ -82,7 +82,7 @@ impl Sensor {
         setting: &Setting<'_>,
         sub_ray: &SubRay,
         ray: &Ray,
-        path: &Path,
+        path: &RayPath,
         parts: &mut Parts,
     ) {
         let chief = is_chief(sub_ray);
@@ -100,7 +100,7 @@ impl Sensor {
     }
 
     /// Adds the light that a sub-ray brings to a surface to the part with that surface and those facets.
-    fn add(&self, parts: &mut Parts, path: &Path, arrival: &Arrival, chief: bool) {
+    fn add(&self, parts: &mut Parts, path: &RayPath, arrival: &Arrival, chief: bool) {
         let (on, facets) = (&arrival.on, &path.facets()[..arrival.bounces]);
         let cosines = path.meetings().take(arrival.bounces).map(|m| m.cos_incidence);
         let place = (on.range, on.cos_incidence);
@@ -109,7 +109,7 @@ impl Sensor {
     }
 
     /// Assigns the chief ray's range to the part that it hits, for beams whose sub-rays do not include the chief ray.
-    pub(super) fn add_chief(parts: &mut Parts, path: &Path) {
+    pub(super) fn add_chief(parts: &mut Parts, path: &RayPath) {
         if let End::Hit(hit) = path.end
             && let Some(part) = parts.find(hit.surface, path.facets())
         {

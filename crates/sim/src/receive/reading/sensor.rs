@@ -3,7 +3,7 @@
 use crate::build::color;
 use crate::error::SimError;
 use crate::light::footprint::{self, SubRay};
-use crate::light::optics::{MAX_BOUNCES, Path, Setting};
+use crate::light::optics::{MAX_BOUNCES, RayPath, Setting};
 use crate::light::power::{self, Illumination};
 use crate::receive::detect;
 use crate::receive::echo::Receiver;
@@ -117,7 +117,7 @@ impl Sensor {
         &'a self,
         setting: &'a Setting<'_>,
         beam: usize,
-    ) -> impl Iterator<Item = (&'a SubRay, Path)> {
+    ) -> impl Iterator<Item = (&'a SubRay, RayPath)> {
         let rays: Vec<Ray> = self.rays(beam).collect();
         self.sub_rays.iter().zip(setting.trace_beam(&rays))
     }
@@ -141,7 +141,7 @@ impl Sensor {
     }
 
     /// The path of a beam's chief ray.
-    pub fn chief_path(&self, setting: &Setting<'_>, beam: usize) -> Path {
+    pub fn chief_path(&self, setting: &Setting<'_>, beam: usize) -> RayPath {
         setting.trace(&self.chief_ray(beam))
     }
 

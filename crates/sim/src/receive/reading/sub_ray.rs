@@ -4,7 +4,7 @@
 
 use super::sensor::Sensor;
 use crate::light::footprint::{self, SubRay};
-use crate::light::optics::{End, Meeting, Path, Setting};
+use crate::light::optics::{End, Meeting, RayPath, Setting};
 use crate::light::power::{self, Illumination};
 use nalgebra::Point3;
 
@@ -21,7 +21,7 @@ pub enum Light {
 
 /// How a path ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Stop {
+pub enum SubRayStop {
     /// On a surface.
     Hit {
         /// Index of the surface in [`Setting::names`].
@@ -53,7 +53,7 @@ pub struct SubRayEnd {
     /// Optical path length to the end, in meters; to the last mirror if there is no end.
     pub path: f64,
     /// How it ends.
-    pub stop: Stop,
+    pub stop: SubRayStop,
 }
 
 /// Light that reaches a surface.
@@ -76,7 +76,7 @@ impl Sensor {
         for (number, sub_ray) in self.sub_rays.iter().enumerate() {
             let ray = footprint::ray(&self.shape, azimuth, sub_ray);
             let path = setting.trace(&ray);
-            let end = |light, path: &Path| SubRayEnd {
+            let end = |light, path: &RayPath| SubRayEnd {
                 number,
                 sub_ray: *sub_ray,
                 light,
@@ -93,7 +93,7 @@ impl Sensor {
                     light: Light::Mirror,
                     facets: path.facets()[..arrival.bounces].to_vec(),
                     path: arrival.on.range,
-                    stop: Stop::Hit {
+                    stop: SubRayStop::Hit {
                         surface: arrival.surface,
                         point: path.points()[arrival.bounces],
                         cos_incidence: arrival.on.cos_incidence,
@@ -105,21 +105,21 @@ impl Sensor {
         ends
     }
 
-    fn stop(&self, setting: &Setting<'_>, sub_ray: &SubRay, path: &Path) -> Stop {
+    fn stop(&self, setting: &Setting<'_>, sub_ray: &SubRay, path: &RayPath) -> SubRayStop {
         match (path.end, self.at_end(setting, sub_ray, path)) {
-            (End::Hit(hit), Some(arrival)) => Stop::Hit {
+            (End::Hit(hit), Some(arrival)) => SubRayStop::Hit {
                 surface: hit.surface,
                 point: hit.point,
                 cos_incidence: arrival.on.cos_incidence,
                 power: power::received(&self.light, &arrival.on),
             },
-            (End::Trapped, _) => Stop::Trapped,
-            (End::Escaped | End::Hit(_), _) => Stop::Escaped,
+            (End::Trapped, _) => SubRayStop::Trapped,
+            (End::Escaped | End::Hit(_), _) => SubRayStop::Escaped,
         }
     }
 
     /// The light that a sub-ray leaves where its path ends; `None` if it does not end on a surface.
-    pub(super) fn at_end(&self, setting: &Setting<'_>, sub_ray: &SubRay, path: &Path) -> Option<Arrival> {
+    pub(super) fn at_end(&self, setting: &Setting<'_>, sub_ray: &SubRay, path: &RayPath) -> Option<Arrival> {
         let End::Hit(hit) = path.end else { return None };
         Some(Arrival {
             surface: hit.surface,

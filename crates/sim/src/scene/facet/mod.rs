@@ -28,7 +28,7 @@ use super::omit::is_false;
 use super::pattern::Exchange;
 use crate::findings::Findings;
 use catoptric_model::ScanGeometry;
-use catoptric_model::place::Path;
+use catoptric_model::place::KeyPath;
 use nalgebra::Point3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -101,7 +101,7 @@ impl FacetShape {
     }
 
     /// Reports what is wrong with its numbers; `path` leads to the shape.
-    pub(crate) fn check(&self, scan: &ScanGeometry, path: &Path, found: &mut Findings) {
+    pub(crate) fn check(&self, scan: &ScanGeometry, path: &KeyPath, found: &mut Findings) {
         match self {
             Self::Wedge(wedge) => wedge.check(scan, &path.key("wedge"), found),
             Self::Plate(plate) => plate.check(scan, &path.key("plate"), found),

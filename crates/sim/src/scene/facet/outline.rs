@@ -2,7 +2,7 @@
 
 use crate::findings::Findings;
 use catoptric_cast::area_vector;
-use catoptric_model::place::Path;
+use catoptric_model::place::KeyPath;
 use catoptric_model::{MirrorPlane, ScanGeometry};
 use nalgebra::{Point3, Unit, Vector3};
 
@@ -30,7 +30,7 @@ pub(crate) fn rectangle(
 }
 
 /// Checks that corners outline a convex plane polygon, and returns whether they do.
-pub(crate) fn check_outline(corners: &[Point3<f64>], path: &Path, found: &mut Findings) -> bool {
+pub(crate) fn check_outline(corners: &[Point3<f64>], path: &KeyPath, found: &mut Findings) -> bool {
     let count = distinct_points(corners);
     if count < 3 {
         found.add(
@@ -103,7 +103,7 @@ fn outside_corner(corners: &[Point3<f64>], normal: &Unit<Vector3<f64>>) -> Optio
 }
 
 /// Checks that the scanner is on the reflecting side.
-pub(crate) fn check_side(corners: &[Point3<f64>], path: &Path, help: &str, found: &mut Findings) {
+pub(crate) fn check_side(corners: &[Point3<f64>], path: &KeyPath, help: &str, found: &mut Findings) {
     let normal = Unit::try_new(area_vector(corners), f64::MIN_POSITIVE);
     let (Some(corner), Some(normal)) = (corners.first(), normal) else {
         return;

@@ -3,7 +3,7 @@
 use super::outline::{check_side, rectangle};
 use super::turn::Turn;
 use crate::findings::Findings;
-use catoptric_model::place::Path;
+use catoptric_model::place::KeyPath;
 use catoptric_model::{ScanGeometry, beam, mirror};
 use nalgebra::Point3;
 use schemars::JsonSchema;
@@ -105,7 +105,7 @@ impl Plate {
     }
 
     /// Checks it; `path` leads to it.
-    pub(super) fn check(&self, scan: &ScanGeometry, path: &Path, found: &mut Findings) {
+    pub(super) fn check(&self, scan: &ScanGeometry, path: &KeyPath, found: &mut Findings) {
         match (self.azimuth_deg, self.beam) {
             (Some(_), Some(_)) => found.add(
                 &path.key("beam"),

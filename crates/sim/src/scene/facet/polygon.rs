@@ -3,7 +3,7 @@
 use super::outline::{check_outline, check_side};
 use super::turn::Turn;
 use crate::findings::Findings;
-use catoptric_model::place::Path;
+use catoptric_model::place::KeyPath;
 use nalgebra::{Point3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -38,7 +38,7 @@ impl PolygonShape {
     }
 
     /// Checks it; `path` leads to it. That there are three corners is up to the schema.
-    pub(super) fn check(&self, path: &Path, found: &mut Findings) {
+    pub(super) fn check(&self, path: &KeyPath, found: &mut Findings) {
         let (corners, path) = (self.corners(), path.key("corners_mm"));
         if corners.len() < 3 || !check_outline(&corners, &path, found) {
             return;

@@ -3,7 +3,7 @@
 use super::outline::{check_side, rectangle};
 use super::turn::Turn;
 use crate::findings::Findings;
-use catoptric_model::place::Path;
+use catoptric_model::place::KeyPath;
 use nalgebra::{Point3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -45,7 +45,7 @@ impl RectangleShape {
     }
 
     /// Checks it; `path` leads to it.
-    pub(super) fn check(&self, path: &Path, found: &mut Findings) {
+    pub(super) fn check(&self, path: &KeyPath, found: &mut Findings) {
         let Some(corners) = self.corners() else {
             let path = path.key("normal");
             found.add(

@@ -4,7 +4,7 @@ use super::outline::{covers, reach, rounded};
 use super::turn::Turn;
 use crate::findings::Findings;
 use catoptric_cast::area_vector;
-use catoptric_model::place::Path;
+use catoptric_model::place::KeyPath;
 use catoptric_model::{ScanGeometry, beam, mirror};
 use nalgebra::{Point3, Vector3};
 use schemars::JsonSchema;
@@ -80,7 +80,7 @@ impl Wedge {
     }
 
     /// Checks it; `path` leads to it.
-    pub(super) fn check(&self, scan: &ScanGeometry, path: &Path, found: &mut Findings) {
+    pub(super) fn check(&self, scan: &ScanGeometry, path: &KeyPath, found: &mut Findings) {
         let [first, last] = self.azimuth_deg;
         let azimuths = path.key("azimuth_deg");
         if first >= last {
