@@ -4,7 +4,7 @@ use super::context::Context;
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print, quoted};
-use catoptric::export::Part;
+use catoptric::export::ExportPart;
 use catoptric::{Error, ExportFormat, ExportOptions, Scene, export, export_boards, files};
 use clap::Args;
 use std::path::PathBuf;
@@ -25,8 +25,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// The solids in an STL; all by default.
-    #[arg(long, value_parser = one_of(&Part::ALL, Part::name, Part::about))]
-    part: Option<Part>,
+    #[arg(long, value_parser = one_of(&ExportPart::ALL, ExportPart::name, ExportPart::about))]
+    part: Option<ExportPart>,
     /// Length of the beams of a GLB after their last mirror, in meters; 1 by default.
     #[arg(long, value_name = "M")]
     reach_m: Option<f64>,

@@ -4,7 +4,9 @@ use super::context::Context;
 use super::error::CliError;
 use super::output::{counted, grouped, print, print_json, quoted};
 use catoptric::layout::{Detail, Requirement, RequirementError};
-use catoptric::optimize::{Better, Candidate, Goal, GoalError, OptimizeError, Optimum, Options, Wanted};
+use catoptric::optimize::{
+    Better, Goal, GoalError, LayoutCandidate, OptimizeError, Optimum, SearchOptions, Wanted,
+};
 use catoptric::{
     BEST_SCENE, Error, OPTIMUM_PAGE, Scene, optimize, report, shown_of_front as shown, write_optimum,
 };
@@ -90,7 +92,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     Ok(())
 }
 
-fn options(arguments: &Arguments) -> Result<Options, CliError> {
+fn options(arguments: &Arguments) -> Result<SearchOptions, CliError> {
     let wanted: Result<Vec<Wanted>, GoalError> =
         arguments.direction.iter().map(|t| Wanted::parse(t)).collect();
     let wanted = wanted.map_err(|e| refused(e.into()))?;
@@ -115,7 +117,7 @@ fn options(arguments: &Arguments) -> Result<Options, CliError> {
         .iter()
         .map(|text| Requirement::parse(text))
         .collect();
-    Ok(Options {
+    Ok(SearchOptions {
         goals,
         requirements: requirements.map_err(|e| refused(e.into()))?,
         evaluations: arguments.evaluations as usize,
@@ -176,7 +178,7 @@ fn text(found: &Optimum) -> String {
         goals.join(", "),
         if found.interrupted { "; interrupted" } else { "" },
     );
-    let mut rows: Vec<(String, &Candidate)> = vec![("as drawn".to_owned(), &found.start)];
+    let mut rows: Vec<(String, &LayoutCandidate)> = vec![("as drawn".to_owned(), &found.start)];
     rows.extend(found.best.iter().map(|best| ("best".to_owned(), best)));
     rows.extend(
         shown(found)

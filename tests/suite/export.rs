@@ -4,7 +4,7 @@
 
 use crate::common::{run, stderr, stdout};
 use catoptric::cast::volume;
-use catoptric::export::{self, Part, Solid};
+use catoptric::export::{self, ExportPart, Solid};
 use catoptric::files::mesh::read_mesh;
 use catoptric::files::scene as scenes;
 use catoptric::layout::{Detail, Drawing, analyze};
@@ -40,7 +40,7 @@ fn solids_are_closed_and_outward() {
         let scene = load(name);
         for seed in [None, Some(5)] {
             let drawing = Drawing::new(&scene, seed).unwrap();
-            let solids = export::solids(&scene, &drawing, Part::All);
+            let solids = export::solids(&scene, &drawing, ExportPart::All);
             assert!(solids.len() > 2 * drawing.facets.len());
             solids.iter().for_each(assert_closed);
         }
@@ -53,7 +53,7 @@ fn mirror_plates_have_their_area_and_thickness() {
         let scene = load(name);
         let analysis = analyze(&scene, None, Detail::Coarse).unwrap();
         let drawing = Drawing::new(&scene, None).unwrap();
-        let plates = export::solids(&scene, &drawing, Part::Mirrors);
+        let plates = export::solids(&scene, &drawing, ExportPart::Mirrors);
         for (plate, facet) in plates.iter().zip(&analysis.facets) {
             // A mirror drawn without a thickness gets the minimum thickness that can be cut.
             let drawn = scene.superstructure.mirror.thickness_mm;
@@ -100,7 +100,7 @@ fn an_stl_is_read_back_in_millimeters() {
     let path = folder.path().join("all.stl");
     let scene = load("prototype.toml");
     let drawing = Drawing::new(&scene, None).unwrap();
-    let solids = export::solids(&scene, &drawing, Part::All);
+    let solids = export::solids(&scene, &drawing, ExportPart::All);
     std::fs::write(&path, export::stl(&solids)).unwrap();
     let mesh = read_mesh(&path).unwrap();
     let count: usize = solids.iter().map(|s| s.triangles.len()).sum();

@@ -7,15 +7,15 @@ use crate::common::{folder_with, run, stderr, stdout};
 use crate::parametric::PARAMETRIC;
 use catoptric::files::{parametric::ParametricScene, scene};
 use catoptric::layout::{self, Detail, Requirement};
-use catoptric::optimize::{Goal, Optimum, Options, Wanted, optimize};
+use catoptric::optimize::{Goal, Optimum, SearchOptions, Wanted, optimize};
 use serde_json::Value;
 
 fn template(text: &str) -> ParametricScene {
     ParametricScene::parse(text, "scene.toml", &[]).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn options(goals: &[&str], requirements: &[&str], evaluations: usize) -> Options {
-    Options {
+fn options(goals: &[&str], requirements: &[&str], evaluations: usize) -> SearchOptions {
+    SearchOptions {
         goals: goals.iter().map(|g| Goal::parse(g, &[]).unwrap()).collect(),
         requirements: requirements
             .iter()
@@ -27,7 +27,7 @@ fn options(goals: &[&str], requirements: &[&str], evaluations: usize) -> Options
     }
 }
 
-fn search(text: &str, options: &Options) -> Optimum {
+fn search(text: &str, options: &SearchOptions) -> Optimum {
     optimize(&template(text), options, &mut |_| true).unwrap()
 }
 
@@ -49,7 +49,7 @@ fn the_same_seed_gives_the_same_answer_on_any_number_of_threads() {
         one.evaluations
     );
     assert!(one.front.len() > 1);
-    let other = search(PARAMETRIC, &Options { seed: 2, ..options });
+    let other = search(PARAMETRIC, &SearchOptions { seed: 2, ..options });
     assert_ne!(one.front, other.front);
 }
 
@@ -97,7 +97,7 @@ fn a_known_optimum_is_found() {
     assert!((best.parameters["reach_mm"] - 60.0).abs() < 0.1, "{best:?}");
     assert!(found.beats_start_in_every_goal);
     let wanted = [Wanted::parse("180,47,4").unwrap()];
-    let directions = Options {
+    let directions = SearchOptions {
         goals: vec![Goal::parse("directions", &wanted).unwrap()],
         ..options(&["size"], &[], 300)
     };

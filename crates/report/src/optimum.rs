@@ -2,7 +2,7 @@
 
 use super::figure::{self, Axes, GRID, Mark, Stroke, color, css};
 use super::page::{escape, figure as block, page, table};
-use catoptric_design::optimize::{Better, Candidate, Optimum, Stated};
+use catoptric_design::optimize::{Better, LayoutCandidate, Optimum, Stated};
 use std::ops::Range;
 
 /// Size of the plot, in pixels.
@@ -42,7 +42,7 @@ pub fn optimum(found: &Optimum) -> String {
     let mut headings = vec!["layout"];
     let names: Vec<String> = found.goals.iter().map(heading).collect();
     headings.extend(names.iter().map(String::as_str));
-    let row = |name: String, candidate: &Candidate| {
+    let row = |name: String, candidate: &LayoutCandidate| {
         let values = found.goals.iter().map(|g| value(candidate, &g.name));
         std::iter::once(name).chain(values).collect::<Vec<String>>()
     };
@@ -176,7 +176,7 @@ fn heading(goal: &Stated) -> String {
     format!("{}{unit}, {direction}", goal.name)
 }
 
-fn value(candidate: &Candidate, goal: &str) -> String {
+fn value(candidate: &LayoutCandidate, goal: &str) -> String {
     let value = candidate.goals.get(goal);
     value.map_or_else(|| "–".to_owned(), |v| goal_value(*v))
 }
@@ -185,7 +185,7 @@ fn picture(found: &Optimum) -> Option<String> {
     let [first, second, ..] = found.goals.as_slice() else {
         return None;
     };
-    let at = |c: &Candidate| Some((*c.goals.get(&first.name)?, *c.goals.get(&second.name)?));
+    let at = |c: &LayoutCandidate| Some((*c.goals.get(&first.name)?, *c.goals.get(&second.name)?));
     let mark = |(x, y): (f64, f64), color, hollow| Mark {
         x,
         y,

@@ -1,7 +1,7 @@
 //! Export of a layout as files for manufacturing and use, and of a dataset's boards as a table.
 
 use crate::{Error, Scene};
-use catoptric_design::export::{self, Part};
+use catoptric_design::export::{self, ExportPart};
 use catoptric_design::layout::Drawing;
 use catoptric_model::{Dataset, closed_set};
 
@@ -49,7 +49,7 @@ impl Format {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExportOptions {
     /// The solids in an STL.
-    pub part: Part,
+    pub part: ExportPart,
     /// Length of the outgoing beams of a GLB after their last mirror, in meters.
     pub reach_m: f64,
     /// Seed of the structure as built; the drawing if `None`.
@@ -59,7 +59,7 @@ pub struct ExportOptions {
 impl Default for ExportOptions {
     fn default() -> Self {
         Self {
-            part: Part::All,
+            part: ExportPart::All,
             reach_m: 1.0,
             as_built: None,
         }
@@ -114,8 +114,8 @@ pub fn export(scene: &Scene, format: Format, options: &ExportOptions) -> Result<
                 return Err(Error::invalid(message, Some("see --part")));
             }
             let shaded = match part {
-                Part::Mirrors => Vec::new(),
-                Part::Frame | Part::All => export::shaded_by_frame(scene, as_built)?,
+                ExportPart::Mirrors => Vec::new(),
+                ExportPart::Frame | ExportPart::All => export::shaded_by_frame(scene, as_built)?,
             };
             (export::stl(&solids), solids.len(), shaded)
         }

@@ -1,7 +1,7 @@
 //! Search of a scene's parameters for better layouts, and its results as files.
 
 use crate::{Control, Error, Scene};
-use catoptric_design::optimize::{Candidate, Optimum, Options};
+use catoptric_design::optimize::{LayoutCandidate, Optimum, SearchOptions};
 use catoptric_files::parametric::ParametricScene;
 use catoptric_files::{IoError, scene as scenes, write_file};
 use std::path::Path;
@@ -15,7 +15,7 @@ const SHOWN: usize = 12;
 ///
 /// # Errors
 /// [`Error::Optimize`] if there is no parameter to vary, no goal, or a goal or requirement that no layout has.
-pub fn optimize(scene: &Scene, options: &Options, control: &Control) -> Result<Optimum, Error> {
+pub fn optimize(scene: &Scene, options: &SearchOptions, control: &Control) -> Result<Optimum, Error> {
     let template = parametric(scene)?;
     control.run(|| {
         control.report("searching", 0, options.evaluations);
@@ -40,7 +40,7 @@ fn parametric(scene: &Scene) -> Result<ParametricScene, Error> {
 }
 
 /// Returns the front, or a selection of it from one end to the other.
-pub fn shown_of_front(found: &Optimum) -> Vec<&Candidate> {
+pub fn shown_of_front(found: &Optimum) -> Vec<&LayoutCandidate> {
     let count = found.front.len();
     if count <= SHOWN {
         return found.front.iter().collect();
@@ -86,7 +86,7 @@ pub fn write_optimum(scene: &Scene, found: &Optimum, out: impl AsRef<Path>) -> R
 }
 
 /// Writes a layout as a scene, along with the meshes it refers to.
-fn write_scene(path: &Path, template: &ParametricScene, candidate: &Candidate) -> Result<(), Error> {
+fn write_scene(path: &Path, template: &ParametricScene, candidate: &LayoutCandidate) -> Result<(), Error> {
     let choice = candidate.choice();
     let refused = |problems: Vec<String>| IoError::content(path, problems.join("; "));
     let found = template.with(&choice).map_err(refused)?;

@@ -2,7 +2,7 @@
 //!
 //! The up axis is y in glTF and z here: the root node holds the rotation between the two.
 
-use super::Part;
+use super::ExportPart;
 use super::stl::single;
 use super::{Solid, solids};
 use crate::layout::{Class, Drawing};
@@ -146,7 +146,7 @@ impl Builder {
 /// Returns the layout and its beams as a binary glTF file; beams that leave end `reach_m` after their last mirror.
 pub fn glb(scene: &Scene, drawing: &Drawing, reach_m: f64) -> Vec<u8> {
     let mut builder = Builder::default();
-    for (facet, solid) in solids(scene, drawing, Part::Mirrors).iter().enumerate() {
+    for (facet, solid) in solids(scene, drawing, ExportPart::Mirrors).iter().enumerate() {
         builder.solid(solid, facet_color(facet));
     }
     for part in &drawing.parts {

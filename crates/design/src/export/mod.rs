@@ -16,7 +16,7 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let scene: sim::Scene = toml::from_str(include_str!("../../../../scenes/prototype.toml"))?;
 //! let drawing = layout::Drawing::new(&scene, None)?;
-//! let solids = export::solids(&scene, &drawing, export::Part::Mirrors);
+//! let solids = export::solids(&scene, &drawing, export::ExportPart::Mirrors);
 //! assert_eq!(solids.len(), 8);
 //! assert_eq!(export::stl(&solids).len(), 84 + 50 * 8 * 12);
 //! # Ok(())
@@ -45,7 +45,7 @@ use catoptric_sim::Scene;
 catoptric_model::closed_set! {
     /// A selection of solids.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-    pub enum Part {
+    pub enum ExportPart {
         /// The mirrors as plates.
         Mirrors,
         /// The scene's posts, and a frame that holds the mirrors.
@@ -55,7 +55,7 @@ catoptric_model::closed_set! {
     }
 }
 
-impl Part {
+impl ExportPart {
     /// The name used in commands.
     pub fn name(self) -> &'static str {
         match self {
@@ -76,10 +76,10 @@ impl Part {
 }
 
 /// Returns the selected solids of a layout, each closed, in the sensor frame.
-pub fn solids(scene: &Scene, drawing: &Drawing, part: Part) -> Vec<Solid> {
+pub fn solids(scene: &Scene, drawing: &Drawing, part: ExportPart) -> Vec<Solid> {
     let thickness = plate_thickness(scene);
     let mut solids = Vec::new();
-    if part != Part::Frame {
+    if part != ExportPart::Frame {
         solids.extend(drawing.facets.iter().map(|facet| {
             let back: Vec<_> = (facet.face.corners.iter())
                 .map(|c| c - facet.face.normal.into_inner() * thickness)
@@ -87,7 +87,7 @@ pub fn solids(scene: &Scene, drawing: &Drawing, part: Part) -> Vec<Solid> {
             Solid::between(&facet.name, &back, &facet.face.corners)
         }));
     }
-    if part != Part::Mirrors {
+    if part != ExportPart::Mirrors {
         let posts = drawing.parts.iter().filter(|p| !p.housing);
         solids.extend(posts.map(|p| Solid {
             name: p.name.clone(),

@@ -1,7 +1,7 @@
 //! The analysis of a layout: its figures, and everything that they summarize.
 
 use super::accuracy::Accuracy;
-use super::element::{Element, elements};
+use super::element::{LayoutElement, elements};
 use super::facet::{FacetView, facets};
 use super::field::{FacetSequences, SPHERE_SR, cells, field};
 use super::footprint::Footprint;
@@ -67,7 +67,7 @@ pub struct Analysis {
     /// Runs of neighboring elements that end the same way, in order.
     pub runs: Vec<ElementRun>,
     /// Every element.
-    pub elements: Vec<Element>,
+    pub elements: Vec<LayoutElement>,
 }
 
 /// Spot and spacing at a range; they do not depend on the mirrors of the path, since a plane mirror changes neither.
@@ -171,9 +171,10 @@ fn spots(sensor: &Sensor) -> Vec<Spot> {
         .to_vec()
 }
 
-fn runs(elements: &[Element], scan: &ScanGeometry) -> Vec<ElementRun> {
-    let same =
-        |a: &Element, b: &Element| a.class == b.class && a.facets == b.facets && a.stopped_by == b.stopped_by;
+fn runs(elements: &[LayoutElement], scan: &ScanGeometry) -> Vec<ElementRun> {
+    let same = |a: &LayoutElement, b: &LayoutElement| {
+        a.class == b.class && a.facets == b.facets && a.stopped_by == b.stopped_by
+    };
     let half_step = 0.5 * scan.step().to_degrees();
     elements
         .chunk_by(same)
@@ -193,16 +194,16 @@ fn runs(elements: &[Element], scan: &ScanGeometry) -> Vec<ElementRun> {
         .collect()
 }
 
-fn stopped_by_facets(structure: &Structure, elements: &[Element]) -> usize {
+fn stopped_by_facets(structure: &Structure, elements: &[LayoutElement]) -> usize {
     let is_facet = |name: &str| structure.facets.iter().any(|f| f.name == name);
     let stopped = elements.iter().filter_map(|e| e.stopped_by.as_deref());
     stopped.filter(|name| is_facet(name)).count()
 }
 
 /// The longest run of elements that do not see, in degrees of the scan; it goes over the seam of a scan that closes.
-fn largest_gap(elements: &[Element], scan: &ScanGeometry) -> f64 {
+fn largest_gap(elements: &[LayoutElement], scan: &ScanGeometry) -> f64 {
     // From the first element on that sees: before it no run goes on.
-    let sees = |e: &Element| e.class.sees();
+    let sees = |e: &LayoutElement| e.class.sees();
     let start = match scan.closes() {
         true => elements.iter().position(sees).unwrap_or(0),
         false => 0,

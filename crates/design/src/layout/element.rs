@@ -14,7 +14,7 @@ pub const DARK: f64 = 0.1;
 
 /// One element of the scan.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Element {
+pub struct LayoutElement {
     /// Index of the beam.
     pub beam: usize,
     /// Its azimuth in the scan, in degrees.
@@ -56,7 +56,7 @@ pub(crate) fn elements(
     names: &[&str],
     traced: &[&Traced],
     footprints: &[&Footprint],
-) -> Vec<Element> {
+) -> Vec<LayoutElement> {
     let white = white(scene);
     let mut margins: Vec<Option<(f64, f64)>> = vec![None; traced.len()];
     for footprint in footprints {
@@ -68,7 +68,7 @@ pub(crate) fn elements(
     let of_one = |t: &Traced| {
         let leaves = exit(&t.chief);
         let reach = |reflectivity| t.sees.then(|| farthest(scene, t, reflectivity));
-        Element {
+        LayoutElement {
             beam: t.beam,
             scan_azimuth_deg: scan.azimuth(t.beam).to_degrees(),
             class: t.class(),

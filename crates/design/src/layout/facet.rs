@@ -1,6 +1,6 @@
 //! Facet by facet: its elements, the extent of its fan, its margins, and the effect of its errors.
 
-use super::element::Element;
+use super::element::LayoutElement;
 use super::field::{Cell, SPHERE_SR};
 use super::footprint::Footprint;
 use super::sensitivity::{RANGE_M, Shift, shifts};
@@ -67,7 +67,7 @@ pub struct FacetView {
 pub(crate) fn facets(
     scan: &ScanGeometry,
     structure: &Structure,
-    elements: &[Element],
+    elements: &[LayoutElement],
     traced: &[&Traced],
     cells: &[Cell],
     footprints: &[&Footprint],
@@ -81,7 +81,7 @@ fn view(
     scan: &ScanGeometry,
     structure: &Structure,
     facet: usize,
-    elements: &[Element],
+    elements: &[LayoutElement],
     traced: &[&Traced],
     cells: &[Cell],
     footprints: &[&Footprint],
@@ -93,7 +93,7 @@ fn view(
         met.filter(|(e, _)| e.class == class).collect::<Vec<_>>()
     };
     let own = of_class(Class::Deflected);
-    let extremes = |value: &dyn Fn(&Element) -> Option<f64>| {
+    let extremes = |value: &dyn Fn(&LayoutElement) -> Option<f64>| {
         let values = || own.iter().filter_map(|(e, _)| value(e));
         Some([values().reduce(f64::min)?, values().reduce(f64::max)?])
     };
@@ -150,7 +150,7 @@ fn view(
 }
 
 /// Returns minimum and maximum azimuth of a fan, in degrees, measured from its middle to avoid a jump at ±180°.
-fn azimuths(own: &[(&Element, &&Traced)]) -> Option<[f64; 2]> {
+fn azimuths(own: &[(&LayoutElement, &&Traced)]) -> Option<[f64; 2]> {
     let (_, middle) = own.get(own.len() / 2)?;
     let middle = exit(&middle.chief)?;
     let from = libm::atan2(middle.y, middle.x);

@@ -49,7 +49,7 @@ pub use accuracy::{Accuracy, FacetAccuracy, predict};
 pub use analysis::{Analysis, ElementRun, SCHEMA_VERSION, SPOT_RANGES_M, Spot};
 pub use depth::{Depth, depth};
 pub use drawing::{Drawing, DrawnPart, DrawnRay};
-pub use element::{DARK, Element};
+pub use element::{DARK, LayoutElement};
 pub use facet::FacetView;
 pub use field::{Cell, NEAR_DEG};
 pub use footprint::{Footprint, OUTLINE};

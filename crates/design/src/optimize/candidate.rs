@@ -2,7 +2,7 @@
 
 use super::error::OptimizeError;
 use super::goal::{Goal, requires_accuracy};
-use super::options::{OpenParameter, Options};
+use super::options::{OpenParameter, SearchOptions};
 use crate::layout::{self, Analysis, Layout};
 use catoptric_files::parametric::ParametricScene;
 use catoptric_sim::Scene;
@@ -15,7 +15,7 @@ const STEPS: f64 = 1e4;
 
 /// A choice of parameter values, with the results for its layout.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Candidate {
+pub struct LayoutCandidate {
     /// Number of the layout in order of evaluation; 0 is the start.
     pub number: usize,
     /// Values of the parameters.
@@ -35,7 +35,7 @@ pub struct Candidate {
     pub(super) shortfall: f64,
 }
 
-impl Candidate {
+impl LayoutCandidate {
     /// Whether it is a valid scene that meets every requirement.
     pub fn is_kept(&self) -> bool {
         self.unmet.is_empty()
@@ -62,7 +62,7 @@ impl Candidate {
 pub(super) struct Judge<'a> {
     template: &'a ParametricScene,
     parameters: &'a [OpenParameter],
-    options: &'a Options,
+    options: &'a SearchOptions,
     accuracy: bool,
     /// The unchanged scene's layout; most candidates differ from it in part only.
     start: Layout,
@@ -73,7 +73,7 @@ impl<'a> Judge<'a> {
     pub(super) fn new(
         template: &'a ParametricScene,
         parameters: &'a [OpenParameter],
-        options: &'a Options,
+        options: &'a SearchOptions,
     ) -> Result<Self, OptimizeError> {
         let accuracy = options.goals.iter().any(Goal::needs_accuracy)
             || options.requirements.iter().any(requires_accuracy);
@@ -120,7 +120,7 @@ impl<'a> Judge<'a> {
     }
 
     /// Evaluates the candidate at a position.
-    pub(super) fn candidate(&self, number: usize, place: &[f64]) -> Candidate {
+    pub(super) fn candidate(&self, number: usize, place: &[f64]) -> LayoutCandidate {
         let numbers = if place == self.start() {
             self.parameters.iter().map(|p| p.start).collect()
         } else {
@@ -133,9 +133,9 @@ impl<'a> Judge<'a> {
     }
 
     /// Evaluates a choice of values, in the order of the parameters.
-    pub(super) fn evaluate(&self, numbers: &[f64]) -> (Candidate, Option<Analysis>) {
+    pub(super) fn evaluate(&self, numbers: &[f64]) -> (LayoutCandidate, Option<Analysis>) {
         let names = self.parameters.iter().map(|p| p.name.clone());
-        let mut candidate = Candidate {
+        let mut candidate = LayoutCandidate {
             number: 0,
             parameters: names.zip(numbers.iter().copied()).collect(),
             goals: BTreeMap::new(),

@@ -1,7 +1,7 @@
 //! Explains why the best layout is better: how the classes of its elements changed, and the contribution of each
 //! parameter.
 
-use super::candidate::{Candidate, Judge};
+use super::candidate::{Judge, LayoutCandidate};
 use crate::layout::{Analysis, Class};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -34,8 +34,8 @@ pub struct LeftAsItWas {
 }
 
 /// Compares start and best; `None` if either is refused.
-pub(super) fn explain(judge: &Judge<'_>, start: &Candidate, best: &Candidate) -> Option<Why> {
-    let numbers = |c: &Candidate| -> Vec<f64> {
+pub(super) fn explain(judge: &Judge<'_>, start: &LayoutCandidate, best: &LayoutCandidate) -> Option<Why> {
+    let numbers = |c: &LayoutCandidate| -> Vec<f64> {
         let names = judge.parameters().iter();
         names.filter_map(|p| c.parameters.get(&p.name).copied()).collect()
     };
@@ -76,7 +76,7 @@ pub(super) fn explain(judge: &Judge<'_>, start: &Candidate, best: &Candidate) ->
 }
 
 /// Returns the largest loss in a goal, as a fraction of what was gained in it; infinite if a requirement is not met.
-fn loss(without: &Candidate, start: &Candidate, best: &Candidate) -> f64 {
+fn loss(without: &LayoutCandidate, start: &LayoutCandidate, best: &LayoutCandidate) -> f64 {
     if !without.is_kept() {
         return f64::INFINITY;
     }

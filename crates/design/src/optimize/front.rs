@@ -1,30 +1,30 @@
 //! The Pareto front: the layouts that no other beats in all goals.
 
-use super::candidate::Candidate;
+use super::candidate::LayoutCandidate;
 
 /// Whether one is at least as good in every goal and better in one.
-fn dominates(a: &Candidate, b: &Candidate) -> bool {
+fn dominates(a: &LayoutCandidate, b: &LayoutCandidate) -> bool {
     let pairs = || a.costs.iter().zip(&b.costs);
     pairs().all(|(a, b)| a <= b) && pairs().any(|(a, b)| a < b)
 }
 
 /// Whether one is better in every goal.
-pub(super) fn beats_in_all(a: &Candidate, b: &Candidate) -> bool {
+pub(super) fn beats_in_all(a: &LayoutCandidate, b: &LayoutCandidate) -> bool {
     a.is_kept() && !b.costs.is_empty() && a.costs.iter().zip(&b.costs).all(|(a, b)| a < b)
 }
 
 /// Returns the layouts that meet the requirements and that no other beats, without duplicates, sorted by the first
 /// goal, best first.
-pub(super) fn front(all: &[Candidate]) -> Vec<Candidate> {
-    let mut front: Vec<&Candidate> = Vec::new();
+pub(super) fn front(all: &[LayoutCandidate]) -> Vec<LayoutCandidate> {
+    let mut front: Vec<&LayoutCandidate> = Vec::new();
     for candidate in all.iter().filter(|c| c.is_kept()) {
-        let beaten = |by: &&Candidate| dominates(by, candidate) || by.costs == candidate.costs;
+        let beaten = |by: &&LayoutCandidate| dominates(by, candidate) || by.costs == candidate.costs;
         if !front.iter().any(beaten) {
             front.retain(|other| !dominates(candidate, other));
             front.push(candidate);
         }
     }
-    let by_goals = |a: &&Candidate, b: &&Candidate| {
+    let by_goals = |a: &&LayoutCandidate, b: &&LayoutCandidate| {
         let pairs = a.costs.iter().zip(&b.costs);
         let differ = pairs.map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne());
         differ.unwrap_or_else(|| a.number.cmp(&b.number))
@@ -34,7 +34,7 @@ pub(super) fn front(all: &[Candidate]) -> Vec<Candidate> {
 }
 
 /// Returns the layout whose smallest gain in any goal is largest; gains are relative to the spread of the front.
-pub(super) fn best(all: &[Candidate], start: &Candidate) -> Option<Candidate> {
+pub(super) fn best(all: &[LayoutCandidate], start: &LayoutCandidate) -> Option<LayoutCandidate> {
     let front = front(all);
     let spans = spreads(front.iter());
     let from = |goal: usize| match start.costs.get(goal) {
@@ -44,7 +44,7 @@ pub(super) fn best(all: &[Candidate], start: &Candidate) -> Option<Candidate> {
             .map(|c| c.costs[goal])
             .fold(f64::NEG_INFINITY, f64::max),
     };
-    let min_gain = |c: &Candidate| {
+    let min_gain = |c: &LayoutCandidate| {
         let gains = c
             .costs
             .iter()
@@ -52,7 +52,7 @@ pub(super) fn best(all: &[Candidate], start: &Candidate) -> Option<Candidate> {
             .map(|(goal, cost)| (from(goal) - cost) / spans[goal]);
         gains.fold(f64::INFINITY, f64::min)
     };
-    let mut best: Option<(f64, &Candidate)> = None;
+    let mut best: Option<(f64, &LayoutCandidate)> = None;
     for candidate in &front {
         let gain = min_gain(candidate);
         if best.is_none_or(|(most, _)| gain > most) {
@@ -63,7 +63,7 @@ pub(super) fn best(all: &[Candidate], start: &Candidate) -> Option<Candidate> {
 }
 
 /// Returns the spread of layouts in every goal; 1 where all are equal.
-pub(super) fn spreads<'a>(some: impl Iterator<Item = &'a Candidate>) -> Vec<f64> {
+pub(super) fn spreads<'a>(some: impl Iterator<Item = &'a LayoutCandidate>) -> Vec<f64> {
     let mut limits: Vec<[f64; 2]> = Vec::new();
     for candidate in some {
         for (goal, cost) in candidate.costs.iter().enumerate() {
@@ -82,8 +82,8 @@ mod tests {
     use super::*;
     use std::collections::BTreeMap;
 
-    fn candidate(number: usize, costs: &[f64], kept: bool) -> Candidate {
-        Candidate {
+    fn candidate(number: usize, costs: &[f64], kept: bool) -> LayoutCandidate {
+        LayoutCandidate {
             number,
             parameters: BTreeMap::new(),
             goals: BTreeMap::new(),

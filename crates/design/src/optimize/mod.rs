@@ -27,11 +27,11 @@ mod goal;
 mod options;
 mod search;
 
-pub use candidate::Candidate;
+pub use candidate::LayoutCandidate;
 pub use error::OptimizeError;
 pub use explain::{LeftAsItWas, Why};
 pub use goal::{Better, Goal, GoalError, Stated, Wanted};
-pub use options::{OpenParameter, Options, Progress};
+pub use options::{OpenParameter, Progress, SearchOptions};
 
 use candidate::Judge;
 use catoptric_files::parametric::ParametricScene;
@@ -61,13 +61,13 @@ pub struct Optimum {
     /// The parameters that were varied.
     pub parameters: Vec<OpenParameter>,
     /// The layout as the scene has it.
-    pub start: Candidate,
+    pub start: LayoutCandidate,
     /// The layout whose smallest gain in any goal is largest; `None` if none meets the requirements.
-    pub best: Option<Candidate>,
+    pub best: Option<LayoutCandidate>,
     /// Whether it is better than the start in every goal.
     pub beats_start_in_every_goal: bool,
     /// Layouts that no other beats in all goals, sorted by the first goal, best first.
-    pub front: Vec<Candidate>,
+    pub front: Vec<LayoutCandidate>,
     /// Why the best is better than the start.
     pub why: Option<Why>,
     /// Goals of every layout that meets the requirements, in order of evaluation.
@@ -80,12 +80,12 @@ pub struct Optimum {
 /// ```
 /// use catoptric_files::parametric::ParametricScene;
 /// use catoptric_design::layout::Detail;
-/// use catoptric_design::optimize::{Goal, Options, optimize};
+/// use catoptric_design::optimize::{Goal, SearchOptions, optimize};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let text = include_str!("../../../../scenes/prototype-parametric.toml");
 /// let template = ParametricScene::parse(text, "prototype-parametric.toml", &[])?;
-/// let options = Options {
+/// let options = SearchOptions {
 ///     goals: vec![Goal::parse("field_of_regard", &[])?, Goal::parse("size", &[])?],
 ///     requirements: Vec::new(),
 ///     evaluations: 60,
@@ -102,7 +102,7 @@ pub struct Optimum {
 /// [`OptimizeError`]: no parameters or no goal, or goals and requirements that layouts do not have.
 pub fn optimize(
     template: &ParametricScene,
-    options: &Options,
+    options: &SearchOptions,
     watch: &mut dyn FnMut(Progress) -> bool,
 ) -> Result<Optimum, OptimizeError> {
     let parameters: Vec<OpenParameter> = template

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 /// Goals, requirements and extent of a search.
 #[derive(Debug, Clone)]
-pub struct Options {
+pub struct SearchOptions {
     /// The goals.
     pub goals: Vec<Goal>,
     /// Requirements that every layout has to meet.

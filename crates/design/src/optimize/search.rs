@@ -1,8 +1,8 @@
 //! The particle swarms: which positions they evaluate, and the record of all candidates.
 
-use super::candidate::{Candidate, Judge};
+use super::candidate::{Judge, LayoutCandidate};
 use super::front::{front, spreads};
-use super::options::{Options, Progress};
+use super::options::{Progress, SearchOptions};
 use argmin::core::{CostFunction, Error, Executor, PopulationState, SendAlias, SyncAlias};
 use argmin::solver::particleswarm::{Particle, ParticleSwarm};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -36,12 +36,12 @@ const FIRST_STEP: f64 = 0.15;
 /// A search in progress: all candidates so far, and what is needed to evaluate more.
 pub(super) struct Search<'a> {
     judge: &'a Judge<'a>,
-    options: &'a Options,
+    options: &'a SearchOptions,
     log: RefCell<Log<'a>>,
 }
 
 struct Log<'a> {
-    all: Vec<Candidate>,
+    all: Vec<LayoutCandidate>,
     watch: &'a mut dyn FnMut(Progress) -> bool,
     stopped: bool,
 }
@@ -55,7 +55,7 @@ struct Aim {
 }
 
 impl Aim {
-    fn cost(&self, candidate: &Candidate) -> f64 {
+    fn cost(&self, candidate: &LayoutCandidate) -> f64 {
         if !candidate.shortfall.is_finite() {
             return REFUSED;
         }
@@ -109,7 +109,7 @@ struct Stopped;
 impl<'a> Search<'a> {
     pub(super) fn new(
         judge: &'a Judge<'a>,
-        options: &'a Options,
+        options: &'a SearchOptions,
         watch: &'a mut dyn FnMut(Progress) -> bool,
     ) -> Self {
         let log = Log {
@@ -155,7 +155,7 @@ impl<'a> Search<'a> {
     }
 
     /// Returns all candidates, and the start.
-    pub(super) fn finish(self) -> (Vec<Candidate>, Candidate) {
+    pub(super) fn finish(self) -> (Vec<LayoutCandidate>, LayoutCandidate) {
         let all = self.log.into_inner().all;
         let start = all[0].clone();
         (all, start)
@@ -185,7 +185,7 @@ impl<'a> Search<'a> {
 
     fn aim(&self, from_start: bool, weights: Vec<f64>) -> Aim {
         let log = self.log.borrow();
-        let kept: Vec<&Candidate> = log.all.iter().filter(|c| c.is_kept()).collect();
+        let kept: Vec<&LayoutCandidate> = log.all.iter().filter(|c| c.is_kept()).collect();
         let goals = weights.len();
         let mut spreads = spreads(kept.iter().copied());
         spreads.resize(goals, 1.0);
@@ -228,7 +228,7 @@ impl<'a> Search<'a> {
     /// Returns the initial particles: half of them the best so far, half random others.
     fn particles(&self, aim: &Aim, random: &mut Xoshiro256PlusPlus) -> Vec<Particle<Vec<f64>, f64>> {
         let log = self.log.borrow();
-        let mut order: Vec<(f64, &Candidate)> = log.all.iter().map(|c| (aim.cost(c), c)).collect();
+        let mut order: Vec<(f64, &LayoutCandidate)> = log.all.iter().map(|c| (aim.cost(c), c)).collect();
         order.sort_by(|(a, c), (b, d)| a.total_cmp(b).then(c.number.cmp(&d.number)));
         let (best, others) = order.split_at(order.len().min(PARTICLES / 2));
         let mut chosen = best.to_vec();
@@ -261,7 +261,7 @@ impl<'a> Search<'a> {
         let judge = self.judge;
         for (batch, places) in places.chunks(PARTICLES).enumerate() {
             let number = begin + batch * PARTICLES;
-            let found: Vec<Candidate> = places
+            let found: Vec<LayoutCandidate> = places
                 .par_iter()
                 .enumerate()
                 .map(|(i, place)| judge.candidate(number + i, place))
