@@ -3,6 +3,7 @@
 //! Blocks are read again later and must not have changed by then: every block has a checksum of its messages.
 
 use super::error::IoError;
+use super::records;
 use catoptric_model::Stop;
 use crc32fast::Hasher;
 use mcap::records::op;
@@ -200,6 +201,13 @@ impl Block {
 impl Records {
     /// The records of a chunk, from the body of its record.
     fn of_chunk(body: &[u8]) -> McapResult<Self> {
+        let chunk = records::chunk(body).ok_or(McapError::UnexpectedEof)?;
+        if chunk.size > LONGEST_RECORD as u64 {
+            return Err(McapError::ChunkTooLarge(chunk.size));
+        }
+        if chunk.compression == "zstd" {
+            return Self::of_run(&zstd(&chunk)?);
+        }
         let options = checked().with_skip_start_magic(true).with_skip_end_magic(true);
         let mut reader = LinearReader::new_with_options(options);
         let mut head = vec![op::CHUNK];
@@ -213,9 +221,7 @@ impl Records {
                     reader.notify_read(read);
                 }
                 LinearReadEvent::Record { data, opcode } => {
-                    if is_of_use(opcode) {
-                        records.push(opcode, data);
-                    }
+                    records.push(opcode, data);
                 }
             }
         }
@@ -236,6 +242,9 @@ impl Records {
     }
 
     fn push(&mut self, opcode: u8, data: &[u8]) {
+        if !is_of_use(opcode) {
+            return;
+        }
         let begin = self.bytes.len();
         self.bytes.extend_from_slice(data);
         self.all.push((opcode, begin..self.bytes.len()));
@@ -261,6 +270,42 @@ impl Records {
             .iter()
             .map(|(opcode, range)| (*opcode, &self.bytes[range.clone()]))
     }
+}
+
+/// Decompresses the records of a chunk; they are of the size that it claims, and of its checksum if it has one.
+fn zstd(chunk: &records::Chunk<'_>) -> McapResult<Vec<u8>> {
+    use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
+    let failed = |e: &dyn std::fmt::Display| McapError::DecompressionError(e.to_string());
+    let (mut rest, mut bytes) = (chunk.records, Vec::new());
+    while !rest.is_empty() {
+        match ruzstd::decoding::StreamingDecoder::new(&mut rest) {
+            Ok(decoder) => {
+                let room = chunk.size - bytes.len() as u64;
+                let read = decoder.take(room + 1).read_to_end(&mut bytes);
+                read.map_err(|e| failed(&e))?;
+                if bytes.len() as u64 > chunk.size {
+                    return Err(failed(&"there is more in a chunk than it says"));
+                }
+            }
+            // A frame of other people's data.
+            Err(FrameDecoderError::ReadFrameHeaderError(ReadFrameHeaderError::SkipFrame { length, .. })) => {
+                let length = usize::try_from(length).unwrap_or(usize::MAX);
+                rest = rest.get(length..).ok_or(McapError::UnexpectedEof)?;
+            }
+            Err(e) => return Err(failed(&e)),
+        }
+    }
+    if bytes.len() as u64 != chunk.size {
+        return Err(failed(&"there is less in a chunk than it says"));
+    }
+    let found = crc32fast::hash(&bytes);
+    if chunk.checksum != 0 && found != chunk.checksum {
+        return Err(McapError::BadChunkCrc {
+            saved: chunk.checksum,
+            calculated: found,
+        });
+    }
+    Ok(bytes)
 }
 
 /// Options shared by all readers.

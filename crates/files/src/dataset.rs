@@ -268,6 +268,7 @@ fn assembled(
         session,
         poses: poses.map_err(fail)?,
         id: Some(id),
+        warnings: Vec::new(),
     };
     dataset.check().map_err(fail)?;
     Ok(dataset)

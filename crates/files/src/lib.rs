@@ -31,7 +31,11 @@ pub mod messages;
 #[cfg(feature = "recording")]
 pub mod playback;
 #[cfg(feature = "recording")]
+mod codes;
+#[cfg(feature = "recording")]
 pub mod recording;
+#[cfg(feature = "recording")]
+mod records;
 #[cfg(feature = "recording")]
 mod schedule;
 #[cfg(feature = "recording")]

@@ -98,6 +98,7 @@ fn find(scene: &Scene, seed: u64, accuracy: &mut Accuracy) -> Result<(), String>
         session,
         poses: poses.map_err(text)?.into_iter().flatten().collect(),
         id: None,
+        warnings: Vec::new(),
     };
     // Omitted poses leave no gap in the numbering.
     for (number, pose) in dataset.poses.iter_mut().enumerate() {
