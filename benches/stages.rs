@@ -65,7 +65,7 @@ fn layout(c: &mut Criterion) {
     let scene = prototype();
     let mut moved = scene.clone();
     let facet = &mut moved.superstructure.facet[3];
-    let corners = catoptric::sim::build::layout::corners(&facet.shape, &Default::default()).unwrap();
+    let corners = facet.shape.corners(&Default::default()).unwrap();
     let corners_mm = corners
         .iter()
         .map(|c| [c.x * 1e3 + 0.3, c.y * 1e3 - 0.2, c.z * 1e3]);

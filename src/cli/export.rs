@@ -2,14 +2,12 @@
 
 use super::Context;
 use super::error::CliError;
+use super::one_of::one_of;
 use super::output::{counted, print, quoted};
 use catoptric::export::Part;
-use catoptric::{Error, ExportFormat, Scene, export, export_boards, files};
-use clap::{Args, ValueEnum};
+use catoptric::{Error, ExportFormat, ExportOptions, Scene, export, export_boards, files};
+use clap::Args;
 use std::path::PathBuf;
-
-/// Default length of the beams of a GLB after their last mirror, in meters.
-const REACH_M: f64 = 1.0;
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]
@@ -18,14 +16,17 @@ pub(crate) struct Arguments {
     #[arg(value_name = "SCENE|DATASET")]
     input: PathBuf,
     /// The format to write.
-    #[arg(long, value_enum)]
-    format: FormatName,
+    #[arg(
+        long,
+        value_parser = one_of(&ExportFormat::ALL, ExportFormat::name, ExportFormat::about)
+    )]
+    format: ExportFormat,
     /// The file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// The solids in an STL; all by default.
-    #[arg(long, value_enum)]
-    part: Option<Solids>,
+    #[arg(long, value_parser = one_of(&Part::ALL, Part::name, Part::about))]
+    part: Option<Part>,
     /// Length of the beams of a GLB after their last mirror, in meters; 1 by default.
     #[arg(long, value_name = "M")]
     reach_m: Option<f64>,
@@ -40,53 +41,23 @@ pub(crate) struct Arguments {
     set: Vec<String>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum FormatName {
-    /// Mirrors and a printable frame as closed solids, in millimeters
-    Stl,
-    /// Mirrors, housing and beams for viewing (binary glTF), in meters
-    Glb,
-    /// Of a scene: corners, angles and tolerances of every mirror; of a dataset: the readings of every beam on every
-    /// board
-    Csv,
-    /// Frames of the laser and the mirrors in the rig
-    Urdf,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Solids {
-    /// The mirrors as plates
-    Mirrors,
-    /// The posts and a frame that holds the mirrors
-    Frame,
-    /// Both
-    All,
-}
-
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     if arguments.input.is_dir() {
         return boards(arguments, context);
     }
-    let reach_m = arguments.reach_m.unwrap_or(REACH_M);
+    let default = ExportOptions::default();
+    let reach_m = arguments.reach_m.unwrap_or(default.reach_m);
     if !(reach_m.is_finite() && reach_m > 0.0) {
         let message = format!("--reach-m must be a positive number, not {reach_m}");
         return Err(CliError::invalid(message, None));
     }
     let scene = Scene::load_with(&arguments.input, &arguments.set)?;
-    let seed = arguments
-        .as_built
-        .then(|| arguments.seed.unwrap_or(scene.resolved().seed));
-    let format = match arguments.format {
-        FormatName::Stl => ExportFormat::Stl(match arguments.part.unwrap_or(Solids::All) {
-            Solids::Mirrors => Part::Mirrors,
-            Solids::Frame => Part::Frame,
-            Solids::All => Part::All,
-        }),
-        FormatName::Glb => ExportFormat::Glb { reach_m },
-        FormatName::Csv => ExportFormat::Csv,
-        FormatName::Urdf => ExportFormat::Urdf,
+    let options = ExportOptions {
+        part: arguments.part.unwrap_or(default.part),
+        reach_m,
+        as_built: (arguments.as_built).then(|| arguments.seed.unwrap_or(scene.resolved().seed)),
     };
-    let exported = export(&scene, format, seed)?;
+    let exported = export(&scene, arguments.format, &options)?;
     if !exported.shaded.is_empty() {
         let names: Vec<String> = exported.shaded.iter().map(usize::to_string).collect();
         context.say(&format!(
@@ -98,10 +69,10 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     files::write_file(&arguments.out, &exported.bytes)?;
     let parts = exported.parts;
     let what = match arguments.format {
-        FormatName::Stl => format!("{}, millimeters", counted(parts, "solid")),
-        FormatName::Glb => format!("{} and beams, meters", counted(parts, "mirror")),
-        FormatName::Csv => counted(parts, "mirror"),
-        FormatName::Urdf => format!("the laser and {}", counted(parts, "mirror")),
+        ExportFormat::Stl => format!("{}, millimeters", counted(parts, "solid")),
+        ExportFormat::Glb => format!("{} and beams, meters", counted(parts, "mirror")),
+        ExportFormat::Csv => counted(parts, "mirror"),
+        ExportFormat::Urdf => format!("the laser and {}", counted(parts, "mirror")),
     };
     print(&format!("wrote {}: {what}\n", quoted(&arguments.out)))
 }
@@ -109,7 +80,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
 /// Exports the boards of a dataset.
 fn boards(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let shown = quoted(&arguments.input);
-    if arguments.format != FormatName::Csv {
+    if arguments.format != ExportFormat::Csv {
         return Err(CliError::invalid(
             format!(
                 "{shown} is a folder; a dataset can be exported as csv only, the other formats need a scene"

@@ -1,10 +1,11 @@
 //! `catoptric new`: writes a commented scene to start from.
 
 use super::error::CliError;
+use super::one_of::one_of;
 use super::output::{print, quoted};
 use catoptric::Template;
 use catoptric::files::IoError;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
@@ -16,20 +17,12 @@ pub(crate) struct Arguments {
     #[arg(value_name = "NAME.toml")]
     name: PathBuf,
     /// The mirrors to start from.
-    #[arg(long, value_enum, default_value_t = LayoutName::Prototype)]
-    layout: LayoutName,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum LayoutName {
-    /// Eight facets around the scanner
-    Prototype,
-    /// Two mirrors on either side of a 270° scanner
-    TwoMirror,
-    /// Half a hexagonal pyramid in front of the scanner
-    Pyramid,
-    /// A small mirror that folds eleven beams straight down
-    Altimeter,
+    #[arg(
+        long,
+        value_parser = one_of(&Template::ALL, Template::name, Template::about),
+        default_value = Template::Prototype.name()
+    )]
+    layout: Template,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
@@ -43,12 +36,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
             format!("catoptric new {}", quoted(&path.with_extension("toml"))),
         ));
     }
-    let template = match arguments.layout {
-        LayoutName::Prototype => Template::Prototype,
-        LayoutName::TwoMirror => Template::TwoMirror,
-        LayoutName::Pyramid => Template::Pyramid,
-        LayoutName::Altimeter => Template::Altimeter,
-    };
     // `create_new` is atomic: a file that another program creates meanwhile cannot be overwritten.
     let file = OpenOptions::new().write(true).create_new(true).open(path);
     let mut file = file.map_err(|source| match source.kind() {
@@ -59,7 +46,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
         _ => IoError::write(path, source).into(),
     })?;
     let written = file
-        .write_all(template.text().as_bytes())
+        .write_all(arguments.layout.text().as_bytes())
         .and_then(|()| file.sync_all());
     if let Err(source) = written {
         // An incomplete scene is worse than none.

@@ -14,6 +14,7 @@ use catoptric::model::Stretch;
 use catoptric::sim::build::Structure;
 use catoptric::sim::build::color;
 use catoptric::sim::light::{Mirrors, Role, Setting};
+use catoptric::sim::receive::echo::Receiver;
 use catoptric::sim::receive::phase;
 use catoptric::sim::receive::{Return, Sensor};
 use catoptric::sim::scene::{BeamShape, Detector, ErrorModel, Preset};
@@ -26,13 +27,6 @@ use std::f64::consts::LN_2;
 /// Full 1/e² width of the beams here, in milliradians, and the standard deviation of their light, a quarter of that.
 const WIDTH_MRAD: f64 = 16.0;
 const SIGMA: f64 = 0.25e-3 * WIDTH_MRAD;
-
-const DETECTORS: [Detector; 4] = [
-    Detector::LeadingEdge,
-    Detector::ConstantFraction,
-    Detector::Peak,
-    Detector::Centroid,
-];
 
 /// Standard deviation of a 4 ns pulse, in meters of range.
 fn pulse_sd(fwhm_ns: f64) -> f64 {
@@ -146,19 +140,27 @@ fn summed(distance: f64, tilt_deg: f64, sd: f64, detector: Detector) -> f64 {
     )
 }
 
+/// How early the detector takes a Gaussian echo of a given height and standard deviation, in meters.
+fn lead(detector: Detector, sd: f64, height: f64) -> f64 {
+    let receiver = Receiver {
+        detector,
+        fraction: 0.5,
+        sd,
+        threshold: 1.0,
+        saturation: f64::INFINITY,
+    };
+    receiver.lead(height)
+}
+
 /// The offset that the calibration at a white board 2 m away, face on, removes.
 fn reference(detector: Detector, sd: f64) -> f64 {
-    match detector {
-        Detector::LeadingEdge => sd * (2.0 * libm::log(height(0.9, 2.0, 0.0))).sqrt(),
-        Detector::ConstantFraction => sd * (2.0 * LN_2).sqrt(),
-        Detector::Peak | Detector::Centroid => 0.0,
-    }
+    lead(detector, sd, height(0.9, 2.0, 0.0))
 }
 
 #[test]
 fn a_tilted_board_reads_as_in_the_closed_forms() {
     let p = pulse_sd(4.0);
-    for detector in DETECTORS {
+    for detector in Detector::ALL {
         let (mut worst, mut worst_summed) = (0.0_f64, 0.0_f64);
         for distance in [0.5, 1.0, 2.0, 4.0] {
             for tilt_deg in [0.0_f64, 15.0, 30.0, 45.0, 60.0] {
@@ -172,19 +174,14 @@ fn a_tilted_board_reads_as_in_the_closed_forms() {
                 // The peak of the echo is lower the more it is spread.
                 let lambert = 1.0 + (3.0 * t * t - 1.5) * SIGMA * SIGMA;
                 let f = height(0.9, distance, tilt_deg) * lambert * p / spread;
-                let edge = |k: f64| -k * (spread - p);
-                let walk = match detector {
-                    Detector::LeadingEdge => {
-                        let k = (2.0 * libm::log(f)).sqrt();
-                        edge(k) - p * k + reference(detector, p)
-                    }
-                    Detector::ConstantFraction => edge((2.0 * LN_2).sqrt()),
+                let skew = match detector {
                     // A skewed echo peaks μ₃/2p² before its mean, μ₃ = 6s³·tan²α·(½ + tan²α)·σ_δ⁴.
                     Detector::Peak => {
                         -3.0 * (distance * SIGMA).powi(3) * t * t * (0.5 + t * t) * SIGMA / (spread * spread)
                     }
-                    Detector::Centroid => 0.0,
+                    Detector::LeadingEdge | Detector::ConstantFraction | Detector::Centroid => 0.0,
                 };
+                let walk = reference(detector, p) - lead(detector, spread, f) + skew;
                 let expected = centroid + walk;
                 // 1 % of the magnitudes of the terms, since their sum passes through 0.
                 let size = distance * SIGMA * SIGMA * (0.5 + 2.0 * t * t) + walk.abs();
@@ -215,7 +212,7 @@ fn a_pulse_as_short_as_the_depth_of_the_spot_reads_as_the_summed_waveform() {
     let (distance, tilt_deg, fwhm_ns) = (4.0, 60.0, 0.47);
     let p = pulse_sd(fwhm_ns);
     let spread = p.hypot(distance * libm::tan(f64::to_radians(tilt_deg)) * SIGMA);
-    for detector in DETECTORS {
+    for detector in Detector::ALL {
         let mut scene = physical();
         scene.detection.detector = detector;
         scene.detection.pulse_fwhm_ns = fwhm_ns;
@@ -231,22 +228,17 @@ fn a_pulse_as_short_as_the_depth_of_the_spot_reads_as_the_summed_waveform() {
 }
 
 #[test]
-fn a_darker_color_walks_only_with_a_fixed_threshold() {
+fn a_darker_color_walks_as_far_as_the_closed_form_says() {
     let p = pulse_sd(4.0);
-    for detector in DETECTORS {
+    for detector in Detector::ALL {
         for (name, reflectivity) in [("white", 0.9), ("pencil_grey", 0.4), ("jet_black", 0.05)] {
             for distance in [0.5, 1.0, 2.0, 4.0] {
                 let mut scene = physical();
                 scene.scanner.sub_rays = 1;
                 scene.detection.detector = detector;
                 let found = forward(&scene, &[filling(distance, 0.0, name)]).expect("it is bright enough");
-                let lead = |h: f64| p * (2.0 * libm::log(h)).sqrt();
-                let expected = match detector {
-                    Detector::LeadingEdge => {
-                        lead(height(0.9, 2.0, 0.0)) - lead(height(reflectivity, distance, 0.0))
-                    }
-                    _ => 0.0,
-                };
+                let expected =
+                    reference(detector, p) - lead(detector, p, height(reflectivity, distance, 0.0));
                 assert!(
                     (found.range() - distance - expected).abs() < 1e-9,
                     "{detector:?}, {name}: {found:?}"
@@ -505,7 +497,7 @@ fn the_guide_states_the_simulated_figures_of_table_3() {
     let guide = include_str!("../../docs/guide/6-physics-of-table-3.md");
     let mut missing = false;
     for (preset, spot) in [(Preset::Ust20lx, "manual"), (Preset::Ust20lxCooper, "Table 1")] {
-        for detector in DETECTORS {
+        for detector in Detector::ALL {
             let mut row = format!("| {} | {spot} |", name_of(detector));
             for distance in [0.5, 1.0, 2.0, 4.0] {
                 let mut scene = physical();
@@ -528,11 +520,8 @@ fn the_guide_states_the_simulated_figures_of_table_3() {
     assert!(!missing, "the guide must contain the rows printed above");
 }
 
-fn name_of(detector: Detector) -> &'static str {
-    match detector {
-        Detector::LeadingEdge => "leading edge",
-        Detector::ConstantFraction => "constant fraction",
-        Detector::Peak => "peak",
-        Detector::Centroid => "centroid",
-    }
+/// Its word in files, as people write it.
+fn name_of(detector: Detector) -> String {
+    let word = serde_json::to_value(detector).expect("a word");
+    word.as_str().expect("a word").replace('_', " ")
 }

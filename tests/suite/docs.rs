@@ -695,3 +695,36 @@ fn every_status_is_explained() {
     let all: BTreeSet<String> = Status::ALL.iter().map(|s| s.word().to_owned()).collect();
     assert_eq!(explained, all);
 }
+
+/// The words of a choice in the scene's schema, or the keys of its tables.
+fn choices(name: &str) -> Vec<String> {
+    let schema = scene::json_schema();
+    let variants = schema["$defs"][name]["oneOf"].as_array().unwrap().clone();
+    let word = |v: &Value| {
+        v["const"]
+            .as_str()
+            .or(v["required"][0].as_str())
+            .unwrap()
+            .to_owned()
+    };
+    variants.iter().map(word).collect()
+}
+
+#[test]
+fn the_guide_names_every_choice() {
+    let guide = |chapter| code_words(&read(chapter)).join(" ");
+    let simulating = guide("docs/guide/3-simulating.md");
+    for name in ["Preset", "Detector", "EchoChoice", "FacetShape"] {
+        for word in choices(name) {
+            assert!(simulating.contains(&word), "{name}: {word}");
+        }
+    }
+    let calibrating = guide("docs/guide/4-calibrating-and-scoring.md");
+    for method in calib::Method::ALL {
+        assert!(calibrating.contains(method.name()), "{method:?}");
+    }
+    let text = read("docs/guide/3-simulating.md");
+    for format in catoptric::files::mesh::MeshFormat::ALL {
+        assert!(text.contains(&format.extension().to_uppercase()), "{format:?}");
+    }
+}

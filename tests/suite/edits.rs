@@ -4,7 +4,6 @@ use crate::scenes::{PROTOTYPE, TWO_MIRROR, scene};
 use catoptric::layout::{Detail, Layout, analyze};
 use catoptric::sim::Scene;
 use catoptric::sim::build::Structure;
-use catoptric::sim::build::layout::corners;
 use catoptric::sim::light::{Edit, Mirrors, Setting};
 use catoptric::sim::receive::Sensor;
 use catoptric::sim::scene::{FacetShape, PolygonShape};
@@ -16,7 +15,7 @@ use proptest::prelude::*;
 fn change(scene: &mut Scene, facet: usize, turn: [f64; 3], shift_mm: [f64; 3], scale: f64) {
     let facets = &mut scene.superstructure.facet;
     let facet = facet % facets.len();
-    let before = corners(&facets[facet].shape, &Default::default()).unwrap();
+    let before = facets[facet].shape.corners(&Default::default()).unwrap();
     let (about, turn) = (before[0], Rotation3::new(Vector3::from(turn)));
     let place = |corner: &Point3<f64>| {
         let placed = about.coords * 1e3 + Vector3::from(shift_mm) + turn * (corner - about) * (1e3 * scale);

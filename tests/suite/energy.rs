@@ -164,12 +164,7 @@ fn forward(scene: &Scene, targets: Vec<Target>) -> (Option<Return>, Vec<SubRayEn
 
 #[test]
 fn light_and_range_are_continuous_through_face_on() {
-    for detector in [
-        Detector::LeadingEdge,
-        Detector::ConstantFraction,
-        Detector::Peak,
-        Detector::Centroid,
-    ] {
+    for detector in Detector::ALL {
         for folded in [false, true] {
             let mut scene = scene(BARE);
             scene.errors.model = ErrorModel::Physical;

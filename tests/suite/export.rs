@@ -254,7 +254,7 @@ fn urdf_frames_are_located_on_the_mirrors() {
 fn the_verb_writes_every_format_and_refuses_what_it_cannot_write() {
     let folder = tempfile::tempdir().unwrap();
     let scene = format!("{}/scenes/two-mirror.toml", env!("CARGO_MANIFEST_DIR"));
-    for format in ["stl", "glb", "csv", "urdf"] {
+    for format in catoptric::ExportFormat::ALL.map(catoptric::ExportFormat::name) {
         let file = format!("two.{format}");
         let output = run(
             folder.path(),

@@ -9,7 +9,6 @@ use crate::scenes::PROTOTYPE;
 use catoptric::files::scene;
 use catoptric::layout::{self, Detail};
 use catoptric::sim::Scene;
-use catoptric::sim::build::layout as shapes;
 use catoptric::sim::scene::FacetShape;
 use nalgebra::Point3;
 
@@ -24,12 +23,7 @@ fn parsed(text: &str, sets: &[&str]) -> Scene {
 fn outlines(scene: &Scene) -> Vec<(String, Vec<Point3<f64>>)> {
     let facets = scene.superstructure.facet.iter();
     facets
-        .map(|f| {
-            (
-                f.name.clone(),
-                shapes::corners(&f.shape, &Default::default()).unwrap(),
-            )
-        })
+        .map(|f| (f.name.clone(), f.shape.corners(&Default::default()).unwrap()))
         .collect()
 }
 
@@ -331,7 +325,11 @@ fn layout_shows_the_corners_it_uses() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let said = stdout(&output);
     let scene = parsed(PARAMETRIC, &["parameters.gap_deg=1"]);
-    let corner = shapes::corners(&scene.superstructure.facet[7].shape, &Default::default()).unwrap()[2] * 1e3;
+    let corner = scene.superstructure.facet[7]
+        .shape
+        .corners(&Default::default())
+        .unwrap()[2]
+        * 1e3;
     let wanted = format!("({:.3}, {:.3}, {:.3})", corner.x, corner.y, corner.z);
     assert!(said.contains(&wanted), "{wanted} is not in {said}");
     let output = run(

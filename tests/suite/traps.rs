@@ -373,13 +373,9 @@ fn same_direction() {
     let scenery = Scenery::new(&scene).unwrap();
     let tracer = scenery.tracer(8).unwrap();
     let (mut compared, mut folded) = (0, 0);
-    for (preset, sub_rays, own) in [
-        (Preset::Ust20lx, 1, false),
-        (Preset::Ust20lx, 19, false),
-        (Preset::Utm30lxEw, 61, false),
-        (Preset::Ust20lxCooper, 256, false),
-        (Preset::Custom, 7, true),
-    ] {
+    let finite = Preset::ALL.into_iter().zip([19, 256, 61, 7].into_iter().cycle());
+    for (preset, sub_rays) in finite.chain([(Preset::Ust20lx, 1)]) {
+        let own = preset == Preset::Custom;
         let mut scene = scene.clone();
         scene.scanner.preset = preset;
         scene.scanner.sub_rays = sub_rays;
@@ -395,13 +391,14 @@ fn same_direction() {
             narrow_aperture_mm: 0.0,
             turns: false,
         });
+        let scan = scene.scanner.scan().unwrap();
         let returns = Laboratory::new(&scene, 1).unwrap().returns(ROOM).unwrap();
         for (index, found) in returns.iter().enumerate() {
             let Some(found) = found.as_ref().filter(|r| (r.share - 1.0).abs() < 1e-12) else {
                 continue;
             };
             let mut vertices = Vec::new();
-            let direction = beam::direction(ust20lx::azimuth(index));
+            let direction = beam::direction(scan.azimuth(index));
             let origin = Point3::new(0.0, 0.0, 2.0);
             assert_eq!(
                 tracer.follow(&Ray { origin, direction }, &mut vertices),

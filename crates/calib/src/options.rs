@@ -1,19 +1,18 @@
 //! Options of a calibration: how far a method iterates, and with which derivatives.
 
-/// How the derivatives of the range equation are formed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum JacobianForm {
-    /// By analytic differentiation of Eq. (6).
-    #[default]
-    Analytic,
-    /// By the central differences of Eq. (7), with δ = 10⁻³ rad.
-    CentralDifference,
+catoptric_model::closed_set! {
+    /// How the derivatives of the range equation are formed.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+    pub enum JacobianForm {
+        /// By analytic differentiation of Eq. (6).
+        #[default]
+        Analytic,
+        /// By the central differences of Eq. (7), with δ = 10⁻³ rad.
+        CentralDifference,
+    }
 }
 
 impl JacobianForm {
-    /// All forms.
-    pub const ALL: [Self; 2] = [Self::Analytic, Self::CentralDifference];
-
     /// The name used in commands.
     pub fn name(self) -> &'static str {
         match self {

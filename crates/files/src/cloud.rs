@@ -3,25 +3,42 @@
 //! Both hold x, y, z in meters as 32-bit floats, the beam as an unsigned 16-bit and the scan as an unsigned 32-bit
 //! integer. The frame is given in a comment of the header.
 
+use super::extension::{by_extension, listed};
 use catoptric_model::cloud::{CloudFrame, CloudPoint, PointCloud};
 use nalgebra::Point3;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// File format of a cloud.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum CloudFormat {
-    /// Stanford's polygon file format.
-    Ply,
-    /// The Point Cloud Library's format.
-    Pcd,
+catoptric_model::closed_set! {
+    /// File format of a cloud.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    pub enum CloudFormat {
+        /// Stanford's polygon file format.
+        Ply,
+        /// The Point Cloud Library's format.
+        Pcd,
+    }
+}
+
+/// One format: a header as text, and the points in the same layout for all.
+struct Row {
+    /// The extension of its files, in lower case.
+    extension: &'static str,
+    /// The last line of the header.
+    last_line: &'static [u8],
+    /// The header for the name of a frame and a number of points.
+    header: fn(&str, usize) -> String,
 }
 
 /// An invalid file name or content of a cloud.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CloudError {
     /// The extension is not that of a supported format.
-    #[error("{}: a cloud is written as .ply or .pcd", path.display())]
+    #[error(
+        "{}: a cloud is written as {}",
+        path.display(),
+        listed(&CloudFormat::ALL, CloudFormat::extension, "or")
+    )]
     UnknownExtension {
         /// The name.
         path: PathBuf,
@@ -38,6 +55,26 @@ const UNIT: &str = "metres";
 pub const POINT_BYTES: usize = 3 * 4 + 2 + 4;
 
 impl CloudFormat {
+    const fn row(self) -> &'static Row {
+        match self {
+            Self::Ply => &Row {
+                extension: "ply",
+                last_line: b"end_header\n",
+                header: ply_header,
+            },
+            Self::Pcd => &Row {
+                extension: "pcd",
+                last_line: b"DATA binary\n",
+                header: pcd_header,
+            },
+        }
+    }
+
+    /// The extension of its files.
+    pub fn extension(self) -> &'static str {
+        self.row().extension
+    }
+
     /// The format selected by a file's extension, in upper or lower case.
     ///
     /// ```
@@ -47,16 +84,11 @@ impl CloudFormat {
     /// ```
     ///
     /// # Errors
-    /// [`CloudError::UnknownExtension`] for any but .ply and .pcd.
+    /// [`CloudError::UnknownExtension`] for any other.
     pub fn of_path(path: &Path) -> Result<Self, CloudError> {
-        let extension = path.extension().map(|e| e.to_ascii_lowercase());
-        match extension.as_ref().and_then(|e| e.to_str()) {
-            Some("ply") => Ok(Self::Ply),
-            Some("pcd") => Ok(Self::Pcd),
-            _ => Err(CloudError::UnknownExtension {
-                path: path.to_owned(),
-            }),
-        }
+        by_extension(path, &Self::ALL, Self::extension).ok_or_else(|| CloudError::UnknownExtension {
+            path: path.to_owned(),
+        })
     }
 }
 
@@ -88,10 +120,7 @@ pub fn cloud_bytes(format: CloudFormat, cloud: &PointCloud) -> io::Result<Vec<u8
 /// [`CloudError::Malformed`] for anything else, including a truncated file.
 pub fn read_cloud(format: CloudFormat, bytes: &[u8]) -> Result<(CloudFrame, Vec<CloudPoint>), CloudError> {
     let malformed = |what: &str| CloudError::Malformed(what.to_owned());
-    let last_line: &[u8] = match format {
-        CloudFormat::Ply => b"end_header\n",
-        CloudFormat::Pcd => b"DATA binary\n",
-    };
+    let last_line = format.row().last_line;
     let end = bytes
         .windows(last_line.len())
         .position(|w| w == last_line)
@@ -111,19 +140,23 @@ pub fn read_cloud(format: CloudFormat, bytes: &[u8]) -> Result<(CloudFrame, Vec<
 
 /// The header of a cloud.
 pub fn cloud_header(format: CloudFormat, frame: CloudFrame, count: usize) -> String {
-    let frame = frame.word();
-    match format {
-        CloudFormat::Ply => format!(
-            "ply\nformat binary_little_endian 1.0\ncomment catoptric, frame {frame}, {UNIT}\n\
-             element vertex {count}\nproperty float x\nproperty float y\nproperty float z\n\
-             property ushort beam\nproperty uint scan\nend_header\n"
-        ),
-        CloudFormat::Pcd => format!(
-            "# .PCD v0.7 - Point Cloud Data file format\n# catoptric, frame {frame}, {UNIT}\nVERSION 0.7\n\
-             FIELDS x y z beam scan\nSIZE 4 4 4 2 4\nTYPE F F F U U\nCOUNT 1 1 1 1 1\nWIDTH {count}\nHEIGHT 1\n\
-             VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {count}\nDATA binary\n"
-        ),
-    }
+    (format.row().header)(frame.word(), count)
+}
+
+fn ply_header(frame: &str, count: usize) -> String {
+    format!(
+        "ply\nformat binary_little_endian 1.0\ncomment catoptric, frame {frame}, {UNIT}\n\
+         element vertex {count}\nproperty float x\nproperty float y\nproperty float z\n\
+         property ushort beam\nproperty uint scan\nend_header\n"
+    )
+}
+
+fn pcd_header(frame: &str, count: usize) -> String {
+    format!(
+        "# .PCD v0.7 - Point Cloud Data file format\n# catoptric, frame {frame}, {UNIT}\nVERSION 0.7\n\
+         FIELDS x y z beam scan\nSIZE 4 4 4 2 4\nTYPE F F F U U\nCOUNT 1 1 1 1 1\nWIDTH {count}\nHEIGHT 1\n\
+         VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {count}\nDATA binary\n"
+    )
 }
 
 /// A point in the layout of both formats.
@@ -189,7 +222,7 @@ mod tests {
 
     #[test]
     fn both_formats_survive_the_round_trip() {
-        for format in [CloudFormat::Ply, CloudFormat::Pcd] {
+        for format in CloudFormat::ALL {
             let given = cloud();
             let bytes = cloud_bytes(format, &given).expect("it fits");
             let (frame, points) = read_cloud(format, &bytes).expect("it is our own");
@@ -220,7 +253,7 @@ mod tests {
 
     #[test]
     fn a_truncated_file_is_rejected() {
-        for format in [CloudFormat::Ply, CloudFormat::Pcd] {
+        for format in CloudFormat::ALL {
             let bytes = cloud_bytes(format, &cloud()).expect("it fits");
             for length in [0, 10, bytes.len() - POINT_BYTES, bytes.len() - 1] {
                 assert!(read_cloud(format, &bytes[..length]).is_err(), "{length} bytes");

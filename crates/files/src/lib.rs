@@ -13,6 +13,7 @@ mod capture;
 #[cfg(feature = "recording")]
 mod container;
 pub mod error;
+mod extension;
 #[cfg(feature = "recording")]
 pub mod file;
 #[cfg(feature = "recording")]

@@ -1,6 +1,7 @@
 //! Rays from CSV (`x_m,y_m,z_m,dx,dy,dz`) or NumPy (N × 6), read in batches; and their paths, written the same way.
 
 use super::error::IoError;
+use super::extension::{by_extension, listed};
 use super::file::StagedOutput;
 use super::npy::{self, Float};
 use catoptric_cast::Ray;
@@ -20,29 +21,35 @@ const PATH_HEADER: &str = "ray,vertex,surface,x_m,y_m,z_m,dx,dy,dz,path_m\n";
 /// the whole path or ∞.
 const PATH_COLUMNS: usize = 3;
 
-/// The format of a file, given by its extension.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
-    /// Text.
-    Csv,
-    /// NumPy array.
-    Npy,
+catoptric_model::closed_set! {
+    /// The format of a file, given by its extension.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum Format {
+        /// Text.
+        Csv,
+        /// NumPy array.
+        Npy,
+    }
 }
 
 impl Format {
     /// The format of a file by its name.
     ///
     /// # Errors
-    /// [`IoError::Content`] if the name ends in neither .csv nor .npy.
+    /// [`IoError::Content`] if the name has the extension of none.
     pub fn of(path: &Path) -> Result<Self, IoError> {
-        let end = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-        match end.as_deref() {
-            Some("csv") => Ok(Self::Csv),
-            Some("npy") => Ok(Self::Npy),
-            _ => Err(IoError::content(
-                path,
-                "is neither .csv nor .npy; the extension determines the format",
-            )),
+        by_extension(path, &Self::ALL, Self::extension).ok_or_else(|| {
+            let known = listed(&Self::ALL, Self::extension, "nor");
+            let message = format!("is neither {known}; the extension determines the format");
+            IoError::content(path, message)
+        })
+    }
+
+    /// The extension of its files.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Csv => "csv",
+            Self::Npy => "npy",
         }
     }
 }

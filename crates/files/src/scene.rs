@@ -45,23 +45,22 @@ pub enum SceneErrors {
     },
 }
 
-/// Built-in scenes to start from, each with a published mirror layout.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Template {
-    /// Eight facets around the scanner, after Cooper's Figure 5.
-    Prototype,
-    /// Two mirrors next to a 270° scanner.
-    TwoMirror,
-    /// Half a hexagonal pyramid in front of the scanner.
-    Pyramid,
-    /// A small mirror that folds eleven beams straight down.
-    Altimeter,
+catoptric_model::closed_set! {
+    /// Built-in scenes to start from, each with a published mirror layout.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum Template {
+        /// Eight facets around the scanner, after Cooper's Figure 5.
+        Prototype,
+        /// Two mirrors next to a 270° scanner.
+        TwoMirror,
+        /// Half a hexagonal pyramid in front of the scanner.
+        Pyramid,
+        /// A small mirror that folds eleven beams straight down.
+        Altimeter,
+    }
 }
 
 impl Template {
-    /// All built-in scenes.
-    pub const ALL: [Self; 4] = [Self::Prototype, Self::TwoMirror, Self::Pyramid, Self::Altimeter];
-
     /// Its name on the command line.
     pub fn name(self) -> &'static str {
         match self {
@@ -69,6 +68,16 @@ impl Template {
             Self::TwoMirror => "two-mirror",
             Self::Pyramid => "pyramid",
             Self::Altimeter => "altimeter",
+        }
+    }
+
+    /// A one-line description.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Prototype => "Eight facets around the scanner",
+            Self::TwoMirror => "Two mirrors on either side of a 270° scanner",
+            Self::Pyramid => "Half a hexagonal pyramid in front of the scanner",
+            Self::Altimeter => "A small mirror that folds eleven beams straight down",
         }
     }
 

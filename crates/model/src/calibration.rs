@@ -13,35 +13,27 @@ use serde::{Deserialize, Serialize};
 /// Version of `calibration.json`. Version 1 had neither `scanner` nor `dataset`.
 pub const SCHEMA_VERSION: u32 = 2;
 
-/// Outcome for an element.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Status {
-    /// θ_a and φ were estimated.
-    Solved,
-    /// No mirror deflects it.
-    Direct,
-    /// Fewer boards than the angles need.
-    TooFewPoses,
-    /// The boards do not determine both angles.
-    Unobservable,
-    /// The iteration did not converge.
-    NotConverged,
-    /// Its readings are not consistent with one beam on one board.
-    Rejected,
+crate::closed_set! {
+    /// Outcome for an element.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Status {
+        /// θ_a and φ were estimated.
+        Solved,
+        /// No mirror deflects it.
+        Direct,
+        /// Fewer boards than the angles need.
+        TooFewPoses,
+        /// The boards do not determine both angles.
+        Unobservable,
+        /// The iteration did not converge.
+        NotConverged,
+        /// Its readings are not consistent with one beam on one board.
+        Rejected,
+    }
 }
 
 impl Status {
-    /// All statuses, in the order of the file format's documentation.
-    pub const ALL: [Self; 6] = [
-        Self::Solved,
-        Self::Direct,
-        Self::TooFewPoses,
-        Self::Unobservable,
-        Self::NotConverged,
-        Self::Rejected,
-    ];
-
     /// The word used in files.
     pub fn word(self) -> &'static str {
         match self {

@@ -3,22 +3,21 @@
 use crate::beam::{self, Deflection};
 use nalgebra::{Point3, Rotation3, Vector3};
 
-/// Frame of a cloud.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum CloudFrame {
-    /// The laser base frame.
-    Sensor,
-    /// The marker body on the superstructure.
-    Rig,
-    /// The frame of motion capture.
-    #[default]
-    Room,
+crate::closed_set! {
+    /// Frame of a cloud.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+    pub enum CloudFrame {
+        /// The laser base frame.
+        Sensor,
+        /// The marker body on the superstructure.
+        Rig,
+        /// The frame of motion capture.
+        #[default]
+        Room,
+    }
 }
 
 impl CloudFrame {
-    /// All frames.
-    pub const ALL: [Self; 3] = [Self::Sensor, Self::Rig, Self::Room];
-
     /// The word used in files and commands.
     pub fn word(self) -> &'static str {
         match self {

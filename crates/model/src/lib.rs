@@ -33,6 +33,7 @@ pub mod bias;
 pub mod board;
 pub mod calibration;
 pub mod characterization;
+mod closed_set;
 pub mod cloud;
 pub mod dataset;
 pub mod error;

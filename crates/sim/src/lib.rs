@@ -7,6 +7,7 @@
 pub mod build;
 pub mod check;
 mod error;
+mod findings;
 pub mod laboratory;
 mod lanes;
 pub mod light;

@@ -59,6 +59,7 @@ const ROOMS: [Room; 16] = [
     ]),
     room("sim", &["model", "cast"]).with_floors(&[
         "error",
+        "findings",
         "lanes",
         "noise",
         "scene",

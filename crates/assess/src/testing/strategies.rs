@@ -56,35 +56,35 @@ pub fn scanners() -> impl Strategy<Value = Scanner> {
         around(2.0, 0.5, -3..=20),
         around(1.0, 0.5, -1..=4),
     );
-    let preset = select(vec![
-        Preset::Ust20lx,
-        Preset::Ust20lxCooper,
-        Preset::Utm30lxEw,
-        Preset::Custom,
-    ]);
-    (preset, select(vec![1_u32, 7, 19]), select(vec![true, false]), own).prop_map(
-        |(preset, sub_rays, housing, (range_max_m, scan_rate_hz, wide, narrow))| {
-            let is_own = preset == Preset::Custom;
-            Scanner {
-                preset,
-                sub_rays,
-                housing,
-                custom: is_own.then_some(Limits {
-                    range_max_m,
-                    scan_rate_hz,
-                    ..Limits::default()
-                }),
-                beam: is_own.then_some(BeamShape {
-                    wide_full_mrad: wide,
-                    narrow_full_mrad: narrow,
-                    wide_aperture_mm: 0.0,
-                    narrow_aperture_mm: 0.0,
-                    turns: true,
-                }),
-                ..base().scanner
-            }
-        },
+    (
+        select(Preset::ALL.to_vec()),
+        select(vec![1_u32, 7, 19]),
+        select(vec![true, false]),
+        own,
     )
+        .prop_map(
+            |(preset, sub_rays, housing, (range_max_m, scan_rate_hz, wide, narrow))| {
+                let is_own = preset == Preset::Custom;
+                Scanner {
+                    preset,
+                    sub_rays,
+                    housing,
+                    custom: is_own.then_some(Limits {
+                        range_max_m,
+                        scan_rate_hz,
+                        ..Limits::default()
+                    }),
+                    beam: is_own.then_some(BeamShape {
+                        wide_full_mrad: wide,
+                        narrow_full_mrad: narrow,
+                        wide_aperture_mm: 0.0,
+                        narrow_aperture_mm: 0.0,
+                        turns: true,
+                    }),
+                    ..base().scanner
+                }
+            },
+        )
 }
 
 /// Rooms in which boards fit in all directions from the rig. The simplest is 7 × 7 × 4.4 m with the rig in the middle.

@@ -132,25 +132,19 @@ fn whole_centimeters(meters: f64) -> f64 {
     (meters * 100.0).round() / 100.0
 }
 
-/// Why a pose is not possible.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Refusal {
-    Range,
-    Room,
-    Rig,
-    Incidence,
-    Unserved,
+catoptric_model::closed_set! {
+    /// Why a pose is not possible.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    enum Refusal {
+        Range,
+        Room,
+        Rig,
+        Incidence,
+        Unserved,
+    }
 }
 
 impl Refusal {
-    const ALL: [Self; 5] = [
-        Self::Range,
-        Self::Room,
-        Self::Rig,
-        Self::Incidence,
-        Self::Unserved,
-    ];
-
     fn words(self) -> &'static str {
         match self {
             Self::Range => "walls, floor or ceiling are nearer than the minimum range",

@@ -2,21 +2,20 @@
 
 use serde::Serialize;
 
-/// The quantity to minimize over the elements of a facet.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Criterion {
-    /// Mean log det of the angles' covariance: the area of the error ellipse.
-    #[default]
-    D,
-    /// Mean trace of the angles' covariance: the mean square error.
-    A,
+catoptric_model::closed_set! {
+    /// The quantity to minimize over the elements of a facet.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Criterion {
+        /// Mean log det of the angles' covariance: the area of the error ellipse.
+        #[default]
+        D,
+        /// Mean trace of the angles' covariance: the mean square error.
+        A,
+    }
 }
 
 impl Criterion {
-    /// All criteria.
-    pub const ALL: [Self; 2] = [Self::D, Self::A];
-
     /// The name used in commands.
     pub fn name(self) -> &'static str {
         match self {

@@ -24,7 +24,7 @@ pub use apply::apply_into;
 pub use calibrate::read_dataset_with;
 pub use calibrate::{calibrate, calibrate_with, characterize};
 #[cfg(feature = "design")]
-pub use export::{Exported, Format as ExportFormat, export, export_boards};
+pub use export::{ExportOptions, Exported, Format as ExportFormat, export, export_boards};
 #[cfg(all(feature = "design", feature = "report"))]
 pub use layout::write_layouts;
 #[cfg(feature = "design")]

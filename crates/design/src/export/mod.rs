@@ -42,15 +42,37 @@ pub use urdf::urdf;
 use crate::layout::{Drawing, plate_thickness};
 use catoptric_sim::Scene;
 
-/// A selection of solids.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
-    /// The mirrors as plates.
-    Mirrors,
-    /// The scene's posts, and a frame that holds the mirrors.
-    Frame,
-    /// Both.
-    All,
+catoptric_model::closed_set! {
+    /// A selection of solids.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum Part {
+        /// The mirrors as plates.
+        Mirrors,
+        /// The scene's posts, and a frame that holds the mirrors.
+        Frame,
+        /// Both.
+        All,
+    }
+}
+
+impl Part {
+    /// The name used in commands.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mirrors => "mirrors",
+            Self::Frame => "frame",
+            Self::All => "all",
+        }
+    }
+
+    /// A one-line description.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::Mirrors => "The mirrors as plates",
+            Self::Frame => "The posts and a frame that holds the mirrors",
+            Self::All => "Both",
+        }
+    }
 }
 
 /// Returns the selected solids of a layout, each closed, in the sensor frame.

@@ -24,26 +24,28 @@ use serde::Serialize;
 /// Reflectivity of the dark target for which data sheets state ranges.
 pub const DARK: f64 = 0.1;
 
-/// How an element's light ends.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Class {
-    /// All of it passes by the structure.
-    Direct,
-    /// All of it leaves by one facet.
-    Deflected,
-    /// All of it leaves after more than one facet.
-    MultiBounce,
-    /// An edge divides it between paths.
-    Split,
-    /// All of it ends on the structure without hitting a mirror first.
-    HitsStructure,
-    /// All of it hits a mirror and then ends on the structure.
-    Shaded,
-    /// All of it is still between mirrors after the last bounce allowed.
-    Trapped,
-    /// It leaves, but even a white target returns too little of it.
-    TooFaint,
+catoptric_model::closed_set! {
+    /// How an element's light ends.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Class {
+        /// All of it passes by the structure.
+        Direct,
+        /// All of it leaves by one facet.
+        Deflected,
+        /// All of it leaves after more than one facet.
+        MultiBounce,
+        /// An edge divides it between paths.
+        Split,
+        /// All of it ends on the structure without hitting a mirror first.
+        HitsStructure,
+        /// All of it hits a mirror and then ends on the structure.
+        Shaded,
+        /// All of it is still between mirrors after the last bounce allowed.
+        Trapped,
+        /// It leaves, but even a white target returns too little of it.
+        TooFaint,
+    }
 }
 
 /// One element of the scan.
@@ -112,18 +114,6 @@ impl Traced {
 }
 
 impl Class {
-    /// All classes.
-    pub const ALL: [Self; 8] = [
-        Self::Direct,
-        Self::Deflected,
-        Self::MultiBounce,
-        Self::Split,
-        Self::HitsStructure,
-        Self::Shaded,
-        Self::Trapped,
-        Self::TooFaint,
-    ];
-
     /// Whether such an element has a direction of its own.
     pub fn sees(self) -> bool {
         matches!(self, Self::Direct | Self::Deflected | Self::MultiBounce)

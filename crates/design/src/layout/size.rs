@@ -4,7 +4,6 @@ use catoptric_cast::area_vector;
 use catoptric_cast::volume;
 use catoptric_sim::Scene;
 use catoptric_sim::build::Structure;
-use catoptric_sim::scene::Preset;
 use nalgebra::{Point3, Vector3};
 use serde::Serialize;
 
@@ -73,12 +72,7 @@ pub(crate) fn size(scene: &Scene, structure: &Structure) -> Size {
         mirror_mass_g: 1e3 * mirror_mass,
         post_mass_g: 1e3 * post_mass,
         structure_mass_g: 1e3 * (mirror_mass + post_mass),
-        scanner_mass_g: match scene.scanner.preset {
-            // Data sheets: about 130 g and 210 g.
-            Preset::Ust20lx | Preset::Ust20lxCooper => Some(130.0),
-            Preset::Utm30lxEw => Some(210.0),
-            Preset::Custom => None,
-        },
+        scanner_mass_g: scene.scanner.preset.mass_g(),
     }
 }
 

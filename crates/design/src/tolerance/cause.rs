@@ -3,31 +3,24 @@
 use catoptric_sim::Scene;
 use catoptric_sim::scene::AsBuilt;
 
-/// A kind of error.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cause {
-    /// Facets are turned.
-    Tilt,
-    /// Facets are shifted.
-    Shift,
-    /// Mirrors are thicker or thinner than specified.
-    Thickness,
-    /// Mirrors have slope errors.
-    Flatness,
-    /// The scanner is misaligned in its housing.
-    Mount,
+catoptric_model::closed_set! {
+    /// A kind of error.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum Cause {
+        /// Facets are turned.
+        Tilt,
+        /// Facets are shifted.
+        Shift,
+        /// Mirrors are thicker or thinner than specified.
+        Thickness,
+        /// Mirrors have slope errors.
+        Flatness,
+        /// The scanner is misaligned in its housing.
+        Mount,
+    }
 }
 
 impl Cause {
-    /// All kinds.
-    pub const ALL: [Self; 5] = [
-        Self::Tilt,
-        Self::Shift,
-        Self::Thickness,
-        Self::Flatness,
-        Self::Mount,
-    ];
-
     /// Its name in files and for people.
     pub fn name(self) -> &'static str {
         match self {

@@ -1,32 +1,51 @@
 //! Mesh files: STL, OBJ and PLY, as text and binary; and a lossless PLY writer.
 //!
-//! The extension determines the format. Damaged files give an error that names the line, or the byte in a binary file;
-//! no content can crash the reader, and sizes stated in a file are not trusted before the bytes are read. Polygons of
-//! more than three corners are split into a fan.
+//! The extension determines the format: to add one, write its file with its row, and add its variant to [`MeshFormat`].
+//! Damaged files give an error that names the line, or the byte in a binary file; no content can crash the reader, and
+//! sizes stated in a file are not trusted before the bytes are read. Polygons of more than three corners are split into a
+//! fan.
 
 mod obj;
 mod ply;
+mod row;
 mod stl;
 
 pub use ply::to_ply;
 
 use super::error::IoError;
+use super::extension::{by_extension, listed};
 use catoptric_sim::Mesh;
-use nalgebra::Point3;
+use row::{Fault, Row};
 use std::fs;
 use std::path::Path;
 
-/// Location of an error in a file.
-enum Fault {
-    /// In a line, from 1.
-    Line(usize, String),
-    /// At a byte, from 0.
-    Byte(usize, String),
-    /// As a whole.
-    Whole(String),
+catoptric_model::closed_set! {
+    /// A format of mesh files.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum MeshFormat {
+        /// Triangles without shared vertices, as text or binary.
+        Stl,
+        /// Vertices and faces as text.
+        Obj,
+        /// Stanford's polygon file format, as text or binary.
+        Ply,
+    }
 }
 
-type Parsed = Result<Mesh, Fault>;
+impl MeshFormat {
+    const fn row(self) -> &'static Row {
+        match self {
+            Self::Stl => &stl::ROW,
+            Self::Obj => &obj::ROW,
+            Self::Ply => &ply::ROW,
+        }
+    }
+
+    /// The extension of its files.
+    pub fn extension(self) -> &'static str {
+        self.row().extension
+    }
+}
 
 /// Reads a mesh in the unit of its file.
 ///
@@ -54,16 +73,12 @@ pub fn read_mesh(path: impl AsRef<Path>) -> Result<Mesh, IoError> {
 /// As [`read_mesh`].
 pub fn parse_mesh(bytes: &[u8], path: impl AsRef<Path>) -> Result<Mesh, IoError> {
     let path = path.as_ref();
-    let end = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    let parsed = match end.as_deref() {
-        Some("stl") => stl::parse(bytes),
-        Some("obj") => obj::parse(bytes),
-        Some("ply") => ply::parse(bytes),
-        _ => Err(Fault::Whole(
-            "is no mesh that can be read; .stl, .obj and .ply can".to_owned(),
-        )),
+    let Some(format) = by_extension(path, &MeshFormat::ALL, MeshFormat::extension) else {
+        let known = listed(&MeshFormat::ALL, MeshFormat::extension, "and");
+        let message = format!("is no mesh that can be read; {known} can");
+        return Err(IoError::content(path, message));
     };
-    parsed.map_err(|fault| match fault {
+    (format.row().parse)(bytes).map_err(|fault| match fault {
         Fault::Line(line, message) => IoError::Text {
             path: path.to_owned(),
             line,
@@ -79,113 +94,14 @@ pub fn parse_mesh(bytes: &[u8], path: impl AsRef<Path>) -> Result<Mesh, IoError>
     })
 }
 
-fn finish(vertices: Vec<Point3<f64>>, triangles: Vec<[u32; 3]>) -> Parsed {
-    Mesh::new(vertices, triangles).map_err(|e| Fault::Whole(e.to_string()))
-}
-
-/// Three numbers of a line, all finite.
-fn triple<'a>(
-    words: &mut impl Iterator<Item = &'a str>,
-    line: usize,
-    what: &str,
-) -> Result<Point3<f64>, Fault> {
-    let mut number = || -> Result<f64, Fault> {
-        let word = words
-            .next()
-            .ok_or_else(|| Fault::Line(line, format!("{what} takes three numbers")))?;
-        let value: f64 = word
-            .parse()
-            .map_err(|_| Fault::Line(line, format!("{word:?} is not a number")))?;
-        if value.is_finite() {
-            Ok(value)
-        } else {
-            Err(Fault::Line(line, format!("{word} is not finite")))
-        }
-    };
-    Ok(Point3::new(number()?, number()?, number()?))
-}
-
-/// Numbered lines of text, from 1; invalid UTF-8 becomes replacement characters, which no number contains.
-fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()))
-}
-
-/// A polygon as triangles that share its first corner.
-fn fan(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> {
-    corners
-        .windows(2)
-        .skip(1)
-        .map(|pair| [corners[0], pair[0], pair[1]])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     /// The same tetrahedron in every format.
     fn files() -> Vec<(&'static str, Vec<u8>)> {
-        let corners = [
-            [0.0f32, 0.0, 0.0],
-            [1.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0],
-            [0.0, 0.0, 0.5],
-        ];
-        let faces = [[0usize, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
-        let mut stl_binary = vec![b's'; 80];
-        stl_binary[..5].copy_from_slice(b"solid");
-        stl_binary.extend(4u32.to_le_bytes());
-        let mut stl_text = "solid t\n".to_owned();
-        let mut obj = "# a tetrahedron\n".to_owned();
-        let mut vertices = String::new();
-        let mut indices = String::new();
-        let (mut little, mut big) = (Vec::new(), Vec::new());
-        for [x, y, z] in corners {
-            obj.push_str(&format!("v {x} {y} {z}\n"));
-            vertices.push_str(&format!("{x} {y} {z}\n"));
-            little.extend([x, y, z].iter().flat_map(|c| c.to_le_bytes()));
-            big.extend([x, y, z].iter().flat_map(|c| c.to_be_bytes()));
-        }
-        for face in faces {
-            stl_binary.extend([0; 12]);
-            stl_text.push_str("facet normal 0 0 0\nouter loop\n");
-            for i in face {
-                let [x, y, z] = corners[i];
-                stl_binary.extend(corners[i].iter().flat_map(|c| c.to_le_bytes()));
-                stl_text.push_str(&format!("vertex {x} {y} {z}\n"));
-            }
-            stl_binary.extend([0; 2]);
-            stl_text.push_str("endloop\nendfacet\n");
-            obj.push_str(&format!(
-                "f {}/1 {}//2 -{}\n",
-                face[0] + 1,
-                face[1] + 1,
-                4 - face[2]
-            ));
-            indices.push_str(&format!("3 {} {} {}\n", face[0], face[1], face[2]));
-            little.push(3);
-            big.push(3);
-            for i in face {
-                let i = i32::try_from(i).expect("small");
-                little.extend(i.to_le_bytes());
-                big.extend(i.to_be_bytes());
-            }
-        }
-        stl_text.push_str("endsolid t\n");
-        let header = |format: &str| {
-            format!(
-                "ply\nformat {format} 1.0\ncomment c\nelement vertex 4\nproperty float x\nproperty float y\n\
-                 property float z\nelement face 4\nproperty list uchar int vertex_indices\nend_header\n"
-            )
-        };
-        let ply = |format, body: &[u8]| [header(format).as_bytes(), body].concat();
-        vec![
-            ("b.stl", stl_binary),
-            ("t.stl", stl_text.into_bytes()),
-            ("t.obj", obj.into_bytes()),
-            ("t.ply", ply("ascii", (vertices + &indices).as_bytes())),
-            ("l.ply", ply("binary_little_endian", &little)),
-            ("b.ply", ply("binary_big_endian", &big)),
-        ]
+        let samples = MeshFormat::ALL.map(|format| (format.row().samples)());
+        samples.into_iter().flatten().collect()
     }
 
     fn corners_of(mesh: &Mesh) -> Vec<[[f64; 3]; 3]> {
@@ -198,6 +114,10 @@ mod tests {
 
     #[test]
     fn every_format_holds_the_same_mesh() {
+        for format in MeshFormat::ALL {
+            let ours = |(name, _): &(&str, _)| name.ends_with(&format!(".{}", format.extension()));
+            assert!((format.row().samples)().iter().all(ours), "{format:?}");
+        }
         let meshes: Vec<_> = files()
             .iter()
             .map(|(name, bytes)| parse_mesh(bytes, name).unwrap_or_else(|e| panic!("{e}")))
@@ -215,7 +135,7 @@ mod tests {
             for cut in 0..bytes.len() {
                 let said = parse_mesh(&bytes[..cut], name);
                 // Text may be cut in a comment, between two faces or in the last number.
-                let is_binary = name.starts_with('b') || name.starts_with('l');
+                let is_binary = !name.starts_with("text");
                 assert!(!is_binary || said.is_err(), "{name} cut at {cut}");
             }
             for at in 0..bytes.len() {
@@ -242,8 +162,11 @@ mod tests {
             )
             .contains("no properties")
         );
-        let cut = &files()[4].1;
+        let (_, cut) = (ply::ROW.samples)().swap_remove(1);
         assert!(said(&cut[..cut.len() - 1], "a.ply").contains("ends before its last element"));
-        assert!(said(b"x", "a.step").contains(".stl, .obj and .ply"));
+        let unknown = said(b"x", "a.step");
+        for format in MeshFormat::ALL {
+            assert!(unknown.contains(&format!(".{}", format.extension())), "{unknown}");
+        }
     }
 }

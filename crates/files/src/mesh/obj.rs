@@ -1,9 +1,16 @@
 //! OBJ: the vertices and faces of a text file; everything else is ignored.
 
-use super::{Fault, Parsed, fan, finish, lines, triple};
+use super::row::{Fault, Parsed, Row, fan, finish, lines, triple};
+
+pub(super) const ROW: Row = Row {
+    extension: "obj",
+    parse,
+    #[cfg(test)]
+    samples: tests::samples,
+};
 
 /// Reads a file.
-pub(super) fn parse(bytes: &[u8]) -> Parsed {
+fn parse(bytes: &[u8]) -> Parsed {
     let text = String::from_utf8_lossy(bytes);
     let mut vertices = Vec::new();
     let mut triangles = Vec::new();
@@ -45,4 +52,20 @@ fn index(word: &str, count: usize) -> Result<u32, String> {
         .filter(|i| (0..count).contains(i))
         .and_then(|i| u32::try_from(i).ok())
         .ok_or_else(|| format!("there is no vertex {value} yet; there are {count}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::mesh::row::{CORNERS, FACES};
+
+    pub(super) fn samples() -> Vec<(&'static str, Vec<u8>)> {
+        let mut text = "# a tetrahedron\n".to_owned();
+        for [x, y, z] in CORNERS {
+            text.push_str(&format!("v {x} {y} {z}\n"));
+        }
+        for [a, b, c] in FACES {
+            text.push_str(&format!("f {}/1 {}//2 -{}\n", a + 1, b + 1, 4 - c));
+        }
+        vec![("text.obj", text.into_bytes())]
+    }
 }

@@ -1,8 +1,15 @@
 //! PLY: a header of elements and their properties, then numbers as text or in either byte order.
 
-use super::{Fault, Parsed, fan, finish};
+use super::row::{Fault, Parsed, Row, fan, finish};
 use catoptric_sim::Mesh;
 use nalgebra::Point3;
+
+pub(super) const ROW: Row = Row {
+    extension: "ply",
+    parse,
+    #[cfg(test)]
+    samples: tests::samples,
+};
 
 /// A mesh as a binary PLY file of 64-bit numbers, which reads back as the same mesh.
 pub fn to_ply(mesh: &Mesh) -> Vec<u8> {
@@ -164,7 +171,7 @@ impl Body<'_> {
 }
 
 /// Reads a file of any encoding.
-pub(super) fn parse(bytes: &[u8]) -> Parsed {
+fn parse(bytes: &[u8]) -> Parsed {
     let (encoding, elements, start, line) = header(bytes)?;
     let mut body = Body {
         bytes,
@@ -290,4 +297,41 @@ fn header(bytes: &[u8]) -> Result<(Encoding, Vec<Element>, usize, usize), Fault>
         }
     }
     Err(Fault::Whole("it has no end".to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::mesh::row::{CORNERS, FACES};
+
+    pub(super) fn samples() -> Vec<(&'static str, Vec<u8>)> {
+        let mut text = String::new();
+        let (mut little, mut big) = (Vec::new(), Vec::new());
+        for [x, y, z] in CORNERS {
+            text.push_str(&format!("{x} {y} {z}\n"));
+            little.extend([x, y, z].iter().flat_map(|c| c.to_le_bytes()));
+            big.extend([x, y, z].iter().flat_map(|c| c.to_be_bytes()));
+        }
+        for [a, b, c] in FACES {
+            text.push_str(&format!("3 {a} {b} {c}\n"));
+            little.push(3);
+            big.push(3);
+            for i in [a, b, c] {
+                let i = i32::try_from(i).expect("small");
+                little.extend(i.to_le_bytes());
+                big.extend(i.to_be_bytes());
+            }
+        }
+        let file = |format: &str, body: &[u8]| {
+            let header = format!(
+                "ply\nformat {format} 1.0\ncomment c\nelement vertex 4\nproperty float x\nproperty float y\n\
+                 property float z\nelement face 4\nproperty list uchar int vertex_indices\nend_header\n"
+            );
+            [header.as_bytes(), body].concat()
+        };
+        vec![
+            ("text.ply", file("ascii", text.as_bytes())),
+            ("little.ply", file("binary_little_endian", &little)),
+            ("big.ply", file("binary_big_endian", &big)),
+        ]
+    }
 }

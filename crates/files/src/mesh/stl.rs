@@ -1,8 +1,15 @@
 //! STL: triangles without shared vertices, as text or binary.
 
-use super::{Fault, Parsed, finish, lines, triple};
+use super::row::{Fault, Parsed, Row, finish, lines, triple};
 use nalgebra::Point3;
 use std::collections::HashMap;
+
+pub(super) const ROW: Row = Row {
+    extension: "stl",
+    parse,
+    #[cfg(test)]
+    samples: tests::samples,
+};
 
 /// Merges vertices with exactly equal coordinates, since the format does not share vertices between triangles.
 #[derive(Default)]
@@ -34,7 +41,7 @@ const STL_HEADER: usize = 84;
 const STL_TRIANGLE: usize = 50;
 
 /// Reads a text or binary file.
-pub(super) fn parse(bytes: &[u8]) -> Parsed {
+fn parse(bytes: &[u8]) -> Parsed {
     let count = bytes
         .get(80..STL_HEADER)
         .and_then(|b| b.try_into().ok())
@@ -124,4 +131,29 @@ fn text(text: &str) -> Parsed {
         ));
     }
     finish(welder.vertices, triangles)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::mesh::row::{CORNERS, FACES};
+
+    pub(super) fn samples() -> Vec<(&'static str, Vec<u8>)> {
+        let mut binary = vec![b's'; 80];
+        binary[..5].copy_from_slice(b"solid");
+        binary.extend(4u32.to_le_bytes());
+        let mut text = "solid t\n".to_owned();
+        for face in FACES {
+            binary.extend([0; 12]);
+            text.push_str("facet normal 0 0 0\nouter loop\n");
+            for i in face {
+                let [x, y, z] = CORNERS[i];
+                binary.extend(CORNERS[i].iter().flat_map(|c| c.to_le_bytes()));
+                text.push_str(&format!("vertex {x} {y} {z}\n"));
+            }
+            binary.extend([0; 2]);
+            text.push_str("endloop\nendfacet\n");
+        }
+        text.push_str("endsolid t\n");
+        vec![("binary.stl", binary), ("text.stl", text.into_bytes())]
+    }
 }

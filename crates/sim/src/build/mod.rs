@@ -2,7 +2,6 @@
 
 pub(crate) mod board;
 pub mod color;
-pub mod layout;
 pub mod pattern;
 pub(crate) mod room;
 pub(crate) mod stage;

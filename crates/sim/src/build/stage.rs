@@ -3,9 +3,9 @@
 //! They are exactly where the scene places them. Every ray cast into the room can hit them; the drawing of the
 //! structure, its beams and the truth about them do not include them.
 
-use crate::build::layout;
 use crate::build::structure::{BuiltFacet, OpaquePart, mesh_shape};
 use crate::error::SimError;
+use crate::scene::facet::outline::rectangle;
 use crate::scene::{PlaneRectangle, PlaneShape, RoomMirror, RoomSurface, Scene, SurfaceShape};
 use catoptric_cast::{Block, Cylinder, Polygon, Shape};
 use catoptric_model::Pose;
@@ -104,7 +104,7 @@ pub(crate) fn plane_corners(shape: &PlaneShape) -> Option<Vec<Point3<f64>>> {
 }
 
 pub(crate) fn rectangle_corners(shape: &PlaneRectangle) -> Option<Vec<Point3<f64>>> {
-    layout::rectangle(
+    rectangle(
         Point3::from(shape.center_m),
         shape.normal.into(),
         [shape.width_m, shape.height_m],

@@ -4,7 +4,6 @@
 //! and the laser's own frame is slightly off in its housing: in the true sensor frame, everything bolted to the housing
 //! moves accordingly.
 
-use crate::build::layout;
 use crate::error::SimError;
 use crate::noise::{Draws, Purpose};
 use crate::scene::{Facet, Glass, MeshShape, Post, PostShape, Scene};
@@ -281,8 +280,10 @@ fn build_facet(
         reason: reason.to_owned(),
     };
     let scan = scene.scanner.scan()?;
-    let drawn =
-        layout::corners(&facet.shape, &scan).ok_or_else(|| fail("no plane mirror fits its description"))?;
+    let drawn = facet
+        .shape
+        .corners(&scan)
+        .ok_or_else(|| fail("no plane mirror fits its description"))?;
     let as_built = &scene.superstructure.as_built;
     let error = seed_and_index.map_or_else(Pose::identity, |(seed, index)| {
         let mut draws = Draws::new(seed, Purpose::FacetPose, index);

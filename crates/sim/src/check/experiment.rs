@@ -1,9 +1,9 @@
 //! Checks of room and procedure: whether everything fits in the room, and whether beams hit the boards.
 
-use super::findings::{Findings, suggestion};
 use super::outline::{Meets, Obstacles, nominal_room_from_sensor};
-use super::structure::{reach, rounded};
 use crate::build::board::{before_beam, stands_in};
+use crate::findings::{Findings, suggestion};
+use crate::scene::facet::outline::{reach, rounded};
 use crate::scene::{Board, BoardPose, Scene, SensorTest};
 use catoptric_model::frame::yaw_pitch_roll;
 use catoptric_model::place::Path;
@@ -86,7 +86,7 @@ fn check_rig(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
         return;
     }
     for (i, facet) in scene.superstructure.facet.iter().enumerate() {
-        let corners = crate::build::layout::corners(&facet.shape, scan).unwrap_or_default();
+        let corners = facet.shape.corners(scan).unwrap_or_default();
         let beyond = corners
             .iter()
             .find_map(|c| outside(&(room_from_sensor * c), &room.size_m));

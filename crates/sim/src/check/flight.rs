@@ -1,12 +1,11 @@
 //! Checks of flights: increasing times, at least one whole scan, unambiguous turns, and a trajectory inside the room.
 
 use super::experiment::{outside, room_extent};
-use super::findings::Findings;
-use super::structure::rounded;
 use super::values::distinct;
-use crate::build::layout;
 use crate::build::structure;
 use crate::build::trajectory::{self, Trajectory};
+use crate::findings::Findings;
+use crate::scene::facet::outline::rounded;
 use crate::scene::{Flight, Scene};
 use catoptric_model::ScanGeometry;
 use catoptric_model::place::Path;
@@ -108,7 +107,7 @@ fn check_trajectory(scene: &Scene, scan: &ScanGeometry, flight: &Flight, path: &
     let mut parts = vec![("rig".to_owned(), Point3::origin())];
     parts.push(("sensor".to_owned(), rig_from_sensor * Point3::origin()));
     for facet in &scene.superstructure.facet {
-        let corners = layout::corners(&facet.shape, scan).unwrap_or_default();
+        let corners = facet.shape.corners(scan).unwrap_or_default();
         parts.extend(
             corners
                 .iter()

@@ -1,8 +1,8 @@
 //! Checks of mishaps: each is exactly one thing that can happen. Whether its pose is recorded with a board is checked
 //! by the setup.
 
-use super::findings::{Findings, suggestion};
 use crate::build::board::board_markers;
+use crate::findings::{Findings, suggestion};
 use crate::scene::{Mishap, Scene};
 use catoptric_model::place::Path;
 

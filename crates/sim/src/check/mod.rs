@@ -5,7 +5,6 @@
 //! are small compared with everything that is rejected here.
 
 mod experiment;
-mod findings;
 mod flight;
 mod mishap;
 mod outline;
@@ -15,9 +14,9 @@ mod values;
 
 pub use outline::{Outline, ServedFacet, outline};
 
+use crate::findings::Findings;
 use crate::scene::Scene;
 use catoptric_model::place::{Path, Problem};
-use findings::Findings;
 
 /// All problems of a scene.
 pub fn problems(scene: &Scene) -> Vec<Problem> {

@@ -1,9 +1,8 @@
 //! What every beam hits in the drawing.
 
-use crate::build::layout;
 use crate::build::room::room_from_rig;
 use crate::build::structure;
-use crate::scene::Scene;
+use crate::scene::{FacetShape, Scene};
 use catoptric_cast::Ray;
 use catoptric_cast::Shape;
 use catoptric_model::beam;
@@ -161,7 +160,7 @@ impl Block {
 impl Obstacles {
     pub(super) fn of(scene: &Scene, scan: &ScanGeometry) -> Self {
         let drawn = &scene.superstructure;
-        let face = |shape| layout::corners(shape, scan).and_then(Face::new);
+        let face = |shape: &FacetShape| shape.corners(scan).and_then(Face::new);
         let facets = drawn.facet.iter().map(|f| face(&f.shape)).collect();
         let posts = drawn.post.iter().map(|post| match (post.size_mm, &post.shape) {
             (Some(size), None) => {

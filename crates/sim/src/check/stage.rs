@@ -1,10 +1,10 @@
 //! Checks of mirrors and surfaces fixed in the room, of the mirror material, and of whether the scene contains enough
 //! to simulate.
 
-use super::findings::Findings;
-use super::structure::check_outline;
 use super::values::distinct;
 use crate::build::stage;
+use crate::findings::Findings;
+use crate::scene::facet::outline::check_outline;
 use crate::scene::{PlaneRectangle, PlaneShape, Scene, SurfaceShape};
 use catoptric_model::place::Path;
 use nalgebra::{Point3, Vector3};

@@ -1,7 +1,7 @@
 //! Checks of names, colors, tables and pairs of limits.
 
-use super::findings::{Findings, suggestion};
 use crate::build::color;
+use crate::findings::{Findings, suggestion};
 use crate::scene::{Detector, EchoChoice, MocapProfile, NoiseTable, Preset, Principle, Scene};
 use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::place::Path;
@@ -174,8 +174,8 @@ fn detection(scene: &Scene, found: &mut Findings) {
     let path = Path::of("detection");
     if detection.principle == Principle::Phase {
         let pulsed = [
-            ("detector", detection.detector != Detector::LeadingEdge),
-            ("echo", detection.echo != EchoChoice::First),
+            ("detector", detection.detector != Detector::default()),
+            ("echo", detection.echo != EchoChoice::default()),
             (
                 "saturation_over_threshold",
                 detection.saturation_over_threshold > 0.0,
@@ -199,13 +199,20 @@ fn detection(scene: &Scene, found: &mut Findings) {
     }
     let limits = scene.scanner.limits();
     if detection.echo == EchoChoice::All && limits.echoes < 2 {
+        let several = (Preset::ALL.into_iter())
+            .filter(|preset| preset.limits().echoes > 1)
+            .map(|preset| format!("{:?}", preset.name()));
+        let several: Vec<String> = several.collect();
         found.add(
             &path.key("echo"),
             format_args!(
                 "is \"all\", but the scanner {:?} reports only one echo",
                 scene.scanner.preset.name()
             ),
-            "use the preset \"utm-30lx-ew\", or \"custom\" with `scanner.custom.echoes`".to_owned(),
+            format!(
+                "use the preset {}, or \"custom\" with `scanner.custom.echoes`",
+                several.join(" or ")
+            ),
         );
     }
     let own_markers = scene.mocap.profile == MocapProfile::Custom;

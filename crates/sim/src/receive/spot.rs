@@ -49,8 +49,7 @@ impl Sensor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Scene;
-    use catoptric_model::ScanGeometry;
+    use crate::scene::{Preset, Scene};
     use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
     fn sensor(preset: &str, sub_rays: usize) -> Sensor {
@@ -70,18 +69,13 @@ mod tests {
 
     #[test]
     fn a_face_on_spot_is_the_beams_own_contour_and_two_steps() {
-        for (preset, shape) in [
-            ("ust-20lx", crate::scene::Preset::Ust20lx.beam_shape()),
-            (
-                "ust-20lx-cooper",
-                crate::scene::Preset::Ust20lxCooper.beam_shape(),
-            ),
-        ] {
+        for preset in Preset::ALL.into_iter().filter(|p| *p != Preset::Custom) {
+            let (shape, step_deg, preset) = (preset.beam_shape(), preset.limits().step_deg, preset.name());
             for range in [0.5, 4.0] {
                 let [width, height] = sensor(preset, 61).spot(&ahead(range, 0.0), 3).expect("it is met");
                 let half = |full_mrad: f64| libm::tan(0.5e-3 * full_mrad);
-                let wide = 2.0 * range * half(shape.wide_full_mrad)
-                    + 2.0 * range * libm::tan(ScanGeometry::default().step());
+                let wide =
+                    2.0 * range * half(shape.wide_full_mrad) + 2.0 * range * libm::tan(step_deg.to_radians());
                 let high = 1e-3 * shape.narrow_aperture_mm + 2.0 * range * half(shape.narrow_full_mrad);
                 // The outer two beams hit the board 0.25° off its normal, and the spot rotates by as much.
                 assert!(

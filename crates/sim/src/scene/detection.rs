@@ -3,45 +3,51 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What the time of flight is measured from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Principle {
-    /// A short pulse.
-    #[default]
-    Pulsed,
-    /// The phase of light whose amplitude is modulated: one range per beam, ambiguous by c/2f.
-    Phase,
+catoptric_model::closed_set! {
+    /// What the time of flight is measured from.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Principle {
+        /// A short pulse.
+        #[default]
+        Pulsed,
+        /// The phase of light whose amplitude is modulated: one range per beam, ambiguous by c/2f.
+        Phase,
+    }
 }
 
-/// Which point of an echo is taken for the range.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Detector {
-    /// Where it rises through a fixed threshold: a weaker pulse reads longer.
-    #[default]
-    LeadingEdge,
-    /// Where it rises through a fraction of its own height.
-    ConstantFraction,
-    /// Its highest point, or the middle of a top that is clipped by saturation.
-    Peak,
-    /// Its centroid.
-    Centroid,
+catoptric_model::closed_set! {
+    /// Which point of an echo is taken for the range.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Detector {
+        /// Where it rises through a fixed threshold: a weaker pulse reads longer.
+        #[default]
+        LeadingEdge,
+        /// Where it rises through a fraction of its own height.
+        ConstantFraction,
+        /// Its highest point, or the middle of a top that is clipped by saturation.
+        Peak,
+        /// Its centroid.
+        Centroid,
+    }
 }
 
-/// Which of a beam's echoes is reported.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum EchoChoice {
-    /// The nearest.
-    #[default]
-    First,
-    /// The highest.
-    Strongest,
-    /// The farthest.
-    Last,
-    /// The nearest in `/scan`, and every echo that the scanner can report in `/echoes`.
-    All,
+catoptric_model::closed_set! {
+    /// Which of a beam's echoes is reported.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+    #[serde(rename_all = "snake_case")]
+    pub enum EchoChoice {
+        /// The nearest.
+        #[default]
+        First,
+        /// The highest.
+        Strongest,
+        /// The farthest.
+        Last,
+        /// The nearest in `/scan`, and every echo that the scanner can report in `/echoes`.
+        All,
+    }
 }
 
 /// From received light to a range.

@@ -6,6 +6,7 @@
 mod body;
 mod detection;
 mod errors;
+pub(crate) mod facet;
 mod flight;
 mod meshes;
 mod mishap;
@@ -16,6 +17,7 @@ mod preset;
 mod room;
 mod scanner;
 mod shape;
+mod sheet;
 mod superstructure;
 mod test;
 
@@ -24,18 +26,18 @@ pub use body::{
 };
 pub use detection::{Detection, Detector, EchoChoice, Principle};
 pub use errors::{Characterization, Correlated, ErrorModel, Errors, Interference, NoiseTable, WarmUp};
+pub use facet::{Facet, FacetShape, Plate, PolygonShape, RectangleShape, Wedge};
 pub use flight::{Attitude, Flight, Waypoint};
 pub use meshes::Meshes;
 pub use mishap::{Mishap, Mislabelled};
 pub use parameter::Parameter;
 pub use pattern::{CopyList, Exchange, FacetCopy, MirrorImage, Pattern, Ring};
+pub use preset::Preset;
 pub use room::{Board, BoardPose, Color, Design, Experiment, MarkerNoise, Mocap, MocapProfile, Room};
-pub use scanner::{BeamShape, HousingBox, Light, Limits, Mount, Preset, Scanner};
+pub use scanner::{Light, Mount, Scanner};
 pub use shape::{MeshShape, MeshUnits, PostCylinder, PostShape};
-pub use superstructure::{
-    AsBuilt, Facet, FacetShape, Glass, Marker, Mirror, Plate, PolygonShape, Post, RectangleShape,
-    Superstructure, Wedge,
-};
+pub use sheet::{BeamShape, HousingBox, Limits};
+pub use superstructure::{AsBuilt, Glass, Marker, Mirror, Post, Superstructure};
 pub use test::SensorTest;
 
 use schemars::JsonSchema;

@@ -1,7 +1,108 @@
 //! The scanner's presets: numbers from data sheets, and from Cooper's Table 1.
+//!
+//! To add a preset, add its variant, and its data with their sources to the table.
 
-use super::scanner::{BeamShape, HousingBox, Limits, Preset, Scanner};
-use catoptric_model::{ScanAngles, ScanDirection, ScanError, ScanGeometry};
+use super::sheet::{BeamShape, HousingBox, Limits};
+use catoptric_model::ScanDirection;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+catoptric_model::closed_set! {
+    /// The model of the scanner.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+    pub enum Preset {
+        /// Hokuyo UST-20LX with the spot given in its manual: 160 × 25 mm at 10 m.
+        #[serde(rename = "ust-20lx")]
+        Ust20lx,
+        /// The same with the spot of Cooper's Table 1, read as three neighboring beams.
+        #[serde(rename = "ust-20lx-cooper")]
+        Ust20lxCooper,
+        /// Hokuyo UTM-30LX-EW: up to three echoes per beam, 30 m. Its spot is assumed to be the UST-20LX's.
+        #[serde(rename = "utm-30lx-ew")]
+        Utm30lxEw,
+        /// A custom scanner: `scanner.custom` and `scanner.beam`. Its beams are the 1081 of the others, 0.25° apart.
+        #[serde(rename = "custom")]
+        Custom,
+    }
+}
+
+/// What is known of a scanner.
+struct Data {
+    /// The name used in files.
+    name: &'static str,
+    /// What it can report, and when.
+    limits: Limits,
+    /// Boxes of its housing in the sensor frame.
+    housing: &'static [HousingBox],
+    /// Shape of a beam.
+    beam: BeamShape,
+    /// Mass in grams, if it is known.
+    mass_g: Option<f64>,
+}
+
+impl Preset {
+    /// The table of the presets.
+    const fn data(self) -> &'static Data {
+        match self {
+            Self::Ust20lx => &Data {
+                name: "ust-20lx",
+                limits: UST_20LX,
+                housing: &UST_20LX_HOUSING,
+                beam: MANUAL_SPOT,
+                mass_g: UST_20LX_MASS,
+            },
+            Self::Ust20lxCooper => &Data {
+                name: "ust-20lx-cooper",
+                limits: UST_20LX,
+                housing: &UST_20LX_HOUSING,
+                beam: TABLE_1_SPOT,
+                mass_g: UST_20LX_MASS,
+            },
+            Self::Utm30lxEw => &Data {
+                name: "utm-30lx-ew",
+                limits: UTM_30LX_EW,
+                housing: &UTM_30LX_EW_HOUSING,
+                // No spot is published for it, which is of the same maker and wavelength: assumed equal.
+                beam: MANUAL_SPOT,
+                // Data sheet: about 210 g.
+                mass_g: Some(210.0),
+            },
+            // The scene defines its limits and its beam; these are defaults.
+            Self::Custom => &Data {
+                name: "custom",
+                limits: UST_20LX,
+                housing: &UST_20LX_HOUSING,
+                beam: MANUAL_SPOT,
+                mass_g: None,
+            },
+        }
+    }
+
+    /// The name used in files.
+    pub fn name(self) -> &'static str {
+        self.data().name
+    }
+
+    /// What the scanner can report.
+    pub fn limits(self) -> Limits {
+        self.data().limits
+    }
+
+    /// Boxes of its housing in the sensor frame. A custom scanner without boxes has those of the UST-20LX.
+    pub fn housing(self) -> &'static [HousingBox] {
+        self.data().housing
+    }
+
+    /// Shape of a beam. A custom scanner defines its own.
+    pub fn beam_shape(self) -> BeamShape {
+        self.data().beam
+    }
+
+    /// Mass in grams; `None` for a custom scanner.
+    pub fn mass_g(self) -> Option<f64> {
+        self.data().mass_g
+    }
+}
 
 /// Limits of the UST-20LX (data sheet): 40 Hz, 20 m, one echo. Its accuracy is specified from 60 mm on, but it reports
 /// ranges from 21 mm on.
@@ -53,97 +154,28 @@ const UTM_30LX_EW_HOUSING: [HousingBox; 2] = [
     },
 ];
 
-impl Preset {
-    /// The name used in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Ust20lx => "ust-20lx",
-            Self::Ust20lxCooper => "ust-20lx-cooper",
-            Self::Utm30lxEw => "utm-30lx-ew",
-            Self::Custom => "custom",
-        }
-    }
+/// Mass of the UST-20LX, in grams (data sheet: about 130 g).
+const UST_20LX_MASS: Option<f64> = Some(130.0);
 
-    /// What the scanner can report.
-    pub fn limits(self) -> Limits {
-        match self {
-            Self::Ust20lx | Self::Ust20lxCooper | Self::Custom => UST_20LX,
-            Self::Utm30lxEw => UTM_30LX_EW,
-        }
-    }
+/// Spot of the UST-20LX: 160 × 25 mm at 10 m to the front, 25 × 160 mm to the side (Hokuyo's manual).
+const MANUAL_SPOT: BeamShape = BeamShape {
+    wide_full_mrad: 16.0,
+    narrow_full_mrad: 2.5,
+    wide_aperture_mm: 0.0,
+    narrow_aperture_mm: 0.0,
+    turns: true,
+};
 
-    /// Boxes of its housing in the sensor frame. A custom scanner without boxes has those of the UST-20LX.
-    pub fn housing(self) -> &'static [HousingBox] {
-        match self {
-            Self::Ust20lx | Self::Ust20lxCooper | Self::Custom => &UST_20LX_HOUSING,
-            Self::Utm30lxEw => &UTM_30LX_EW_HOUSING,
-        }
-    }
-
-    /// Shape of a beam.
-    pub fn beam_shape(self) -> BeamShape {
-        match self {
-            // 160 × 25 mm at 10 m to the front, 25 × 160 mm to the side (Hokuyo's manual). No spot is published for the
-            // UTM-30LX-EW, of the same maker and wavelength: assumed equal. A custom scanner defines its own.
-            Self::Ust20lx | Self::Utm30lxEw | Self::Custom => BeamShape {
-                wide_full_mrad: 16.0,
-                narrow_full_mrad: 2.5,
-                wide_aperture_mm: 0.0,
-                narrow_aperture_mm: 0.0,
-                turns: true,
-            },
-            // Table 1 as the union of three neighbors: width 33.6 mrad·R minus two steps of 0.25°, height 3.0 mm + 0.85
-            // mrad·R. The interpretation as a union is assumed. 33.6 mrad is the slope through the origin of all widths
-            // except that at 2 m, which is 12 mm below the line between its neighbors at 1 m and 3 m.
-            Self::Ust20lxCooper => BeamShape {
-                wide_full_mrad: 24.9,
-                narrow_full_mrad: 0.85,
-                wide_aperture_mm: 0.0,
-                narrow_aperture_mm: 3.0,
-                turns: true,
-            },
-        }
-    }
-}
-
-impl Scanner {
-    /// Shape of a beam: the scene's, otherwise the preset's.
-    pub fn beam_shape(&self) -> BeamShape {
-        self.beam.unwrap_or_else(|| self.preset.beam_shape())
-    }
-
-    /// Boxes of the housing in the sensor frame: none, the scene's, or otherwise the preset's.
-    pub fn housing_boxes(&self) -> &[HousingBox] {
-        match (self.housing, &self.housing_box) {
-            (false, _) => &[],
-            (true, Some(boxes)) => boxes,
-            (true, None) => self.preset.housing(),
-        }
-    }
-
-    /// What the scanner can report: the scene's limits for a custom scanner, otherwise the preset's.
-    pub fn limits(&self) -> Limits {
-        match self.preset {
-            Preset::Custom => self.custom.unwrap_or(UST_20LX),
-            preset => preset.limits(),
-        }
-    }
-
-    /// How it scans.
-    ///
-    /// # Errors
-    /// [`ScanError`] names the first number under `scanner.custom` that no scan can have.
-    pub fn scan(&self) -> Result<ScanGeometry, ScanError> {
-        let limits = self.limits();
-        let angles = ScanAngles {
-            first_deg: limits.first_deg,
-            step_deg: limits.step_deg,
-            beams: limits.beams as usize,
-            direction: limits.direction,
-        };
-        ScanGeometry::new(angles, limits.scan_rate_hz, limits.beam_time_us)
-    }
-}
+/// Table 1 as the union of three neighbors: width 33.6 mrad·R minus two steps of 0.25°, height 3.0 mm + 0.85 mrad·R. The
+/// interpretation as a union is assumed. 33.6 mrad is the slope through the origin of all widths except that at 2 m, which
+/// is 12 mm below the line between its neighbors at 1 m and 3 m.
+const TABLE_1_SPOT: BeamShape = BeamShape {
+    wide_full_mrad: 24.9,
+    narrow_full_mrad: 0.85,
+    wide_aperture_mm: 0.0,
+    narrow_aperture_mm: 3.0,
+    turns: true,
+};
 
 impl Default for Limits {
     fn default() -> Self {
@@ -151,17 +183,11 @@ impl Default for Limits {
     }
 }
 
-impl Limits {
-    /// Time from the start of one scan to the start of the next, in seconds.
-    pub fn scan_period_s(&self) -> f64 {
-        1.0 / self.scan_rate_hz
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Mount;
+    use crate::scene::{Mount, Scanner};
+    use catoptric_model::ScanGeometry;
 
     /// Extents of all boxes together.
     fn extents(boxes: &[HousingBox]) -> [f64; 3] {
@@ -178,11 +204,11 @@ mod tests {
 
     #[test]
     fn housings_are_as_large_as_their_data_sheets_say_and_leave_the_scan_plane_free() {
-        for (preset, size) in [
-            (Preset::Ust20lx, [50.0, 50.0, 70.0]),
-            (Preset::Ust20lxCooper, [50.0, 50.0, 70.0]),
-            (Preset::Utm30lxEw, [62.0, 62.0, 87.5]),
-        ] {
+        for preset in Preset::ALL {
+            let size = match preset {
+                Preset::Ust20lx | Preset::Ust20lxCooper | Preset::Custom => [50.0, 50.0, 70.0],
+                Preset::Utm30lxEw => [62.0, 62.0, 87.5],
+            };
             assert_eq!(extents(preset.housing()), size, "{preset:?}");
             for part in preset.housing() {
                 assert!(
@@ -194,8 +220,22 @@ mod tests {
     }
 
     #[test]
-    fn the_presets_scan_as_the_default_does() {
-        for preset in [Preset::Ust20lx, Preset::Ust20lxCooper, Preset::Utm30lxEw] {
+    fn every_preset_has_its_word_in_files() {
+        for preset in Preset::ALL {
+            let word = toml::Value::try_from(preset).expect("a word");
+            assert_eq!(word.as_str(), Some(preset.name()));
+        }
+    }
+
+    #[test]
+    fn the_presets_scan_as_their_data_sheets_say() {
+        for preset in Preset::ALL {
+            let expected = match preset {
+                // All of Hokuyo's scan 1081 beams in steps of 0.25°, 40 times a second.
+                Preset::Ust20lx | Preset::Ust20lxCooper | Preset::Utm30lxEw | Preset::Custom => {
+                    ScanGeometry::default()
+                }
+            };
             let scanner = Scanner {
                 preset,
                 sub_rays: 1,
@@ -205,7 +245,7 @@ mod tests {
                 housing_box: None,
                 mount: Mount::default(),
             };
-            assert_eq!(scanner.scan(), Ok(ScanGeometry::default()), "{preset:?}");
+            assert_eq!(scanner.scan(), Ok(expected), "{preset:?}");
         }
     }
 

@@ -1,5 +1,6 @@
 //! What is built around the scanner: mirrors, posts, markers, and their deviations from the drawing.
 
+use super::facet::Facet;
 use super::omit::{is_false, is_zero};
 use super::pattern::Pattern;
 use super::shape::PostShape;
@@ -50,118 +51,6 @@ impl Default for Superstructure {
             max_bounces: four(),
         }
     }
-}
-
-/// A plane mirror.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Facet {
-    /// Name.
-    pub name: String,
-    /// Its outline.
-    pub shape: FacetShape,
-    /// Whether the back of its body, `mirror.thickness_mm` behind the face, reflects too.
-    #[serde(default, skip_serializing_if = "is_false")]
-    pub two_sided: bool,
-}
-
-/// Outline of a facet.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum FacetShape {
-    /// Bounded by two azimuths and two heights, and oriented so that its middle beam leaves in a given direction.
-    Wedge(Wedge),
-    /// A rectangle around one beam, oriented so that the beam leaves in a given direction, or with a given normal.
-    Plate(Plate),
-    /// A rectangle with a given center and normal.
-    Rectangle(RectangleShape),
-    /// Given corners.
-    Polygon(PolygonShape),
-}
-
-/// A facet between two azimuths.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Wedge {
-    /// First and last azimuth, in degrees, the smaller first.
-    #[schemars(inner(range(min = -360.0, max = 360.0)))]
-    pub azimuth_deg: [f64; 2],
-    /// Distance from the sensor origin along the middle azimuth, in millimeters.
-    #[schemars(range(min = 1.0, max = 10000.0))]
-    pub distance_mm: f64,
-    /// Azimuth in which the middle beam leaves, in degrees.
-    #[schemars(range(min = -360.0, max = 360.0))]
-    pub exit_azimuth_deg: f64,
-    /// Elevation in which the middle beam leaves, in degrees.
-    #[schemars(range(min = -90.0, max = 90.0))]
-    pub exit_elevation_deg: f64,
-    /// Height of the facet, centered on the scan plane, in millimeters.
-    #[schemars(range(min = 0.1, max = 10000.0))]
-    pub height_mm: f64,
-}
-
-/// A rectangle around one beam: `azimuth_deg` or `beam`, and either both `exit_` or both `normal_` angles.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Plate {
-    /// Azimuth of the beam that hits its center, in degrees.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = -180.0, max = 180.0))]
-    pub azimuth_deg: Option<f64>,
-    /// The same beam by its index.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = 0, max = 35999))]
-    pub beam: Option<u32>,
-    /// Distance from the sensor origin to its center, in millimeters.
-    #[schemars(range(min = 1.0, max = 10000.0))]
-    pub distance_mm: f64,
-    /// Azimuth in which that beam leaves, in degrees.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = -360.0, max = 360.0))]
-    pub exit_azimuth_deg: Option<f64>,
-    /// Elevation in which that beam leaves, in degrees.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = -90.0, max = 90.0))]
-    pub exit_elevation_deg: Option<f64>,
-    /// Yaw: azimuth of the normal of the reflecting side, in degrees.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = -360.0, max = 360.0))]
-    pub normal_azimuth_deg: Option<f64>,
-    /// Pitch: elevation of that normal, in degrees.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = -90.0, max = 90.0))]
-    pub normal_elevation_deg: Option<f64>,
-    /// Extent parallel to the scan plane, in millimeters.
-    #[schemars(range(min = 0.1, max = 10000.0))]
-    pub width_mm: f64,
-    /// Extent along the other side, in millimeters.
-    #[schemars(range(min = 0.1, max = 10000.0))]
-    pub height_mm: f64,
-}
-
-/// A rectangular facet.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct RectangleShape {
-    /// Center, in millimeters.
-    pub center_mm: [f64; 3],
-    /// Normal of the reflecting side; any length.
-    pub normal: [f64; 3],
-    /// Extent parallel to the scan plane, in millimeters.
-    #[schemars(range(min = 0.1, max = 10000.0))]
-    pub width_mm: f64,
-    /// Extent along the other side, in millimeters.
-    #[schemars(range(min = 0.1, max = 10000.0))]
-    pub height_mm: f64,
-}
-
-/// A facet with given corners.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct PolygonShape {
-    /// Corners of a convex plane polygon, in millimeters, counter-clockwise seen from the reflecting side.
-    #[schemars(length(min = 3))]
-    pub corners_mm: Vec<[f64; 3]>,
 }
 
 /// An opaque body: a box with `size_mm`, or another `shape`.

@@ -1,21 +1,8 @@
 //! Expands patterns into facets: rings, mirror images, lists of copies.
-//!
-//! A copy has the same kind of shape as its original, with other numbers, so that the mirror image of a wedge is a
-//! readable wedge:
-//!
-//! ```text
-//! left and right:  y → −y      azimuths α → −α, in reverse order
-//! up and down:     z → −z      elevations ε → −ε
-//! rotation by τ:               azimuths α → α + τ
-//! ```
 
-use crate::build::layout::plate_azimuth_deg;
-use crate::scene::{Exchange, Facet, FacetShape, Pattern, Scene};
+use crate::scene::{Exchange, Facet, Pattern, Scene};
 use catoptric_model::ScanGeometry;
 use catoptric_model::place::{Path, Problem, Segment, nearest};
-
-/// Part of a step within which a beam is another one's mirror image: what rounding leaves.
-const SAME_PART_OF_STEP: f64 = 1e-6;
 
 /// A scene with its patterns expanded, and the origin of its facets.
 #[derive(Debug, Clone, PartialEq)]
@@ -140,51 +127,9 @@ fn find<'a>(facets: &'a [Facet], name: &str, path: &Path) -> Result<&'a Facet, P
 
 /// A facet seen in a mirror, or in two one after the other.
 pub fn mirrored(facet: &Facet, name: String, across: &[Exchange], scan: &ScanGeometry) -> Facet {
-    let image = |shape: FacetShape, exchange: &Exchange| match exchange {
-        Exchange::LeftRight => left_right(shape, scan),
-        Exchange::UpDown => up_down(shape),
-    };
-    Facet {
-        name,
-        shape: across.iter().fold(facet.shape.clone(), image),
-        two_sided: facet.two_sided,
-    }
-}
-
-/// A facet turned about the scanner's axis, counter-clockwise, by an angle in degrees.
-pub fn turned(facet: &Facet, name: String, turn_deg: f64, scan: &ScanGeometry) -> Facet {
-    let (sin, cos) = libm::sincos(turn_deg.to_radians());
-    let turn = |[x, y, z]: [f64; 3]| [cos * x - sin * y, sin * x + cos * y, z];
-    let around = |azimuth: f64| {
-        let azimuth = azimuth + turn_deg;
-        azimuth - 360.0 * (azimuth / 360.0).round()
-    };
     let mut shape = facet.shape.clone();
-    match &mut shape {
-        FacetShape::Wedge(wedge) => {
-            let middle = 0.5 * (wedge.azimuth_deg[0] + wedge.azimuth_deg[1]);
-            // Both by the same amount, which keeps the width of the wedge.
-            let by = around(middle) - middle;
-            wedge.azimuth_deg = wedge.azimuth_deg.map(|a| a + by);
-            wedge.exit_azimuth_deg = around(wedge.exit_azimuth_deg);
-        }
-        FacetShape::Plate(plate) => {
-            if let Some(azimuth) = plate_azimuth_deg(plate, scan) {
-                plate.azimuth_deg = Some(around(azimuth));
-                plate.beam = None;
-            }
-            plate.exit_azimuth_deg = plate.exit_azimuth_deg.map(around);
-            plate.normal_azimuth_deg = plate.normal_azimuth_deg.map(around);
-        }
-        FacetShape::Rectangle(rectangle) => {
-            rectangle.center_mm = turn(rectangle.center_mm);
-            rectangle.normal = turn(rectangle.normal);
-        }
-        FacetShape::Polygon(polygon) => {
-            for corner in &mut polygon.corners_mm {
-                *corner = turn(*corner);
-            }
-        }
+    for exchange in across {
+        shape.exchange(*exchange, scan);
     }
     Facet {
         name,
@@ -193,63 +138,15 @@ pub fn turned(facet: &Facet, name: String, turn_deg: f64, scan: &ScanGeometry) -
     }
 }
 
-fn left_right(mut shape: FacetShape, scan: &ScanGeometry) -> FacetShape {
-    match &mut shape {
-        FacetShape::Wedge(wedge) => {
-            let [first, last] = wedge.azimuth_deg;
-            wedge.azimuth_deg = [-last, -first];
-            wedge.exit_azimuth_deg = -wedge.exit_azimuth_deg;
-        }
-        FacetShape::Plate(plate) => {
-            plate.azimuth_deg = plate.azimuth_deg.map(|a| -a);
-            if let Some(beam) = plate.beam {
-                plate.beam = opposite(beam, scan);
-                if plate.beam.is_none() {
-                    plate.azimuth_deg = Some(-scan.azimuth_deg(beam as usize));
-                }
-            }
-            plate.exit_azimuth_deg = plate.exit_azimuth_deg.map(|a| -a);
-            plate.normal_azimuth_deg = plate.normal_azimuth_deg.map(|a| -a);
-        }
-        FacetShape::Rectangle(rectangle) => {
-            rectangle.center_mm[1] = -rectangle.center_mm[1];
-            rectangle.normal[1] = -rectangle.normal[1];
-        }
-        FacetShape::Polygon(polygon) => reflect_corners(&mut polygon.corners_mm, 1),
+/// A facet turned about the scanner's axis, counter-clockwise, by an angle in degrees.
+pub fn turned(facet: &Facet, name: String, turn_deg: f64, scan: &ScanGeometry) -> Facet {
+    let mut shape = facet.shape.clone();
+    shape.turn(turn_deg, scan);
+    Facet {
+        name,
+        shape,
+        two_sided: facet.two_sided,
     }
-    shape
-}
-
-/// The beam whose azimuth is the opposite of another one's, if the scan has it.
-fn opposite(beam: u32, scan: &ScanGeometry) -> Option<u32> {
-    let azimuth = -scan.azimuth(beam as usize);
-    let found = scan.nearest(azimuth)?;
-    let off = (scan.place(azimuth) - found as f64).abs();
-    u32::try_from(found).ok().filter(|_| off < SAME_PART_OF_STEP)
-}
-
-fn up_down(mut shape: FacetShape) -> FacetShape {
-    match &mut shape {
-        FacetShape::Wedge(wedge) => wedge.exit_elevation_deg = -wedge.exit_elevation_deg,
-        FacetShape::Plate(plate) => {
-            plate.exit_elevation_deg = plate.exit_elevation_deg.map(|e| -e);
-            plate.normal_elevation_deg = plate.normal_elevation_deg.map(|e| -e);
-        }
-        FacetShape::Rectangle(rectangle) => {
-            rectangle.center_mm[2] = -rectangle.center_mm[2];
-            rectangle.normal[2] = -rectangle.normal[2];
-        }
-        FacetShape::Polygon(polygon) => reflect_corners(&mut polygon.corners_mm, 2),
-    }
-    shape
-}
-
-/// Reflects the corners and reverses their order, since a reflection reverses the orientation.
-fn reflect_corners(corners: &mut [[f64; 3]], axis: usize) {
-    for corner in corners.iter_mut() {
-        corner[axis] = -corner[axis];
-    }
-    corners.reverse();
 }
 
 #[cfg(test)]

@@ -1,12 +1,8 @@
-//! Compares copies with closed forms: reflected and rotated corners.
+//! Patterns are expanded in order, and refused if they cannot be.
 
 use super::*;
-use crate::build::layout;
-use crate::scene::Plate;
-use crate::scene::{CopyList, FacetCopy, MirrorImage, PolygonShape, RectangleShape, Ring, Wedge};
-use catoptric_cast::area_vector;
-use catoptric_model::beam;
-use nalgebra::{Point3, Rotation3, Vector3};
+use crate::scene::facet::tests::samples;
+use crate::scene::{CopyList, FacetCopy, FacetShape, MirrorImage, Ring};
 
 fn facet(name: &str, shape: FacetShape) -> Facet {
     Facet {
@@ -16,130 +12,13 @@ fn facet(name: &str, shape: FacetShape) -> Facet {
     }
 }
 
-fn corners(shape: &FacetShape) -> Option<Vec<Point3<f64>>> {
-    layout::corners(shape, &ScanGeometry::default())
-}
-
-fn plate() -> Plate {
-    Plate {
-        azimuth_deg: None,
-        beam: Some(800),
-        distance_mm: 64.0,
-        exit_azimuth_deg: Some(48.0),
-        exit_elevation_deg: Some(35.0),
-        normal_azimuth_deg: None,
-        normal_elevation_deg: None,
-        width_mm: 17.0,
-        height_mm: 12.0,
-    }
-}
-
-/// One shape of each kind, without symmetry.
-fn shapes() -> Vec<FacetShape> {
-    let wedge = FacetShape::Wedge(Wedge {
-        azimuth_deg: [62.0, 77.0],
-        distance_mm: 64.0,
-        exit_azimuth_deg: 60.0,
-        exit_elevation_deg: 50.0,
-        height_mm: 12.0,
-    });
-    let by_normal = FacetShape::Plate(Plate {
-        azimuth_deg: Some(70.0),
-        beam: None,
-        exit_azimuth_deg: None,
-        exit_elevation_deg: None,
-        normal_azimuth_deg: Some(-121.0),
-        normal_elevation_deg: Some(-37.0),
-        ..plate()
-    });
-    let rectangle = FacetShape::Rectangle(RectangleShape {
-        center_mm: [-19.89, 66.89, 1.5],
-        normal: [0.45, -0.33, -0.4036],
-        width_mm: 70.2,
-        height_mm: 30.0,
-    });
-    let polygon = FacetShape::Polygon(PolygonShape {
-        corners_mm: vec![[30.0, 60.0, -6.0], [40.0, 50.0, -6.0], [35.0, 55.0, 9.0]],
-    });
-    vec![wedge, FacetShape::Plate(plate()), by_normal, rectangle, polygon]
-}
-
-/// Whether two outlines have the same corners in the same cyclic order, wherever the lists begin.
-fn same_outline(found: &[Point3<f64>], wanted: &[Point3<f64>]) -> bool {
-    let near = |start: usize| {
-        (0..wanted.len()).all(|i| (found[(start + i) % found.len()] - wanted[i]).norm() < 1e-15)
-    };
-    found.len() == wanted.len() && (0..found.len()).any(near)
-}
-
-#[test]
-fn a_mirror_image_has_the_reflected_corners() {
-    for (exchange, sign) in [
-        (Exchange::LeftRight, Vector3::new(1.0, -1.0, 1.0)),
-        (Exchange::UpDown, Vector3::new(1.0, 1.0, -1.0)),
-    ] {
-        for shape in shapes() {
-            let own = corners(&shape).expect("it is a mirror");
-            let image = mirrored(
-                &facet("a", shape.clone()),
-                "b".to_owned(),
-                &[exchange],
-                &ScanGeometry::default(),
-            );
-            let found = corners(&image.shape).expect("so is its image");
-            // A reflection turns counter-clockwise order into clockwise order.
-            let reflected = own
-                .iter()
-                .rev()
-                .map(|c| Point3::from(c.coords.component_mul(&sign)));
-            let wanted: Vec<Point3<f64>> = reflected.collect();
-            assert!(
-                same_outline(&found, &wanted),
-                "{exchange:?} {shape:?}: {found:?} {wanted:?}"
-            );
-        }
-    }
-}
-
-#[test]
-fn a_turned_facet_has_the_turned_corners() {
-    for turn in [-97.0_f64, 30.0, 145.0, 300.0] {
-        let rotation = Rotation3::from_axis_angle(&Vector3::z_axis(), turn.to_radians());
-        for shape in shapes() {
-            let own = corners(&shape).expect("it is a mirror");
-            let copy = turned(&facet("a", shape), "b".to_owned(), turn, &ScanGeometry::default());
-            let found = corners(&copy.shape).expect("so is its copy");
-            for (found, own) in found.iter().zip(&own) {
-                assert!((found - rotation * own).norm() < 1e-14, "{turn} {found} {own}");
-            }
-        }
-    }
-}
-
-#[test]
-fn a_plate_sends_its_beam_in_the_requested_direction() {
-    let corners = corners(&FacetShape::Plate(plate())).expect("it is a mirror");
-    let normal = nalgebra::Unit::new_normalize(area_vector(&corners));
-    let plane = catoptric_model::MirrorPlane::through(corners[0], normal);
-    let azimuth = ScanGeometry::default().azimuth(800);
-    let deflection = plane
-        .deflect(beam::direction(azimuth))
-        .expect("it faces the scanner");
-    let wanted = beam::spherical(48.0_f64.to_radians(), 35.0_f64.to_radians());
-    assert!(beam::angle_between(&deflection.exit_direction(azimuth), &wanted) < 1e-14);
-    assert!((deflection.distance - 0.064).abs() < 1e-15);
-    let center = corners.iter().map(|c| c.coords).sum::<Vector3<f64>>() / 4.0;
-    assert!((center - beam::direction(azimuth).into_inner() * 0.064).norm() < 1e-15);
-    assert!(((corners[1] - corners[0]).norm() - 0.017).abs() < 1e-15);
-}
-
 fn scene_with(patterns: Vec<Pattern>) -> Scene {
     let mut scene: Scene = toml::from_str(
         "schema_version = 1
 name = \"copies\"",
     )
     .expect("it is a scene");
-    scene.superstructure.facet = vec![facet("petal", shapes().remove(0))];
+    scene.superstructure.facet = vec![facet("petal", samples().swap_remove(0))];
     scene.superstructure.pattern = patterns;
     scene
 }

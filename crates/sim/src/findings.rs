@@ -4,11 +4,11 @@ use catoptric_model::place::{Path, Problem, nearest};
 use std::fmt;
 
 /// The problems found so far.
-pub(super) struct Findings(pub(super) Vec<Problem>);
+pub(crate) struct Findings(pub(crate) Vec<Problem>);
 
 impl Findings {
     /// Records a problem; the message continues from the name of the key.
-    pub(super) fn add(&mut self, path: &Path, message: impl fmt::Display, help: impl Into<Option<String>>) {
+    pub(crate) fn add(&mut self, path: &Path, message: impl fmt::Display, help: impl Into<Option<String>>) {
         self.0.push(Problem {
             path: path.clone(),
             message: format!("`{path}` {message}"),
@@ -18,7 +18,7 @@ impl Findings {
 }
 
 /// Asks "did you mean …?" for a close name, or lists the known ones.
-pub(super) fn suggestion<'a>(
+pub(crate) fn suggestion<'a>(
     found: &str,
     what: &str,
     names: impl IntoIterator<Item = &'a str> + Clone,
