@@ -1,9 +1,9 @@
 //! `catoptric calibrate`: estimates a calibration from a dataset. The truth is never read.
 
-use super::Context;
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print, quoted};
+use super::{Context, Reading};
 use catoptric::calib::{JacobianForm, Options};
 use catoptric::model::Status;
 use catoptric::{Calibration, Method, calibrate_with, read_characterization, write_json};
@@ -39,10 +39,12 @@ pub(crate) struct Arguments {
         default_value = JacobianForm::default().name()
     )]
     jacobian: JacobianForm,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let mut dataset = context.read_dataset(&arguments.dataset)?;
+    let mut dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
     context.check()?;
     if let Some(path) = &arguments.characterization {
         let found = read_characterization(path)?;
@@ -64,7 +66,8 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let begin = Instant::now();
     let calibration = calibrate_with(&dataset, method, &options, &context.control())?;
     context.detail(&format!("calibrated in {:.2} s", begin.elapsed().as_secs_f64()));
-    for warning in &calibration.warnings {
+    let known = |warning: &&String| !dataset.warnings.contains(warning);
+    for warning in calibration.warnings.iter().filter(known) {
         context.say(&format!("warning: {warning}"));
     }
     write_json(&arguments.out, &calibration)?;

@@ -1,9 +1,9 @@
 //! `catoptric compare`: tabulates several calibrations of one dataset, ours and third-party ones.
 
-use super::Context;
 use super::error::CliError;
 use super::output::{counted, print};
 use super::score::figure;
+use super::{Context, Reading};
 use catoptric::compare::{CONTRADICTION, Row};
 use catoptric::score::Honesty;
 use catoptric::{Comparison, Contestant, Error, compare, read_calibration_for, read_truth};
@@ -21,11 +21,13 @@ pub(crate) struct Arguments {
     /// Print the table as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 /// Succeeds whatever the verdicts are; judging a single calibration is up to `score`.
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let dataset = context.read_dataset(&arguments.dataset)?;
+    let dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
     let truth = read_truth(&arguments.dataset)?;
     let contestants: Vec<Contestant> = arguments
         .calibrations

@@ -1,10 +1,10 @@
 //! `catoptric demo`: simulates, calibrates, scores and reports on the built-in scene.
 
-use super::Context;
 use super::calibrate::summary;
 use super::error::CliError;
 use super::output::{counted, grouped, print, quoted};
 use super::score::figure;
+use super::{Context, Reading};
 use catoptric::apply::{CloudSketch, Lift};
 use catoptric::calib::Options;
 use catoptric::files;
@@ -56,7 +56,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let figures = simulate_into(&scene, &dataset_folder, &recording, &control)?;
 
     context.say("reading the dataset back");
-    let dataset = context.read_dataset(&dataset_folder)?;
+    let dataset = context.read_dataset(&dataset_folder, Reading::default())?;
     let truth = read_truth(&dataset_folder)?;
     let mut results = Vec::new();
     let mut lines = Vec::new();

@@ -88,6 +88,12 @@ fn help(error: &Error) -> Option<String> {
         Error::Setup(SimError::Placement { .. }) => {
             Some("use a larger room, a smaller board, or a shorter experiment.range_m".to_owned())
         }
+        Error::File(IoError::Damaged { .. }) => {
+            Some("--partial leaves out what is damaged and uses the rest".to_owned())
+        }
+        Error::File(IoError::Changed { path, .. }) if path.extension().is_some_and(|e| e == "mcap") => {
+            Some("--partial uses what can be read of it nevertheless".to_owned())
+        }
         Error::File(IoError::Exists { .. }) => Some("use --replace or another --out".to_owned()),
         other => other.help(),
     }

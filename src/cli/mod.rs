@@ -27,7 +27,7 @@ mod tolerance;
 mod trace;
 mod validate;
 
-use catoptric::{Control, Dataset, Stop, read_dataset_with};
+use catoptric::{Control, Damage, Dataset, Stop, read_dataset_with};
 use clap::{ArgAction, Args, Parser, Subcommand};
 use error::CliError;
 use progress::Reporter;
@@ -119,6 +119,14 @@ pub(crate) struct Context {
     reporter: Arc<Reporter>,
 }
 
+/// How a dataset is read.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub(crate) struct Reading {
+    /// Leave out the damaged stretches of a recording, with the reason, and use the rest
+    #[arg(long)]
+    partial: bool,
+}
+
 impl Context {
     /// The control of a long verb: it stops on Ctrl-C and reports progress on stderr.
     fn control(&self) -> Control {
@@ -130,9 +138,19 @@ impl Context {
         }
     }
 
-    /// Reads a dataset; Ctrl-C stops that, and every later pass over its readings.
-    fn read_dataset(&self, folder: &Path) -> Result<Dataset, CliError> {
-        Ok(read_dataset_with(folder, &self.control())?)
+    /// Reads a dataset, and says what was unusual in its recording. Ctrl-C stops that, and every later pass over its
+    /// readings.
+    fn read_dataset(&self, folder: &Path, reading: Reading) -> Result<Dataset, CliError> {
+        let damage = if reading.partial {
+            Damage::LeftOut
+        } else {
+            Damage::Refused
+        };
+        let dataset = read_dataset_with(folder, damage, &self.control())?;
+        for warning in &dataset.warnings {
+            self.say(&format!("warning: {warning}"));
+        }
+        Ok(dataset)
     }
 
     /// Returns an error once Ctrl-C has been pressed.

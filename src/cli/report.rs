@@ -1,8 +1,8 @@
 //! `catoptric report`: writes one HTML page about calibrations and their scores.
 
-use super::Context;
 use super::error::CliError;
 use super::output::print;
+use super::{Context, Reading};
 use catoptric::apply::{CloudSketch, Lift};
 use catoptric::report::MAX_POINTS;
 use catoptric::{CloudFrame, Error, files, read_calibration_for, read_truth, report, score};
@@ -20,10 +20,12 @@ pub(crate) struct Arguments {
     /// The page to write.
     #[arg(long, value_name = "report.html")]
     out: PathBuf,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let dataset = context.read_dataset(&arguments.dataset)?;
+    let dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
     let truth = read_truth(&arguments.dataset)?;
     let mut results = Vec::new();
     for path in &arguments.calibrations {

@@ -1,8 +1,8 @@
 //! `catoptric score`: compares a calibration with the truth or, on blind data, with boards and walls.
 
-use super::Context;
 use super::error::CliError;
 use super::output::{print, quoted};
+use super::{Context, Reading};
 use catoptric::{Error, Score, Verdict, read_calibration_for, read_truth, score};
 use clap::Args;
 use std::path::PathBuf;
@@ -21,6 +21,8 @@ pub(crate) struct Arguments {
     /// Print the score as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -31,7 +33,7 @@ fn positive(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let dataset = context.read_dataset(&arguments.dataset)?;
+    let dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
     let truth = read_truth(&arguments.dataset)?;
     let calibration = read_calibration_for(&arguments.calibration, &dataset.session)?;
     let mut result = score(&dataset, &calibration, truth.as_ref()).map_err(Error::from)?;

@@ -70,6 +70,14 @@ pub enum IoError {
         /// Byte offset at which it was detected.
         offset: u64,
     },
+    /// A damaged recording of which some can be used.
+    #[error("{source}; the other {kept} stretches can be read")]
+    Damaged {
+        /// The damage.
+        source: Box<IoError>,
+        /// Number of stretches that are whole.
+        kept: usize,
+    },
     /// Inconsistent values.
     #[error("{}: {message}", path.display())]
     Content {
@@ -154,6 +162,7 @@ impl IoError {
             Self::Stopped(_) => 130,
             Self::Text { .. }
             | Self::Recording { .. }
+            | Self::Damaged { .. }
             | Self::Content { .. }
             | Self::Inconsistent { .. }
             | Self::Changed { .. } => 2,

@@ -47,6 +47,8 @@ pub(super) struct Gathering<R> {
     label_time: u64,
     first_scan: Option<u64>,
     last_scan: u64,
+    /// Time at which the last scan was logged.
+    pub(super) latest_scan: u64,
     scan_time: f64,
     scans: usize,
     /// Stamp of every scan of a flight.
@@ -75,6 +77,7 @@ impl<R: Keep> Gathering<R> {
             label_time,
             first_scan: None,
             last_scan: label_time,
+            latest_scan: label_time,
             scan_time: 0.0,
             scans: 0,
             stamps: Vec::new(),
@@ -84,10 +87,11 @@ impl<R: Keep> Gathering<R> {
         }
     }
 
-    /// Adds a scan; its beams must be those of the session.
+    /// Adds a scan, logged at a given time; its beams must be those of the session.
     pub(super) fn scan(
         &mut self,
         mut scan: Scan,
+        logged: u64,
         scanner: &ScannerSheet,
         codes: &mut Codes,
     ) -> Result<(), String> {
@@ -113,6 +117,7 @@ impl<R: Keep> Gathering<R> {
         }
         self.first_scan.get_or_insert(scan.stamp);
         self.last_scan = scan.stamp;
+        self.latest_scan = logged;
         self.scan_time = scan.scan_time;
         self.scans += 1;
         self.kept.scan(scan.ranges);
@@ -155,6 +160,11 @@ impl<R: Keep> Gathering<R> {
         Ok(())
     }
 
+    /// Number of its scans so far.
+    pub(super) fn scans(&self) -> usize {
+        self.scans
+    }
+
     /// Number of the pose.
     pub(super) fn number(&self) -> usize {
         self.label.pose
@@ -170,14 +180,20 @@ impl<R: Keep> Gathering<R> {
     pub(super) fn end(mut self, known: Known<'_>) -> Result<(R::Kept, Vec<String>), String> {
         let (pose, expected, found) = (self.label.pose, self.label.scans, self.scans);
         if found == 0 && expected > 0 {
-            return Err(format!("pose {pose}: none of its {expected} scans is in the recording"));
+            return Err(format!(
+                "pose {pose}: none of its {expected} scans is in the recording"
+            ));
         }
         if found < expected {
             let lost = expected - found;
-            self.notes.push(format!("pose {pose}: {lost} of its {expected} scans are not in the recording"));
+            self.notes.push(format!(
+                "pose {pose}: {lost} of its {expected} scans are not in the recording"
+            ));
         }
         if found > expected {
-            self.notes.push(format!("pose {pose}: {found} scans, its label says {expected}; all are used"));
+            self.notes.push(format!(
+                "pose {pose}: {found} scans, its label says {expected}; all are used"
+            ));
         }
         if self.echoes > 0 && self.echoes != found {
             return Err(format!("pose {pose}: echoes of {} scans of {found}", self.echoes));
@@ -216,7 +232,10 @@ impl<R: Keep> Gathering<R> {
         if self.stamps.iter().enumerate().all(is_even) {
             return Vec::new();
         }
-        self.stamps.iter().map(|stamp| seconds_between(known.epoch, *stamp)).collect()
+        self.stamps
+            .iter()
+            .map(|stamp| seconds_between(known.epoch, *stamp))
+            .collect()
     }
 
     /// The stretch without its readings, with times counted from the epoch, and the data kept of them.

@@ -24,15 +24,19 @@ pub mod paths;
 #[cfg(feature = "recording")]
 pub mod cdr;
 #[cfg(feature = "recording")]
+mod codes;
+#[cfg(feature = "recording")]
 pub mod definitions;
 #[cfg(feature = "recording")]
 mod gathering;
+#[cfg(feature = "recording")]
+mod lost;
 #[cfg(feature = "recording")]
 pub mod messages;
 #[cfg(feature = "recording")]
 pub mod playback;
 #[cfg(feature = "recording")]
-mod codes;
+mod reading;
 #[cfg(feature = "recording")]
 pub mod recording;
 #[cfg(feature = "recording")]
@@ -72,7 +76,7 @@ pub mod rays;
 pub mod results;
 
 #[cfg(feature = "recording")]
-pub use dataset::{DatasetWriter, read_dataset, read_dataset_until, read_session};
+pub use dataset::{DatasetWriter, read_dataset, read_dataset_with, read_session};
 pub use error::IoError;
 #[cfg(feature = "recording")]
 pub use file::{StagedOutput, write_file, write_json};
@@ -81,6 +85,8 @@ pub use json::read_json;
 pub use manifest::{Manifest, Provenance};
 #[cfg(feature = "recording")]
 pub use playback::read_recording;
+#[cfg(feature = "recording")]
+pub use reading::Damage;
 #[cfg(feature = "recording")]
 pub use recording::RecordingWriter;
 #[cfg(all(feature = "recording", feature = "scene"))]

@@ -9,7 +9,7 @@
 //! not in the session, and messages before the first label. A frame without a message on `/mocap/markers` has an empty list
 //! of markers. Lost scans, a label sent twice and readings that are no ranges are counted and noted.
 
-use super::blocks::{Place, words};
+use super::blocks::{Block, Place, Visit};
 use super::bodies::{Bodies, MARKERS_TOPIC};
 use super::codes::Codes;
 use super::definitions::{self, Definition};
@@ -17,15 +17,13 @@ use super::error::IoError;
 use super::gathering::{Gathering, Keep, Known, Whole};
 use super::messages;
 use super::records;
-use super::source::{Entry, Source, Start};
-use super::survey::Survey;
-use catoptric_model::place::nearest;
+use super::source::{Entry, Position, Source, Start};
 use catoptric_model::session::ScannerSheet;
 use catoptric_model::{PoseLabel, Session, Stop, Stretch};
 use mcap::records::op;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 /// The content of a channel, in the order in which messages of equal times are taken.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,6 +44,9 @@ pub(super) enum Text {
     /// As it is, without a schema.
     Bare,
 }
+
+/// Topic of the labels.
+pub(super) const LABEL_TOPIC: &str = "/session/pose";
 
 /// What reading a recording makes of it.
 pub(super) struct Played<R: Keep> {
@@ -119,7 +120,7 @@ pub(super) fn play<R: Keep>(
     let visited = place.visit(stop, partial, |event| playback.take(event));
     if !playback.is_unordered {
         let (blocks, length) = visited?;
-        let ended = playback.end_stretch();
+        let ended = playback.end_stretch(None);
         ended.map_err(|what| place.corrupt(what, length))?;
         return playback.finish(place, blocks, None, stop);
     }
@@ -127,10 +128,13 @@ pub(super) fn play<R: Keep>(
     let mut index = Index::default();
     let mut playback = Playback::<R>::new(place, session, partial)?;
     let (blocks, length) = place.visit(stop, partial, |event| index.take(event, &mut playback))?;
-    index.entries.sort_by_key(|entry| entry.key());
+    index.entries.sort_by_key(|entry| (entry.time, !entry.is_label));
     playback.epoch = index.epoch;
-    let source = Source::new(place, stop, blocks, Arc::from(index.entries));
-    for (number, entry) in source.order().iter().enumerate() {
+    let source = Source {
+        order: Some(Arc::from(index.entries)),
+        ..Source::new(place, &session.scanner, stop, blocks)
+    };
+    for (number, entry) in source.order.iter().flat_map(|order| order.iter()).enumerate() {
         let records = source.records(entry.block as usize)?;
         let record = records.get(entry.number as usize);
         let message = record.and_then(|(_, body)| records::message(body));
@@ -138,7 +142,9 @@ pub(super) fn play<R: Keep>(
         let taken = playback.message(&message, (0, number));
         taken.map_err(|what| place.corrupt(what, source.blocks[entry.block as usize].at()))?;
     }
-    playback.end_stretch().map_err(|what| place.corrupt(what, length))?;
+    playback
+        .end_stretch(None)
+        .map_err(|what| place.corrupt(what, length))?;
     let Source { blocks, order, .. } = source;
     playback.finish(place, blocks, order, stop)
 }
@@ -228,7 +234,10 @@ impl<'a, R: Keep> Playback<'a, R> {
             }
             op::CHANNEL => {
                 let channel = records::channel(data).ok_or_else(|| short("channel"))?;
-                let schema = self.schemas.get(&channel.schema).map_or("no schema", String::as_str);
+                let schema = self
+                    .schemas
+                    .get(&channel.schema)
+                    .map_or("no schema", String::as_str);
                 let topic = self.topic(channel.topic, schema, channel.encoding)?;
                 self.names.insert(channel.topic.to_owned());
                 self.topics.insert(channel.id, topic);
@@ -271,7 +280,7 @@ impl<'a, R: Keep> Playback<'a, R> {
     }
 
     /// Processes a message, given the index of its block and its index there.
-    fn message(&mut self, message: &records::Message<'_>, at: (usize, usize)) -> Result<(), String> {
+    fn message(&mut self, message: &records::Message<'_>, at: Position) -> Result<(), String> {
         let Some(topic) = self.topics.get(&message.channel).cloned() else {
             return Err(self.no_channel(message.channel));
         };
@@ -303,7 +312,8 @@ impl<'a, R: Keep> Playback<'a, R> {
             Topic::Label(_) | Topic::Other => return Ok(()),
             Topic::Scan => {
                 let scan = messages::decode_scan(message.data).map_err(|e| e.to_string());
-                let taken = scan.and_then(|scan| current.scan(scan, self.scanner, &mut self.codes));
+                let taken =
+                    scan.and_then(|scan| current.scan(scan, message.time, self.scanner, &mut self.codes));
                 (taken, "/scan".to_owned())
             }
             Topic::Echoes => {
@@ -333,11 +343,13 @@ impl<'a, R: Keep> Playback<'a, R> {
 
     /// The least time that a scan in order can have.
     fn latest_scan(&self) -> u64 {
-        self.current.as_ref().map_or(self.labeled, |current| current.latest_scan.max(self.labeled))
+        self.current
+            .as_ref()
+            .map_or(self.labeled, |current| current.latest_scan.max(self.labeled))
     }
 
     /// Processes a label.
-    fn label(&mut self, text: Text, message: &records::Message<'_>, at: (usize, usize)) -> Result<(), String> {
+    fn label(&mut self, text: Text, message: &records::Message<'_>, at: Position) -> Result<(), String> {
         self.labeled = message.time;
         let label = match text {
             Text::Bare => Ok(message.data),
@@ -349,20 +361,29 @@ impl<'a, R: Keep> Playback<'a, R> {
         let label = match label {
             Ok(label) => label,
             Err(what) => {
-                self.end_stretch()?;
+                self.end_stretch(Some(at))?;
                 return self.fault_or(format!("{LABEL_TOPIC}: {what}"));
             }
         };
-        if self.current.as_ref().is_some_and(|current| current.label == label) {
-            self.notes.push(format!("pose {}: its label was sent more than once", label.pose));
+        if self
+            .current
+            .as_ref()
+            .is_some_and(|current| current.label == label)
+        {
+            self.notes
+                .push(format!("pose {}: its label was sent more than once", label.pose));
             return Ok(());
         }
-        self.end_stretch()?;
+        self.end_stretch(Some(at))?;
         if !self.poses.insert(label.pose) {
-            return self.fault_or(format!("{LABEL_TOPIC}: there are two stretches of pose {}", label.pose));
+            return self.fault_or(format!(
+                "{LABEL_TOPIC}: there are two stretches of pose {}",
+                label.pose
+            ));
         }
         self.starts.push(Start {
             label: at,
+            end: (usize::MAX, usize::MAX),
             scans: label.scans,
         });
         self.current = Some(Gathering::new(label, message.time, self.scanner));
@@ -382,14 +403,15 @@ impl<'a, R: Keep> Playback<'a, R> {
     fn fault(&mut self, what: String) {
         if let Some(current) = self.current.take() {
             self.starts.pop();
-            self.left_out.push(format!("pose {} is left out: {what}", current.number()));
+            self.left_out
+                .push(format!("pose {} is left out: {what}", current.number()));
         } else {
             self.left_out.push(what);
         }
     }
 
-    /// Ends the current stretch, if there is one.
-    fn end_stretch(&mut self) -> Result<(), String> {
+    /// Ends the current stretch, if there is one, at the position of the next label.
+    fn end_stretch(&mut self, end: Option<Position>) -> Result<(), String> {
         let Some(gathering) = self.current.take() else {
             return Ok(());
         };
@@ -398,12 +420,12 @@ impl<'a, R: Keep> Playback<'a, R> {
             bodies: &self.bodies,
             epoch: self.epoch.unwrap_or_default(),
         };
-        let number = gathering.number();
-        let scans = gathering.scans();
+        let (number, scans) = (gathering.number(), gathering.scans());
         match gathering.end(known) {
             Ok((kept, notes)) => {
                 if let Some(start) = self.starts.last_mut() {
                     start.scans = scans;
+                    start.end = end.unwrap_or(start.end);
                 }
                 self.notes.extend(notes);
                 self.finished.push(kept);
@@ -429,23 +451,23 @@ impl<'a, R: Keep> Playback<'a, R> {
         stop: &Stop,
     ) -> Result<Played<R>, IoError> {
         if self.unlabeled > 0 {
-            let words = format!("{} scans before the first label belong to no stretch", self.unlabeled);
+            let words = format!(
+                "{} scans before the first label belong to no stretch",
+                self.unlabeled
+            );
             self.notes.insert(0, words);
         }
         self.notes.extend(self.codes.words());
         Ok(Played {
             stretches: self.finished,
             source: Source {
-                place: place.clone(),
-                stop: stop.clone(),
-                blocks,
                 order,
                 stretches: self.starts,
                 topics: self.topics,
                 names: self.names,
                 epoch: self.epoch.unwrap_or_default(),
                 bodies: self.bodies,
-                kept: Mutex::default(),
+                ..Source::new(place, self.scanner, stop, blocks)
             },
             notes: self.notes,
             left_out: self.left_out,
