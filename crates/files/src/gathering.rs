@@ -191,8 +191,8 @@ impl<R: Keep> Gathering<R> {
             ));
         }
         if found > expected {
-            self.notes.push(format!(
-                "pose {pose}: {found} scans, its label says {expected}; all are used"
+            return Err(format!(
+                "pose {pose}: {found} scans, its label says {expected}; was the next label lost?"
             ));
         }
         if self.echoes > 0 && self.echoes != found {

@@ -71,10 +71,13 @@ struct Playback<'a, R: Keep> {
     /// Latest time of the messages taken so far, and that of the current label.
     latest: u64,
     labeled: u64,
-    /// Whether messages that belong together are apart, so that they must be sorted.
+    /// Whether messages that belong together are apart, so that they must be sorted; and whether they are.
     is_unordered: bool,
+    is_sorted: bool,
     /// Whether a stretch with a fault is left out instead of the whole recording.
     partial: bool,
+    /// Whether some of the recording cannot be read.
+    has_damage: bool,
     current: Option<Gathering<R>>,
     /// Numbers of the poses so far.
     poses: BTreeSet<usize>,
@@ -130,6 +133,7 @@ pub(super) fn play<R: Keep>(
     let (blocks, length) = place.visit(stop, partial, |event| index.take(event, &mut playback))?;
     index.entries.sort_by_key(|entry| (entry.time, !entry.is_label));
     playback.epoch = index.epoch;
+    playback.is_sorted = true;
     let source = Source {
         order: Some(Arc::from(index.entries)),
         ..Source::new(place, &session.scanner, stop, blocks)
@@ -195,7 +199,9 @@ impl<'a, R: Keep> Playback<'a, R> {
             latest: 0,
             labeled: 0,
             is_unordered: false,
+            is_sorted: false,
             partial,
+            has_damage: false,
             current: None,
             poses: BTreeSet::new(),
             starts: Vec::new(),
@@ -212,6 +218,7 @@ impl<'a, R: Keep> Playback<'a, R> {
         match event {
             Visit::Damage(what) => {
                 self.fault(what.to_owned());
+                self.has_damage = true;
                 Ok(())
             }
             Visit::Record { opcode, data, at } => {
@@ -421,7 +428,12 @@ impl<'a, R: Keep> Playback<'a, R> {
             epoch: self.epoch.unwrap_or_default(),
         };
         let (number, scans) = (gathering.number(), gathering.scans());
-        match gathering.end(known) {
+        let ended = match self.is_sorted && self.has_damage && gathering.miscounts() {
+            // What cannot be read may have been anywhere, and a label among it.
+            true => Err("some of its messages cannot be read".to_owned()),
+            false => gathering.end(known),
+        };
+        match ended {
             Ok((kept, notes)) => {
                 if let Some(start) = self.starts.last_mut() {
                     start.scans = scans;
