@@ -108,6 +108,31 @@ fn the_order_of_a_file_means_nothing() {
 }
 
 #[test]
+fn labels_without_a_schema_can_still_be_read() {
+    let session = session(BEAMS);
+    let bytes = record(&session, &original(&session));
+    let expected = content(&dataset(&session, bytes.clone()));
+    let mut out = io::Cursor::new(Vec::new());
+    let mut writer = mcap::Writer::new(&mut out).expect("begun");
+    for message in mcap::MessageStream::new(&bytes).expect("ours") {
+        let mut message = message.expect("whole");
+        if message.channel.topic == "/session/pose" {
+            // After the encapsulation and the length of the text, and before its terminating zero.
+            message.data = message.data[8..message.data.len() - 1].to_vec().into();
+            message.channel = std::sync::Arc::new(mcap::Channel {
+                schema: None,
+                message_encoding: "json".to_owned(),
+                ..(*message.channel).clone()
+            });
+        }
+        writer.write(&message).expect("written");
+    }
+    writer.finish().expect("ended");
+    drop(writer);
+    assert_eq!(content(&dataset(&session, out.into_inner())), expected);
+}
+
+#[test]
 fn chunks_may_be_compressed_with_zstd() {
     use ruzstd::encoding::{CompressionLevel, compress_to_vec};
     let session = session(BEAMS);
