@@ -248,10 +248,9 @@ fn frames_in_which_the_tracker_lost_a_body_are_not_used() {
     let good = dataset(&session, bytes.clone());
     let lost = |change: &dyn Fn(usize, &mut Vec<u8>)| {
         let mut changed = messages(&bytes);
-        let mut number = 0;
-        for (_, _, data) in changed.iter_mut().filter(|m| m.0 == "/mocap/white") {
+        let of_board = changed.iter_mut().filter(|m| m.0 == "/mocap/white");
+        for (number, (_, _, data)) in of_board.enumerate() {
             change(number, data);
-            number += 1;
         }
         dataset(&session, written(&bytes, &changed))
     };
