@@ -14,7 +14,7 @@ use super::blocks::Place;
 use super::error::IoError;
 use super::file::{sha256, sha256_file};
 use super::folder::{Occupant, StagedFile, StagedFolder, list};
-use super::json::to_json;
+use super::json::{parse_json, to_json};
 use super::manifest::{Manifest, Provenance};
 use super::playback::read_recording;
 use super::reading::{Damage, Records, records};
@@ -301,7 +301,7 @@ fn read_hashes(dataset: &Path) -> Result<Option<BTreeMap<String, String>>, IoErr
     let path = dataset.join(MANIFEST);
     match fs::read(&path) {
         Ok(bytes) => {
-            let manifest: Manifest = serde_json::from_slice(&bytes).map_err(|e| IoError::json(&path, &e))?;
+            let manifest: Manifest = parse_json(&bytes, &path)?;
             Ok(Some(manifest.files))
         }
         Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(None),
@@ -317,7 +317,10 @@ fn read_checked(
 ) -> Result<Vec<u8>, IoError> {
     let path = dataset.join(name);
     let bytes = fs::read(&path).map_err(|e| IoError::read(&path, e))?;
-    check(dataset, name, &sha256(&bytes), hashes)?;
+    // An editor may have changed the ends of lines, which mean nothing.
+    let plain = String::from_utf8_lossy(&bytes).replace("\r\n", "\n");
+    check(dataset, name, &sha256(plain.as_bytes()), hashes)
+        .or_else(|_| check(dataset, name, &sha256(&bytes), hashes))?;
     Ok(bytes)
 }
 

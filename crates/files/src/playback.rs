@@ -127,7 +127,7 @@ pub(super) fn play<R: Keep>(
         ended.map_err(|what| place.corrupt(what, length))?;
         return playback.finish(place, blocks, None, stop);
     }
-    // Once more, for the times of all messages, and then in their order.
+    // Once more, for the times of all messages, and then in order.
     let mut index = Index::default();
     let mut playback = Playback::<R>::new(place, session, partial)?;
     let (blocks, length) = place.visit(stop, partial, |event| index.take(event, &mut playback))?;
