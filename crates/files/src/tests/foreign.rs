@@ -1,4 +1,5 @@
-//! Recordings as other tools and drivers make them: in another order, compressed otherwise, with losses and codes.
+//! Recordings unlike our own: messages in another order, other compression, lost scans, poses that a tracker reports when it
+//! has lost a body, damage, clocks that differ.
 
 use super::*;
 use crate::dataset::{OBSERVATIONS, parse_dataset};
