@@ -1,4 +1,4 @@
-//! Estimates the deflection of every element, a beam with its mirror: by turns selects the boards that it hits and solves for
+//! Estimates the deflection of every element, a beam with its mirror: alternately selects the boards that it hits and solves for
 //! its two angles, until the selection no longer changes.
 
 use crate::element::attempt::{Attempt, Failure, Fit, MIN_BOARDS, Workspace, lost};
