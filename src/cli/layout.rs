@@ -97,7 +97,7 @@ pub(super) fn requirements(texts: &[String], example: &str) -> Result<Vec<Requir
 pub(super) fn refused(error: RequirementError, example: &str) -> CliError {
     let message = format!("--require: {error}");
     let help = match error {
-        RequirementError::Form { .. } => format!("--require '{example}'"),
+        RequirementError::Form { .. } | RequirementError::Limit { .. } => format!("--require '{example}'"),
         RequirementError::Unknown { help, .. } => help,
     };
     CliError::invalid(message, help)
@@ -107,7 +107,7 @@ fn unmet(requirements: &[Requirement], analyses: &[Analysis]) -> Result<Vec<Stri
     let mut unmet = Vec::new();
     for analysis in analyses {
         for requirement in requirements {
-            let found = requirement.judge(analysis).map_err(|e| refused(e, EXAMPLE))?;
+            let found = layout::judge(requirement, analysis).map_err(|e| refused(e, EXAMPLE))?;
             unmet.extend(found.iter().map(|u| format!("not met: {u}")));
         }
     }

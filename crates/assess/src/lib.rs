@@ -4,6 +4,7 @@
 pub mod apply;
 pub mod compare;
 pub mod palette;
+pub mod requirement;
 pub mod score;
 pub mod study;
 pub mod tables;
@@ -13,5 +14,6 @@ pub mod validate;
 
 pub use apply::apply;
 pub use compare::{Comparison, Contestant, compare};
+pub use requirement::{Requirement, RequirementError};
 pub use score::{Score, Verdict, score};
 pub use validate::{Problem, validate};
