@@ -10,6 +10,7 @@ mod demo;
 mod error;
 mod export;
 mod interrupt;
+mod judging;
 mod layout;
 mod man;
 mod new;

@@ -3,6 +3,7 @@
 
 pub mod apply;
 pub mod compare;
+pub mod junit;
 pub mod palette;
 pub mod requirement;
 pub mod score;
@@ -13,7 +14,7 @@ pub mod testing;
 pub mod validate;
 
 pub use apply::apply;
-pub use compare::{Comparison, Contestant, compare};
+pub use compare::{CompareError, Comparison, Contestant, Rules, compare, compare_by};
 pub use requirement::{Requirement, RequirementError};
 pub use score::{Score, Verdict, score};
 pub use validate::{Problem, validate};

@@ -53,6 +53,8 @@ pub mod parametric;
 pub mod scene;
 #[cfg(feature = "scene")]
 mod tree;
+#[cfg(all(feature = "recording", feature = "scene"))]
+mod truth;
 
 pub mod cloud;
 #[cfg(feature = "recording")]
@@ -78,9 +80,9 @@ pub use manifest::{Manifest, Provenance};
 pub use playback::read_recording;
 #[cfg(feature = "recording")]
 pub use recording::RecordingWriter;
-#[cfg(all(feature = "recording", feature = "scene"))]
-pub use results::read_truth;
 pub use results::{read_calibration, read_calibration_for, read_characterization};
+#[cfg(all(feature = "recording", feature = "scene"))]
+pub use truth::{read_reference, read_truth};
 
 #[cfg(all(test, feature = "recording", feature = "scene"))]
 mod tests;
