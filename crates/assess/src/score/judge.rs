@@ -2,9 +2,9 @@
 
 use super::gate::{ENOUGH, Gate, MIN_SOLVED, Outcome, SIGNIFICANCE, mean_limit, median_limit, worst_limit};
 use super::words::elements;
-use super::{Score, honesty};
+use super::{Score, honesty, wrap};
 use crate::validate::{Problem, Severity};
-use catoptric_model::{Calibration, Dataset};
+use catoptric_model::{Calibration, Dataset, Status};
 
 /// Problems that are listed one by one.
 const LISTED: usize = 3;
@@ -72,6 +72,7 @@ pub(super) fn gates(
         ),
     });
     if !has_truth {
+        gates.push(omitted(dataset, calibration));
         gates.extend(blind(score));
         return gates;
     }
@@ -277,6 +278,47 @@ fn mounting(score: &Score) -> Gate {
         },
     );
     Gate::at_most("mounting", found.nees, limit, words).with_rate(SIGNIFICANCE)
+}
+
+/// Beams inside the fan of a facet as drawn that are not judged, in degrees of the scan: mirrors are off their drawing.
+const DRAWN_WITHIN_DEG: f64 = 3.0;
+
+/// The gate on elements that the drawing has deflected, without a truth: each needs a direction or a reason.
+fn omitted(dataset: &Dataset, calibration: &Calibration) -> Gate {
+    let scan = &dataset.session.scanner.scan;
+    let step = scan.angles().step_deg.abs();
+    let inside = |beam: usize| {
+        let azimuth = scan.azimuth(beam);
+        dataset
+            .session
+            .facets
+            .iter()
+            .filter(|f| scan.holds(f.beams, beam))
+            .any(|f| {
+                let edges = f
+                    .beams
+                    .map(|edge| wrap(scan.azimuth(edge) - azimuth).abs().to_degrees());
+                edges.iter().all(|apart| *apart >= DRAWN_WITHIN_DEG.max(step))
+            })
+    };
+    let missed = (0..scan.beams())
+        .filter(|&beam| inside(beam))
+        .filter(|&beam| match calibration.beam(beam).map(|b| b.status) {
+            None | Some(Status::Direct) => true,
+            Some(
+                Status::Solved
+                | Status::TooFewPoses
+                | Status::Unobservable
+                | Status::NotConverged
+                | Status::Rejected,
+            ) => false,
+        })
+        .count();
+    let words = format!(
+        "{} deflected by a mirror as drawn, with neither a direction nor a reason",
+        elements(missed, "is", "are")
+    );
+    Gate::at_most("missed", missed as f64, 0.0, words)
 }
 
 /// The gates of a score without a truth: how much is stated, and the residuals on boards and walls.
