@@ -482,7 +482,7 @@ fn wrong_distances_fail_and_are_explained() {
     for (change, words) in [
         ((|d| d + 0.020) as fn(f64) -> f64, "20.0 mm subtracted from all d"),
         (|d| d - 0.020, "20.0 mm added to all d"),
-        (|d| d * 2.0, "d halved, as of a path there and back"),
+        (|d| d * 2.0, "d halved, as of a round trip"),
         (|d| d / 2.54, "d in inches"),
     ] {
         let found = falsified(|c| {

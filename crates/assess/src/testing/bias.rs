@@ -120,7 +120,7 @@ mod tests {
                 .expect_err("it is biased");
             let axis = if shift[0] > 0.0 { "θ_a" } else { "φ (" };
             assert!(failure.to_string().contains(axis), "{failure}");
-            // Where it is allowed it is none.
+            // Within what is allowed it passes.
             let within = 0.06_f64.to_radians();
             Bias::over(&trials(40, 1, shift)).assert(within, Significance::PER_MILLE);
         }

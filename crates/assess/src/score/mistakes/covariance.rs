@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 /// Mean normalized squared errors that an honest covariance usually has.
 const USUAL: [f64; 2] = [0.3, 1.8];
 
-/// Error of a usual calibration over the limit of the experiment, at most.
+/// Largest error of a usual calibration over the limit of the experiment.
 const USUAL_ERROR: f64 = 10.0;
 
 pub(super) fn recognize(

@@ -371,7 +371,7 @@ fn per_axis_deg(
     (0.5 * sum / count as f64).sqrt().to_degrees()
 }
 
-/// Whether the errors are those of mirrors that were turned, each by itself: a calibration of another build of them.
+/// Whether the errors are those of mirrors that were turned individually: a calibration of another build of them.
 fn remounted(elements: &[&Element<'_>], score: &Score, facets: usize) -> Option<Mistake> {
     let of_facet = |facet: &str| -> Vec<&Element<'_>> {
         let all = elements.iter().filter(|e| e.error.facet == facet);

@@ -34,7 +34,7 @@ pub(super) fn recognize(score: &Score, scored: &[&ElementError], dataset: &Datas
         ("d in inches", Box::new(|e| e.estimate.distance * 0.0254)),
         ("d in kilometers", Box::new(|e| e.estimate.distance * 1e3)),
         (
-            "d halved, as of a path there and back",
+            "d halved, as of a round trip",
             Box::new(|e| e.estimate.distance * 0.5),
         ),
         ("d doubled", Box::new(|e| e.estimate.distance * 2.0)),
