@@ -33,7 +33,7 @@ const WELL_KNOWN_SD: f64 = std::f64::consts::PI / 180.0;
 /// Whether a bound on (cos φ·δθ, δφ) bounds anything: its largest standard deviation is not above
 /// [`WEAKEST_SD`](catoptric_calib::observability::WEAKEST_SD), beyond which the linearized bound of an open direction has
 /// no meaning.
-pub(super) fn bounds(bound: &Matrix2<f64>) -> bool {
+pub fn bounds(bound: &Matrix2<f64>) -> bool {
     largest_sd(bound) <= WEAKEST_SD
 }
 

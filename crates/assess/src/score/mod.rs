@@ -37,7 +37,6 @@ mod statistics;
 pub mod words;
 
 use crate::validate::{Severity, validate_for};
-use bound::bounds;
 use catoptric_model::frame::Pose;
 use catoptric_model::{Calibration, Dataset, PoseRecord, Track, TrackedFrame, Unreadable, beam};
 use catoptric_sim::Truth;
@@ -52,8 +51,8 @@ pub(crate) use element::wrap;
 #[cfg(feature = "testing")]
 pub(crate) use statistics::mahalanobis_squared;
 
-pub use bound::true_directions;
 pub use bound::{Knowable, knowable};
+pub use bound::{bounds, true_directions};
 pub use element::ElementError;
 pub use figures::{ApartScore, BeamCounts, DistanceError, OpenCounts, PointError, Score, Spread, Verdict};
 pub use gate::{Gate, MIN_SOLVED, Outcome};

@@ -55,7 +55,7 @@ pub fn validate_for(calibration: &Calibration, session: &Session) -> Vec<Problem
     let mut found = check(calibration, Some(session));
     if let Err(error) = calibration.check_scanner(session) {
         let mut problems = Problems::default();
-        problems.error("scanner", error.to_string());
+        problems.error("scanner", format!("does not fit: {error}"));
         found.extend(problems.list);
     }
     found

@@ -14,6 +14,10 @@ const LARGE_DEG: f64 = 0.05;
 /// Elements on which all mistakes are tried; the best is then computed from all elements.
 const TRIED: usize = 40;
 
+/// Errors of mirrors that are mounted anew: larger than this, in degrees, and than this many limits of the experiment.
+const REMOUNTED_DEG: f64 = 0.2;
+const REMOUNTED_LIMITS: f64 = 10.0;
+
 /// Degrees of a radian.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
@@ -271,7 +275,7 @@ pub(super) fn recognize(
     let scan = &dataset.session.scanner.scan;
     // Directions of which next to nothing is scored may be those of other beams.
     let deflected = truth_of(truth, scan);
-    if !(found > LARGE_DEG) || scored.is_empty() {
+    if found.is_nan() || found <= LARGE_DEG || scored.is_empty() {
         return None;
     }
     let entries: BTreeMap<usize, Deflection> = calibration
@@ -408,7 +412,8 @@ fn remounted(elements: &[&Element<'_>], score: &Score, facets: usize) -> Option<
     let would_be = (0.5_f64 * sum / count).sqrt().to_degrees();
     let found = score.per_axis_rms_deg;
     // Honest errors are mostly those of whole mirrors too; only much larger ones are another build.
-    let too_large = found > 0.2 && !(found <= 10.0 * score.crlb_per_axis_deg);
+    let limit = score.crlb_per_axis_deg;
+    let too_large = found > REMOUNTED_DEG && (limit.is_nan() || found > REMOUNTED_LIMITS * limit);
     (too_large && would_be <= LEFT * found).then(|| {
         let words = format!(
             "each mirror turned on its own, by up to {:.2}°, as if it were a calibration of other mirrors, such as another dataset's",
