@@ -414,7 +414,7 @@ fn ctrl_c_ends_programs_and_keeps_none_of_their_failures() {
     std::fs::write(at.join("go"), "").unwrap();
     for out in ["s", "t"] {
         let done = catoptric().args(arguments(out)).current_dir(at).output().unwrap();
-        // One contestant fails by itself, which is its result.
+        // One contestant fails on its own, which is its result.
         assert_eq!(done.status.code(), Some(1), "{}", stderr(&done));
     }
     let runs = read(at, "s/runs.csv");
