@@ -78,7 +78,27 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         cross_validation(&calibration),
         quoted(&arguments.dataset),
         quoted(&arguments.out)
-    ))
+    ))?;
+    let solved = calibration.beams.iter().any(|b| b.status == Status::Solved);
+    // Without a mirror, no element has a direction to solve.
+    if solved || dataset.session.facets.is_empty() {
+        return Ok(());
+    }
+    Err(CliError::Verdict(format!(
+        "not good enough: no element is solved{}",
+        most_frequent(&calibration)
+    )))
+}
+
+/// The most frequent reason why elements are not solved.
+fn most_frequent(calibration: &Calibration) -> String {
+    let abstentions = catoptric::score::words::abstentions(calibration);
+    abstentions.first().map_or_else(String::new, |a| {
+        format!(
+            "; the most frequent reason: {} {} ({})",
+            a.count, a.status, a.reason
+        )
+    })
 }
 
 /// How well the boards are predicted by the others; empty unless requested.

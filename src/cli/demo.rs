@@ -2,6 +2,7 @@
 
 use super::calibrate::summary;
 use super::error::CliError;
+use super::judging::conclude;
 use super::output::{counted, grouped, print, quoted};
 use super::score::figure;
 use super::{Context, Reading};
@@ -10,8 +11,8 @@ use catoptric::calib::Options;
 use catoptric::files;
 use catoptric::report::MAX_POINTS;
 use catoptric::{
-    CloudFrame, Error, Method, Recording, Scene, Template, Verdict, apply_into, calibrate_with, read_truth,
-    report, score, simulate_into, write_json,
+    CloudFrame, Error, Method, Recording, Scene, Template, apply_into, calibrate_with, read_truth, report,
+    score, simulate_into, write_json,
 };
 use clap::Args;
 use std::path::PathBuf;
@@ -120,11 +121,5 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         quoted(&cloud_path),
         counted(cloud.points, "point"),
     ))?;
-    match score.verdict {
-        Verdict::Fail => Err(CliError::Verdict(format!(
-            "not good enough: {}",
-            score.warnings.first().map_or("", String::as_str)
-        ))),
-        Verdict::Pass | Verdict::Blind => Ok(()),
-    }
+    conclude(score.verdict, &score.reasons())
 }

@@ -130,6 +130,23 @@ impl DatasetWriter {
     /// # Errors
     /// [`IoError`] if writing fails; then no part of it is left, and an earlier dataset is untouched.
     pub fn finish(self, provenance: Provenance) -> Result<Manifest, IoError> {
+        self.publish(provenance, |manifest| manifest)
+    }
+
+    /// As [`finish`](Self::finish), for a dataset without its truth: the manifest states that it is blind, and neither the
+    /// seed nor the command.
+    ///
+    /// # Errors
+    /// Same as [`finish`](Self::finish).
+    pub fn finish_blind(self, provenance: Provenance) -> Result<Manifest, IoError> {
+        self.publish(provenance, Manifest::hidden)
+    }
+
+    fn publish(
+        self,
+        provenance: Provenance,
+        written: impl FnOnce(Manifest) -> Manifest,
+    ) -> Result<Manifest, IoError> {
         let Self { recording, folder } = self;
         recording.finish()?.finish()?;
         let mut files = BTreeMap::new();
@@ -138,7 +155,7 @@ impl DatasetWriter {
                 sha256_file(&path, &Stop::default()).map_err(|e| IoError::read(folder.shown(&name), e))?;
             files.insert(name, hash);
         }
-        let manifest = Manifest::new(provenance, SCENE, files);
+        let manifest = written(Manifest::new(provenance, SCENE, files));
         let bytes = to_json(folder.shown(MANIFEST), &manifest)?;
         folder.write(MANIFEST, &bytes)?;
         folder.publish()?;
@@ -285,11 +302,20 @@ fn assembled(
         warnings,
     };
     dataset.check().map_err(fail)?;
+    if dataset.poses.is_empty() {
+        let message = "holds no stretch: none of its topics is one that a dataset has";
+        return Err(IoError::content(path, message));
+    }
     Ok(dataset)
 }
 
 /// The hashes of the manifest, if there is one.
 fn read_hashes(dataset: &Path) -> Result<Option<BTreeMap<String, String>>, IoError> {
+    Ok(read_manifest(dataset)?.map(|manifest| manifest.files))
+}
+
+/// The manifest, if there is one.
+pub(super) fn read_manifest(dataset: &Path) -> Result<Option<Manifest>, IoError> {
     // Reported before any missing file: the wrong folder was given.
     if !dataset.join(SESSION).is_file() && dataset.exists() {
         let reason = format!("it is no dataset: there is no {SESSION} in it");
@@ -302,7 +328,8 @@ fn read_hashes(dataset: &Path) -> Result<Option<BTreeMap<String, String>>, IoErr
     match fs::read(&path) {
         Ok(bytes) => {
             let manifest: Manifest = parse_json(&bytes, &path)?;
-            Ok(Some(manifest.files))
+            require_version(&path, manifest.schema_version, super::manifest::SCHEMA_VERSION)?;
+            Ok(Some(manifest))
         }
         Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(e) => Err(IoError::read(path, e)),
@@ -310,7 +337,7 @@ fn read_hashes(dataset: &Path) -> Result<Option<BTreeMap<String, String>>, IoErr
 }
 
 /// The bytes of a file, which must match the manifest.
-fn read_checked(
+pub(super) fn read_checked(
     dataset: &Path,
     name: &str,
     hashes: Option<&BTreeMap<String, String>>,

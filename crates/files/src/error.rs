@@ -94,6 +94,14 @@ pub enum IoError {
         /// The inconsistency.
         source: ModelError,
     },
+    /// The truth of a dataset that is not known to be blind is missing.
+    #[error("{}: {message}", path.display())]
+    NoTruth {
+        /// The file.
+        path: PathBuf,
+        /// What is missing.
+        message: String,
+    },
     /// A file whose SHA-256 is not the one in the manifest.
     #[error("{}: changed since it was written: its SHA-256 is not the one in {}", path.display(), manifest.display())]
     Changed {
@@ -165,6 +173,7 @@ impl IoError {
             | Self::Damaged { .. }
             | Self::Content { .. }
             | Self::Inconsistent { .. }
+            | Self::NoTruth { .. }
             | Self::Changed { .. } => 2,
             Self::Read { .. }
             | Self::Write { .. }

@@ -62,6 +62,8 @@ pub mod parametric;
 pub mod scene;
 #[cfg(feature = "scene")]
 mod tree;
+#[cfg(all(feature = "recording", feature = "scene"))]
+mod truth;
 
 pub mod cloud;
 #[cfg(feature = "recording")]
@@ -89,9 +91,9 @@ pub use playback::read_recording;
 pub use reading::Damage;
 #[cfg(feature = "recording")]
 pub use recording::RecordingWriter;
-#[cfg(all(feature = "recording", feature = "scene"))]
-pub use results::read_truth;
 pub use results::{read_calibration, read_calibration_for, read_characterization};
+#[cfg(all(feature = "recording", feature = "scene"))]
+pub use truth::{read_reference, read_truth};
 
 #[cfg(all(test, feature = "recording", feature = "scene"))]
 mod tests;
