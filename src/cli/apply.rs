@@ -1,9 +1,9 @@
 //! `catoptric apply`: turns a stretch of scans into a point cloud, given a calibration.
 
+use super::context::{Context, Reading};
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print};
-use super::{Context, Reading};
 use catoptric::files::cloud::CloudFormat;
 use catoptric::{CloudFrame, apply_into, read_calibration_for};
 use clap::Args;

@@ -1,9 +1,9 @@
 //! `catoptric calibrate`: estimates a calibration from a dataset. The truth is never read.
 
+use super::context::{Context, Reading};
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print, quoted};
-use super::{Context, Reading};
 use catoptric::calib::{JacobianForm, Options};
 use catoptric::model::Status;
 use catoptric::{Calibration, Method, calibrate_with, read_characterization, write_json};

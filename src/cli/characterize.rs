@@ -1,8 +1,8 @@
 //! `catoptric characterize`: measures the range errors of the bare sensor (step 1), from a dataset or a scene.
 
+use super::context::{Context, Reading};
 use super::error::CliError;
 use super::output::{print, print_json, quoted};
-use super::{Context, Reading};
 use catoptric::model::{Characterization, RangeBias};
 use catoptric::{Error, Scene, characterize, files, read_truth, report, simulate_with, tables};
 use clap::Args;

@@ -1,6 +1,6 @@
 //! `catoptric check`: checks that a scene can be simulated, and reports the size of the experiment.
 
-use super::Context;
+use super::context::Context;
 use super::error::CliError;
 use super::output::{counted, print, quoted};
 use catoptric::sim::Laboratory;

@@ -1,10 +1,10 @@
 //! `catoptric compare`: tabulates several calibrations of one dataset, ours and third-party ones.
 
+use super::context::{Context, Reading};
 use super::error::CliError;
 use super::judging::{Judging, conclude, write_junit};
 use super::output::{counted, print};
 use super::score::figure;
-use super::{Context, Reading};
 use catoptric::compare::{CONTRADICTION, Row};
 use catoptric::junit::Suite;
 use catoptric::score::Honesty;

@@ -1,9 +1,8 @@
 //! `catoptric completions`: prints a shell's completion script.
 
-use super::Cli;
 use super::error::CliError;
 use super::output::print;
-use clap::{Args, CommandFactory};
+use clap::{Args, Command};
 use clap_complete::Shell;
 
 /// Arguments of `completions`.
@@ -13,8 +12,8 @@ pub(crate) struct Arguments {
     shell: Shell,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
+pub(crate) fn run(arguments: &Arguments, mut program: Command) -> Result<(), CliError> {
     let mut script = Vec::new();
-    clap_complete::generate(arguments.shell, &mut Cli::command(), "catoptric", &mut script);
+    clap_complete::generate(arguments.shell, &mut program, "catoptric", &mut script);
     print(&String::from_utf8_lossy(&script))
 }

@@ -1,11 +1,11 @@
 //! `catoptric demo`: simulates, calibrates, scores and reports on the built-in scene.
 
 use super::calibrate::summary;
+use super::context::{Context, Reading};
 use super::error::CliError;
 use super::judging::conclude;
 use super::output::{counted, grouped, print, quoted};
 use super::score::figure;
-use super::{Context, Reading};
 use catoptric::apply::{CloudSketch, Lift};
 use catoptric::calib::Options;
 use catoptric::files;

@@ -1,9 +1,9 @@
 //! `catoptric export`: writes a layout as files for manufacturing and use, or a dataset's boards as a table.
 
+use super::context::{Context, Reading};
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print, quoted};
-use super::{Context, Reading};
 use catoptric::export::Part;
 use catoptric::{Error, ExportFormat, ExportOptions, Scene, export, export_boards, files};
 use clap::Args;

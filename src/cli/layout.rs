@@ -1,6 +1,6 @@
 //! `catoptric layout`: analyzes the coverage, losses and attainable accuracy of mirror layouts, several side by side.
 
-use super::Context;
+use super::context::Context;
 use super::error::CliError;
 use super::judging::{Limits, write_junit};
 use super::output::{print, quoted};

@@ -1,4 +1,4 @@
-//! The command line: global options, dispatch, and one file per verb.
+//! The command line: dispatch, and one file per verb.
 
 mod apply;
 mod calibrate;
@@ -6,6 +6,7 @@ mod characterize;
 mod check;
 mod compare;
 mod completions;
+mod context;
 mod demo;
 mod error;
 mod export;
@@ -28,13 +29,11 @@ mod tolerance;
 mod trace;
 mod validate;
 
-use catoptric::{Control, Damage, Dataset, Stop, read_dataset_with};
-use clap::{ArgAction, Args, Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
+use context::{Context, Global};
 use error::CliError;
 use progress::Reporter;
 use std::ffi::OsString;
-use std::io::Write;
-use std::path::Path;
 use std::sync::Arc;
 
 /// Printed at the end of every help text.
@@ -49,20 +48,6 @@ struct Cli {
     global: Global,
     #[command(subcommand)]
     verb: Verb,
-}
-
-/// Options of every verb.
-#[derive(Debug, Clone, Args)]
-struct Global {
-    /// Number of threads; all of the machine by default. Affects speed, never results.
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    threads: Option<u16>,
-    /// Print more on stderr.
-    #[arg(short, long, global = true, action = ArgAction::Count)]
-    verbose: u8,
-    /// Print nothing but errors on stderr.
-    #[arg(short, long, global = true, conflicts_with = "verbose")]
-    quiet: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -109,70 +94,6 @@ enum Verb {
     Completions(completions::Arguments),
     /// Print the manual page, or write all of them
     Man(man::Arguments),
-}
-
-/// What every verb receives in addition to its own arguments.
-pub(crate) struct Context {
-    global: Global,
-    /// The command line as given, without the program's name.
-    given: Vec<OsString>,
-    stop: Stop,
-    reporter: Arc<Reporter>,
-}
-
-/// How a dataset is read.
-#[derive(Debug, Clone, Copy, Default, Args)]
-pub(crate) struct Reading {
-    /// Leave out the damaged stretches of a recording, with the reason, and use the rest
-    #[arg(long)]
-    partial: bool,
-}
-
-impl Context {
-    /// The control of a long verb: it stops on Ctrl-C and reports progress on stderr.
-    fn control(&self) -> Control {
-        let reporter = self.reporter.clone();
-        Control {
-            stop: self.stop.clone(),
-            progress: Some(Arc::new(move |progress| reporter.report(progress))),
-            threads: None,
-        }
-    }
-
-    /// Reads a dataset, and says what was unusual in its recording. Ctrl-C stops that, and every later pass over its
-    /// readings.
-    fn read_dataset(&self, folder: &Path, reading: Reading) -> Result<Dataset, CliError> {
-        let damage = if reading.partial {
-            Damage::LeftOut
-        } else {
-            Damage::Refused
-        };
-        let dataset = read_dataset_with(folder, damage, &self.control())?;
-        for warning in &dataset.warnings {
-            self.say(&format!("warning: {warning}"));
-        }
-        Ok(dataset)
-    }
-
-    /// Returns an error once Ctrl-C has been pressed.
-    fn check(&self) -> Result<(), CliError> {
-        Ok(self.stop.check().map_err(catoptric::Error::from)?)
-    }
-
-    /// Prints a line on stderr, unless `--quiet` is set.
-    fn say(&self, text: &str) {
-        if !self.global.quiet {
-            // If stderr is closed, there is nowhere left to report to.
-            let _ = writeln!(anstream::stderr(), "{text}");
-        }
-    }
-
-    /// Prints a line on stderr if `--verbose` is set.
-    fn detail(&self, text: &str) {
-        if self.global.verbose > 0 {
-            self.say(text);
-        }
-    }
 }
 
 /// Runs the program on its arguments, the first of which is its name, and returns its exit code.
@@ -240,7 +161,7 @@ fn dispatch(verb: &Verb, context: &Context) -> Result<(), CliError> {
         Verb::New(arguments) => new::run(arguments),
         Verb::Check(arguments) => check::run(arguments, context),
         Verb::Schema => schema::run(),
-        Verb::Completions(arguments) => completions::run(arguments),
-        Verb::Man(arguments) => man::run(arguments),
+        Verb::Completions(arguments) => completions::run(arguments, Cli::command()),
+        Verb::Man(arguments) => man::run(arguments, Cli::command()),
     }
 }

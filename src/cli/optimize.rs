@@ -1,6 +1,6 @@
 //! `catoptric optimize`: searches the parameters of a scene for better layouts.
 
-use super::Context;
+use super::context::Context;
 use super::error::CliError;
 use super::judging::Limits;
 use super::output::{counted, grouped, print, print_json, quoted};

@@ -1,9 +1,9 @@
 //! `catoptric plan`: plans which board poses to record next, from the drawing or for what a dataset lacks.
 
+use super::context::{Context, Reading};
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print, print_json, quoted};
-use super::{Context, Reading};
 use catoptric::calib::plan::{Criterion, FacetPlan, Open, Plan, PlannedPose, Request, Standing};
 use catoptric::files::{self, dataset};
 use catoptric::{Dataset, PlanStart, Scene, completed_scene, plan, planned_scene, report, write_planned};

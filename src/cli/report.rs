@@ -1,9 +1,9 @@
 //! `catoptric report`: writes one HTML page about calibrations and their scores.
 
+use super::context::{Context, Reading};
 use super::error::CliError;
 use super::judging::conclude;
 use super::output::print;
-use super::{Context, Reading};
 use catoptric::apply::{CloudSketch, Lift};
 use catoptric::report::MAX_POINTS;
 use catoptric::{CloudFrame, Error, Verdict, files, read_calibration, read_reference, report, score};

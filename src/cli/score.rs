@@ -1,9 +1,9 @@
 //! `catoptric score`: compares a calibration with the truth or, on blind data, with boards and walls.
 
+use super::context::{Context, Reading};
 use super::error::CliError;
 use super::judging::{Judging, conclude, write_junit};
 use super::output::{print, quoted};
-use super::{Context, Reading};
 use catoptric::junit::Suite;
 use catoptric::{Score, read_reference, score_with};
 use clap::Args;

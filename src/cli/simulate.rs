@@ -1,6 +1,6 @@
 //! `catoptric simulate`: simulates the experiment of a scene and writes it as a dataset.
 
-use super::Context;
+use super::context::Context;
 use super::error::CliError;
 use super::output::{counted, print, print_json, quoted};
 use catoptric::{Recording, Scene, simulate_into};

@@ -1,6 +1,6 @@
 //! `catoptric study`: runs many experiments and reports the statistics of their errors.
 
-use super::Context;
+use super::context::Context;
 use super::error::CliError;
 use super::judging::{Limits, conclude, unknown, write_junit};
 use super::output::{print, print_json, quoted};

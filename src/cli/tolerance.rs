@@ -1,6 +1,6 @@
 //! `catoptric tolerance`: analyzes the effect of manufacturing errors on a layout, before and after calibration.
 
-use super::Context;
+use super::context::Context;
 use super::error::CliError;
 use super::judging::Limits;
 use super::layout::refused;

@@ -1,6 +1,6 @@
 //! `catoptric trace`: traces arbitrary rays through a scene and writes their paths.
 
-use super::Context;
+use super::context::Context;
 use super::error::CliError;
 use super::output::{counted, print, print_json};
 use catoptric::files::IoError;

@@ -90,15 +90,15 @@ const ROOMS: [Room; 16] = [
     ]),
     room("files", &["model", "sim"]).still_tied(),
     room("assess", &["files", "sim", "calib"]).still_tied(),
-    room("design", &["assess"]).still_tied(),
-    room("report", &["assess", "design"]).still_tied(),
+    room("design", &["assess"]),
+    room("report", &["assess", "design"]),
     room("catoptric", &["files", "assess", "design", "report"]),
     room("fixtures", &["model", "sim"]),
     room("studio", &["catoptric"]),
     room("import", &["catoptric"]),
     room("live", &["catoptric"]),
     room("flight", &["catoptric"]),
-    room(PROGRAM, &["catoptric", "studio", "import", "live", "flight"]).still_tied(),
+    room(PROGRAM, &["catoptric", "studio", "import", "live", "flight"]),
     room("py", &[PROGRAM]),
 ];
 

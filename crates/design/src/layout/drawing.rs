@@ -1,9 +1,9 @@
 //! The geometry of a layout for drawing or building it: mirrors, posts, housing, the paths of all beams.
 
-use super::element::{Class, exit, trace};
 use super::field::{Cell, cells};
 use super::footprint::{Footprint, Outlines};
 use super::size::HOUSING;
+use super::traced::{Class, exit, trace};
 use catoptric_cast::Triangle;
 use catoptric_model::{Pose, ScanGeometry};
 use catoptric_sim::build::room_from_rig;

@@ -1,9 +1,10 @@
 //! Facet by facet: its elements, the extent of its fan, its margins, and the effect of its errors.
 
-use super::element::{Class, Element, Traced, exit};
-use super::field::Cell;
+use super::element::Element;
+use super::field::{Cell, SPHERE_SR};
 use super::footprint::Footprint;
 use super::sensitivity::{RANGE_M, Shift, shifts};
+use super::traced::{Class, Traced, exit};
 use catoptric_cast::area_vector;
 use catoptric_model::ScanGeometry;
 use catoptric_sim::build::Structure;
@@ -134,7 +135,7 @@ fn view(
         exit_azimuth_deg: azimuths(&own),
         exit_elevation_deg: extremes(&|e| e.exit_elevation_deg),
         solid_angle_sr,
-        field_of_regard: solid_angle_sr / super::SPHERE_SR,
+        field_of_regard: solid_angle_sr / SPHERE_SR,
         mirror_at_m: extremes(&|e| Some(e.mirror_at_m)),
         range_max_white_m: extremes(&|e| e.range_max_white_m).map(|[min, _]| min),
         range_max_dark_m: extremes(&|e| e.range_max_dark_m).map(|[min, _]| min),

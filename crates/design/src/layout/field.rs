@@ -6,7 +6,7 @@
 //! Every cell is divided into parts, and a part counts unless an earlier sequence covers it, so that cells without
 //! overlap keep their solid angle exactly.
 
-use super::element::{Traced, exit};
+use super::traced::{Traced, exit};
 use catoptric_model::ScanGeometry;
 use catoptric_sim::build::Structure;
 use catoptric_sim::receive::Sensor;
@@ -18,6 +18,9 @@ use std::sync::LazyLock;
 
 /// Angle within which a direction counts as near a beam, in degrees.
 pub const NEAR_DEG: f64 = 5.0;
+
+/// Solid angle of all directions.
+pub(super) const SPHERE_SR: f64 = 4.0 * std::f64::consts::PI;
 
 /// Number of parts of a cell along the scan and across it.
 const PARTS: [usize; 2] = [3, 6];

@@ -5,7 +5,7 @@
 //! outline of a footprint is complete even where an edge cuts it, and its margin is then negative. Glass moves a
 //! footprint by less than its own thickness; this is neglected.
 
-use super::element::Traced;
+use super::traced::Traced;
 use catoptric_cast::Polygon;
 use catoptric_cast::Ray;
 use catoptric_model::mirror;

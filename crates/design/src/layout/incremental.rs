@@ -3,15 +3,26 @@
 //! After a change of mirrors or posts, only beams that hit the changed ones, or that pass where they are now, are
 //! traced again. The results for the layout are bit-identical to those of a layout traced from scratch.
 
-use super::element::{self, Traced};
 use super::footprint::{Footprint, Outlines};
-use super::{Analysis, Detail};
+use super::traced::{Traced, trace_one};
 use catoptric_sim::build::Structure;
 use catoptric_sim::light::{Edit, Mirrors, Setting};
 use catoptric_sim::receive::Sensor;
 use catoptric_sim::{Scene, SimError};
 use rayon::prelude::*;
+use serde::Serialize;
 use std::sync::Arc;
+
+/// Level of detail of an analysis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Detail {
+    /// The scene's own sub-rays.
+    #[default]
+    Full,
+    /// One ray per beam: elements that an edge cuts are not distinguished.
+    Coarse,
+}
 
 /// An analyzed layout that can be edited.
 ///
@@ -37,13 +48,13 @@ pub struct Layout {
     detail: Detail,
     pub(super) sensor: Sensor,
     pub(super) structure: Structure,
-    beams: Vec<Arc<Beam>>,
+    pub(super) beams: Vec<Arc<Beam>>,
 }
 
 /// The traced paths and footprints of a beam.
-struct Beam {
-    traced: Traced,
-    footprints: Vec<Footprint>,
+pub(super) struct Beam {
+    pub(super) traced: Traced,
+    pub(super) footprints: Vec<Footprint>,
 }
 
 impl Layout {
@@ -78,21 +89,6 @@ impl Layout {
         Ok(layout)
     }
 
-    /// Returns what the layout sees, loses and allows.
-    ///
-    /// # Errors
-    /// As [`Layout::new`]; a layout that was constructed has none.
-    pub fn analysis(&self) -> Result<Analysis, SimError> {
-        let traced: Vec<&Traced> = self.beams.iter().map(|beam| &beam.traced).collect();
-        let footprints: Vec<&Footprint> = self.beams.iter().flat_map(|beam| &beam.footprints).collect();
-        Ok(super::analysis(
-            self,
-            &self.setting()?.names(),
-            &traced,
-            &footprints,
-        ))
-    }
-
     fn drawn(scene: &Scene, seed: Option<u64>, detail: Detail) -> Result<Self, SimError> {
         let sensor = match detail {
             Detail::Full => Sensor::new(scene)?,
@@ -115,7 +111,7 @@ impl Layout {
         })
     }
 
-    fn setting(&self) -> Result<Setting<'_>, SimError> {
+    pub(super) fn setting(&self) -> Result<Setting<'_>, SimError> {
         Setting::new(&self.scene, &self.structure, Mirrors::Attached, Vec::new())
     }
 
@@ -127,7 +123,7 @@ impl Layout {
     ) -> Vec<Arc<Beam>> {
         let outlines = Outlines::new(&self.sensor, &self.structure);
         let trace = |beam| {
-            let traced = element::trace_one(&self.sensor, setting, &self.scene, beam);
+            let traced = trace_one(&self.sensor, setting, &self.scene, beam);
             let footprints = outlines.of(&traced);
             Arc::new(Beam { traced, footprints })
         };

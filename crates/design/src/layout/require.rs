@@ -3,7 +3,7 @@
 //! Every number of the JSON except those of single elements has a name: its keys joined by dots, facets by their names,
 //! other lists by index. `*` instead of a facet's name means every facet.
 
-use super::Analysis;
+use super::analysis::Analysis;
 pub(crate) use catoptric_assess::requirement::numbers;
 pub use catoptric_assess::requirement::{Requirement, RequirementError, Unmet};
 

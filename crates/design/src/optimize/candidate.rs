@@ -1,7 +1,8 @@
 //! Candidates of the search: a choice of parameter values with the goals and requirements of its layout.
 
+use super::error::OptimizeError;
 use super::goal::{Goal, requires_accuracy};
-use super::{OpenParameter, OptimizeError, Options};
+use super::options::{OpenParameter, Options};
 use crate::layout::{self, Analysis, Layout};
 use catoptric_files::parametric::ParametricScene;
 use catoptric_sim::Scene;

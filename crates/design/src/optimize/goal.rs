@@ -1,6 +1,5 @@
 //! Goals: quantities of a layout to maximize or minimize.
 
-use super::Stated;
 use crate::layout::{Analysis, Requirement};
 use catoptric_model::beam;
 use catoptric_model::place::nearest;
@@ -36,6 +35,17 @@ pub struct Goal {
     better: Better,
     unit: Option<&'static str>,
     what: Measure,
+}
+
+/// A goal as results state it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Stated {
+    /// Its name.
+    pub name: String,
+    /// Whether more or less of it is better.
+    pub better: Better,
+    /// Its unit; `None` for a share or a count.
+    pub unit: Option<&'static str>,
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -20,103 +20,26 @@
 //! stored in order: the same seed gives the same result on any number of threads.
 
 mod candidate;
+mod error;
 mod explain;
 mod front;
 mod goal;
+mod options;
 mod search;
 
 pub use candidate::Candidate;
+pub use error::OptimizeError;
 pub use explain::{LeftAsItWas, Why};
-pub use goal::{Better, Goal, GoalError, Wanted};
+pub use goal::{Better, Goal, GoalError, Stated, Wanted};
+pub use options::{OpenParameter, Options, Progress};
 
-use crate::layout::{Detail, Requirement, RequirementError};
 use candidate::Judge;
 use catoptric_files::parametric::ParametricScene;
-use catoptric_sim::SimError;
 use search::Search;
 use serde::Serialize;
 
 /// Version of the format of a search result.
 pub const SCHEMA_VERSION: u32 = 1;
-
-/// Goals, requirements and extent of a search.
-#[derive(Debug, Clone)]
-pub struct Options {
-    /// The goals.
-    pub goals: Vec<Goal>,
-    /// Requirements that every layout has to meet.
-    pub requirements: Vec<Requirement>,
-    /// Number of layouts to evaluate.
-    pub evaluations: usize,
-    /// Seed of the search.
-    pub seed: u64,
-    /// Level of detail of each evaluation.
-    pub detail: Detail,
-}
-
-/// Why a search failed.
-#[derive(Debug, thiserror::Error)]
-pub enum OptimizeError {
-    /// There is no parameter to vary.
-    #[error("the scene has no parameter with both `low` and `high`")]
-    NothingOpen,
-    /// There is no goal.
-    #[error("a search needs a goal")]
-    NoGoal,
-    /// A goal is invalid.
-    #[error(transparent)]
-    Goal(#[from] GoalError),
-    /// A requirement is invalid.
-    #[error(transparent)]
-    Requirement(#[from] RequirementError),
-    /// The scene cannot be set up.
-    #[error(transparent)]
-    Setup(#[from] SimError),
-    /// The optimizer stopped with an error.
-    #[error("the search ended early: {0}")]
-    Search(String),
-}
-
-impl OptimizeError {
-    /// Returns advice on how to correct it, where there is any.
-    pub fn help(&self) -> Option<String> {
-        match self {
-            Self::Goal(GoalError::Unknown { help, .. } | GoalError::Figure { help, .. }) => {
-                Some(help.clone())
-            }
-            Self::Requirement(error) => error.help(),
-            Self::Goal(GoalError::Direction { .. } | GoalError::Directions)
-            | Self::NothingOpen
-            | Self::NoGoal
-            | Self::Setup(_)
-            | Self::Search(_) => None,
-        }
-    }
-}
-
-/// A parameter that the search varied.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct OpenParameter {
-    /// Its name.
-    pub name: String,
-    /// Lower limit.
-    pub low: f64,
-    /// Upper limit.
-    pub high: f64,
-    /// Value in the scene.
-    pub start: f64,
-}
-
-/// A goal as results state it.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Stated {
-    /// Its name.
-    pub name: String,
-    /// Whether more or less of it is better.
-    pub better: Better,
-    /// Its unit; `None` for a share or a count.
-    pub unit: Option<&'static str>,
-}
 
 /// The result of a search.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -150,15 +73,6 @@ pub struct Optimum {
     /// Goals of every layout that meets the requirements, in order of evaluation.
     #[serde(skip)]
     pub tried: Vec<Vec<f64>>,
-}
-
-/// Progress of a search.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Progress {
-    /// Number of layouts evaluated since the last report.
-    pub more: usize,
-    /// Number of layouts on the front so far.
-    pub front: usize,
 }
 
 /// Runs a search; `watch` is called after every batch and stops the search by returning `false`.

@@ -2,7 +2,7 @@
 
 use super::candidate::{Candidate, Judge};
 use super::front::{front, spreads};
-use super::{Options, Progress};
+use super::options::{Options, Progress};
 use argmin::core::{CostFunction, Error, Executor, PopulationState, SendAlias, SyncAlias};
 use argmin::solver::particleswarm::{Particle, ParticleSwarm};
 use rand_xoshiro::Xoshiro256PlusPlus;

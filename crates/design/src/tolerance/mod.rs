@@ -34,10 +34,9 @@ mod summary;
 pub use after::{Bounds, Calibrated, calibrate};
 pub use cause::Cause;
 pub use draw::{Built, Departure, Draw, POINT_RANGE_M, Workshop};
-pub use summary::{Counts, Distribution, Errors, FacetTolerance, Histogram, Source, Tolerance};
-
-/// Version of the format of a tolerance analysis.
-pub const SCHEMA_VERSION: u32 = 1;
+pub use summary::{
+    Counts, Distribution, Errors, FacetTolerance, Histogram, SCHEMA_VERSION, Source, Tolerance,
+};
 
 use crate::layout::{Requirement, RequirementError, Unmet, numbers};
 

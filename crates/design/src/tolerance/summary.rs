@@ -1,11 +1,14 @@
 //! Summary of many structures: the result of a tolerance analysis.
 
 use super::draw::{Built, Departure, Draw, Workshop};
-use super::{Bounds, Calibrated, SCHEMA_VERSION};
+use super::{Bounds, Calibrated};
 use crate::layout::Class;
 use catoptric_assess::score::percentile;
 use catoptric_sim::Scene;
 use serde::Serialize;
+
+/// Version of the format of a tolerance analysis.
+pub const SCHEMA_VERSION: u32 = 1;
 
 /// Maximum number of bars of a histogram, apart from the one of the largest value.
 const BARS: f64 = 60.0;

@@ -1,6 +1,6 @@
 //! The depth image: the room in gray, the elements' ranges in color, and a color scale.
 
-use super::Drawn;
+use super::drawn::Drawn;
 use super::perspective::base64;
 use super::picture::Picture;
 use super::views;

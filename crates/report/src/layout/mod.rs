@@ -2,44 +2,19 @@
 
 mod canvas;
 mod depth;
+mod drawn;
 mod perspective;
 mod picture;
 mod sides;
 mod tables;
 mod views;
 
+pub use drawn::Drawn;
+
 use super::figure::{css, standalone};
 use super::page::{escape, figure as block, legend, page, table};
-use catoptric_design::layout::{Analysis, Depth, Drawing};
-use catoptric_sim::{Scene, SimError};
 use sides::SIDES;
 use views::LOST;
-
-/// A layout: its analysis, and the geometry to draw.
-#[derive(Debug, Clone)]
-pub struct Drawn {
-    analysis: Analysis,
-    drawing: Drawing,
-    depth: Depth,
-}
-
-impl Drawn {
-    /// Traces the geometry of an analyzed layout.
-    ///
-    /// # Errors
-    /// As [`layout::analyze`](catoptric_design::layout::analyze).
-    pub fn new(scene: &Scene, analysis: &Analysis) -> Result<Self, SimError> {
-        let mut scene = scene.clone();
-        // As many sub-rays as in the analysis; that number came from a scene.
-        scene.scanner.sub_rays = u32::try_from(analysis.sub_rays).unwrap_or(scene.scanner.sub_rays);
-        let drawing = Drawing::new(&scene, analysis.seed)?;
-        Ok(Self {
-            depth: catoptric_design::layout::depth(&scene, &drawing)?,
-            drawing,
-            analysis: analysis.clone(),
-        })
-    }
-}
 
 /// Returns the page, as HTML.
 pub fn layout(layouts: &[Drawn]) -> String {
@@ -129,14 +104,6 @@ fn file_name(name: &str) -> String {
         }
     };
     name.chars().map(letter).collect()
-}
-
-/// Returns the radius about the scanner of everything built, in meters.
-fn radius(drawing: &Drawing) -> f64 {
-    let faces = drawing.facets.iter().flat_map(|f| &f.face.corners);
-    let bodies = drawing.parts.iter().flat_map(|p| p.skin.iter().flatten());
-    // The lower limit leaves something to draw axes in if nothing is built.
-    faces.chain(bodies).map(|p| p.coords.norm()).fold(0.05, f64::max)
 }
 
 /// The pictures of one layout, with caption, legend and table.

@@ -1,8 +1,8 @@
 //! The structure with its beams in perspective: triangles and lines with a depth buffer, shaded, as PNG.
 
 use super::canvas::{Canvas, SIZE, mixed};
+use super::drawn::{Drawn, radius};
 use super::views::{DIRECT, is_drawn, ray_color};
-use super::{Drawn, radius};
 use crate::figure::{color, css};
 use crate::page::escape;
 use catoptric_design::layout::center;

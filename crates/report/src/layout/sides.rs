@@ -1,6 +1,6 @@
 //! The structure with its beams from three sides.
 
-use super::Drawn;
+use super::drawn::{Drawn, radius};
 use super::views::{DIRECT, is_drawn, ray_color};
 use crate::figure::{self, Axes, Stroke, color};
 use nalgebra::Point3;
@@ -51,7 +51,7 @@ pub(super) fn side(drawn: &Drawn, side: &Side) -> String {
         width,
         opacity,
     };
-    let half = 1e3 * super::radius(drawing) * 1.5;
+    let half = 1e3 * radius(drawing) * 1.5;
     let mut strokes = Vec::new();
     for part in &drawing.parts {
         let corners: Vec<(f64, f64)> = part.skin.iter().flatten().map(flat).collect();

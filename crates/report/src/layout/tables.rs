@@ -1,6 +1,6 @@
 //! The tables next to the pictures of a layout.
 
-use super::Drawn;
+use super::drawn::Drawn;
 use crate::page::number;
 use catoptric_design::layout::{Analysis, Class, FacetView};
 

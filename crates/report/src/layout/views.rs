@@ -1,6 +1,6 @@
 //! Flat pictures of a layout: the map of directions, the scan, the footprints on the facets.
 
-use super::Drawn;
+use super::drawn::Drawn;
 use crate::figure::{Area, Axes, GRID, Label, Shapes, Stroke, color, fine, round_numbers};
 use catoptric_design::layout::{Class, DrawnRay, ElementRun, Footprint};
 use catoptric_model::beam;
