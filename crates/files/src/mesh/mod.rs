@@ -2,11 +2,12 @@
 //!
 //! The extension determines the format: to add one, write its file with its row, and add its variant to [`MeshFormat`].
 //! Damaged files give an error that names the line, or the byte in a binary file; no content can crash the reader, and
-//! sizes stated in a file are not trusted before the bytes are read. Polygons of more than three corners are split into a
-//! fan.
+//! sizes stated in a file are not trusted before the bytes are read. Polygons of more than three corners are split into
+//! triangles.
 
 mod obj;
 mod ply;
+mod polygon;
 mod row;
 mod stl;
 
