@@ -25,7 +25,9 @@ fn parse(bytes: &[u8]) -> Parsed {
             content.push_str(lines.next().map_or("", |(_, more)| more));
         }
         // A comment begins a word; in `1.#QNAN0` the sign does not.
-        let mut words = content.split_whitespace().take_while(|word| !word.starts_with('#'));
+        let mut words = content
+            .split_whitespace()
+            .take_while(|word| !word.starts_with('#'));
         match words.next() {
             Some("v") => vertices.push(triple(&mut words, line, "a vertex")?),
             Some("f") => {

@@ -173,7 +173,11 @@ impl Body<'_> {
     /// Passes over numbers beyond those of an element: some programs write more in a row than they say.
     fn end_row(&mut self) {
         if self.encoding == Encoding::Text {
-            while self.bytes.get(self.at).is_some_and(|byte| !matches!(byte, b'\n' | b'\r')) {
+            while self
+                .bytes
+                .get(self.at)
+                .is_some_and(|byte| !matches!(byte, b'\n' | b'\r'))
+            {
                 self.at += 1;
             }
         }
@@ -280,10 +284,13 @@ fn parse(bytes: &[u8]) -> Parsed {
 
 /// The triangles of a strip, every other one with its corners exchanged.
 fn of_strip(strip: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
-    strip.windows(3).enumerate().map(|(number, corners)| match number % 2 {
-        0 => [corners[0], corners[1], corners[2]],
-        _ => [corners[1], corners[0], corners[2]],
-    })
+    strip
+        .windows(3)
+        .enumerate()
+        .map(|(number, corners)| match number % 2 {
+            0 => [corners[0], corners[1], corners[2]],
+            _ => [corners[1], corners[0], corners[2]],
+        })
 }
 
 /// All triangles in the order of the faces.
@@ -306,7 +313,10 @@ fn with_polygons(
             Fault::Whole(_) => Fault::Whole(message),
         };
         let split = match face.iter().find(|v| **v as usize >= vertices.len()) {
-            Some(vertex) => Err(format!("a face uses vertex {vertex}; there are {}, numbered from 0", vertices.len())),
+            Some(vertex) => Err(format!(
+                "a face uses vertex {vertex}; there are {}, numbered from 0",
+                vertices.len()
+            )),
             None => polygon::triangles(&face, vertices),
         };
         all.extend(split.map_err(at)?);

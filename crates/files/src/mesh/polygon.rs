@@ -86,7 +86,11 @@ fn is_convex(flat: &[Point2<f64>]) -> bool {
         .filter(|rise| *rise != 0.0)
         .map(|rise| rise > 0.0)
         .collect();
-    let changes = rises.iter().zip(rises.iter().cycle().skip(1)).filter(|(a, b)| a != b).count();
+    let changes = rises
+        .iter()
+        .zip(rises.iter().cycle().skip(1))
+        .filter(|(a, b)| a != b)
+        .count();
     left && changes <= 2
 }
 
@@ -156,7 +160,9 @@ mod tests {
     use proptest::prelude::*;
 
     fn place(flat: &[[f64; 2]]) -> Vec<Point3<f64>> {
-        flat.iter().map(|[x, y]| Point3::new(*x, *y, 0.5 * x - 0.25 * y + 3.0)).collect()
+        flat.iter()
+            .map(|[x, y]| Point3::new(*x, *y, 0.5 * x - 0.25 * y + 3.0))
+            .collect()
     }
 
     fn split(flat: &[[f64; 2]]) -> Result<Vec<[u32; 3]>, String> {
@@ -212,7 +218,16 @@ mod tests {
 
     #[test]
     fn the_notch_of_a_u_stays_open() {
-        let u = [[0.0, 0.0], [6.0, 0.0], [6.0, 4.0], [4.0, 4.0], [4.0, 1.0], [2.0, 1.0], [2.0, 4.0], [0.0, 4.0]];
+        let u = [
+            [0.0, 0.0],
+            [6.0, 0.0],
+            [6.0, 4.0],
+            [4.0, 4.0],
+            [4.0, 1.0],
+            [2.0, 1.0],
+            [2.0, 4.0],
+            [0.0, 4.0],
+        ];
         let found = split(&u).expect("it is simple");
         assert_eq!(covering(&u, &found, [3.0, 2.5]), 0);
         assert_eq!(covering(&u, &found, [1.01, 2.52]), 1);
@@ -232,6 +247,10 @@ mod tests {
             Point3::new(1.0, 1.0, 0.8),
             Point3::new(0.0, 4.0, 0.0),
         ];
-        assert!(triangles(&[0, 1, 2, 3], &bent).expect_err("refused").contains("not plane"));
+        assert!(
+            triangles(&[0, 1, 2, 3], &bent)
+                .expect_err("refused")
+                .contains("not plane")
+        );
     }
 }

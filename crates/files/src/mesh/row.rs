@@ -57,7 +57,9 @@ pub(super) fn triple<'a>(
 /// characters, which no number contains.
 pub(super) fn text_of(bytes: &[u8]) -> String {
     let bytes = bytes.strip_prefix(MARK).unwrap_or(bytes);
-    String::from_utf8_lossy(bytes).replace("\r\n", "\n").replace('\r', "\n")
+    String::from_utf8_lossy(bytes)
+        .replace("\r\n", "\n")
+        .replace('\r', "\n")
 }
 
 /// Numbered lines of text, from 1.

@@ -50,7 +50,9 @@ fn parse(bytes: &[u8]) -> Parsed {
     let fits = |n: usize| n.checked_mul(STL_TRIANGLE).map(|size| size + STL_HEADER) == Some(bytes.len());
     // A binary header may begin with "solid" as text does; then its size decides, or that text has no zero bytes.
     let begin = bytes.strip_prefix(MARK).unwrap_or(bytes).trim_ascii_start();
-    let says_solid = begin.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
+    let says_solid = begin
+        .get(..5)
+        .is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
     if says_solid && !count.is_some_and(fits) && !bytes.contains(&0) {
         return text(&text_of(bytes));
     }
@@ -68,7 +70,9 @@ fn parse(bytes: &[u8]) -> Parsed {
         let spare = bytes.get(end..);
         spare.is_some_and(|spare| spare.len() < STL_TRIANGLE || spare.iter().all(|byte| *byte == 0))
     };
-    let end = count.checked_mul(STL_TRIANGLE).and_then(|size| size.checked_add(STL_HEADER));
+    let end = count
+        .checked_mul(STL_TRIANGLE)
+        .and_then(|size| size.checked_add(STL_HEADER));
     let Some(end) = end.filter(|end| is_whole(*end)) else {
         let expected = count as u64 * STL_TRIANGLE as u64 + STL_HEADER as u64;
         return Err(Fault::Byte(
