@@ -1,5 +1,5 @@
 //! Polygons as triangles: convex ones as a fan, concave ones by clipping ears in their plane (Meisters, "Polygons have
-//! ears", 1975). A concave polygon that is not plane, or crosses itself, encloses no surface that everybody agrees on, and is
+//! ears", 1975). A concave polygon that is not flat, or crosses itself, encloses no surface that everybody agrees on, and is
 //! refused.
 
 use nalgebra::{Point2, Point3, Vector3};
@@ -40,7 +40,7 @@ pub(super) fn triangles(corners: &[u32], vertices: &[Point3<f64>]) -> Result<Vec
     let off = |p: &Point3<f64>| unit.dot(&(p - places[0])).abs();
     let extent = places.iter().map(|p| (p - places[0]).norm()).fold(0.0, f64::max);
     if places.iter().map(off).fold(0.0, f64::max) > FLATNESS * extent {
-        return Err("a concave face is not plane, so that its surface is undefined".to_owned());
+        return Err("a concave face is not flat, so that its surface is undefined".to_owned());
     }
     if crosses_itself(&flat) {
         return Err("a face crosses itself, so that its surface is undefined".to_owned());
@@ -250,7 +250,7 @@ mod tests {
         assert!(
             triangles(&[0, 1, 2, 3], &bent)
                 .expect_err("refused")
-                .contains("not plane")
+                .contains("not flat")
         );
     }
 }
