@@ -55,7 +55,7 @@ impl Control {
                 .map_err(|e| Error::Threads(e.to_string()))?
                 .install(work),
         };
-        done.or_else(|error| Err(self.check().err().unwrap_or(error)))
+        done.map_err(|error| self.check().err().unwrap_or(error))
     }
 
     /// Returns an error once a stop has been requested.
