@@ -279,7 +279,8 @@ fn parse(bytes: &[u8]) -> Parsed {
             }
         }
     }
-    finish(vertices.clone(), with_polygons(triangles, polygons, &vertices)?)
+    let triangles = with_polygons(triangles, polygons, &vertices)?;
+    finish(vertices, triangles)
 }
 
 /// The triangles of a strip, every other one with its corners exchanged.
