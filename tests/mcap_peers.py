@@ -12,7 +12,9 @@ import argparse
 import hashlib
 import json
 import math
+import subprocess
 import sys
+import tempfile
 import tomllib
 from collections import defaultdict
 from pathlib import Path
@@ -25,6 +27,7 @@ from rosbags.highlevel import AnyReader
 EPOCH_NS = 1_518_000_000 * 10**9
 LABEL_TOPIC = "/session/pose"
 TYPES = {
+    LABEL_TOPIC: "std_msgs/msg/String",
     "/scan": "sensor_msgs/msg/LaserScan",
     "/echoes": "sensor_msgs/msg/MultiEchoLaserScan",
     "/points": "sensor_msgs/msg/PointCloud2",
@@ -79,13 +82,9 @@ def read_with_mcap(path):
         messages = []
         for schema, channel, message in reader.iter_messages(log_time_order=False):
             check(message.log_time == message.publish_time, f"{channel.topic}: log time is not publish time")
-            if channel.message_encoding == "json":
-                decoded, kind = json.loads(message.data), None
-            else:
-                check(schema.encoding == "ros2msg", f"{channel.topic}: schema encoding {schema.encoding!r}")
-                decoded = plain(decoders.decoder_for(channel.message_encoding, schema)(message.data))
-                kind = schema.name
-            messages.append((channel.topic, kind, message.log_time, decoded))
+            check(schema.encoding == "ros2msg", f"{channel.topic}: schema encoding {schema.encoding!r}")
+            decoded = plain(decoders.decoder_for(channel.message_encoding, schema)(message.data))
+            messages.append((channel.topic, schema.name, message.log_time, decoded))
         counted = reader.get_summary().statistics.message_count
         check(counted == len(messages), f"the summary counts {counted} messages, the file holds {len(messages)}")
     return messages
@@ -96,11 +95,8 @@ def read_with_rosbags(path):
     with AnyReader([path]) as reader:
         messages = []
         for connection, time, data in reader.messages():
-            if connection.topic == LABEL_TOPIC:
-                messages.append((connection.topic, None, time, json.loads(data)))
-            else:
-                decoded = plain(reader.deserialize(data, connection.msgtype))
-                messages.append((connection.topic, connection.msgtype, time, decoded))
+            decoded = plain(reader.deserialize(data, connection.msgtype))
+            messages.append((connection.topic, connection.msgtype, time, decoded))
     return messages
 
 
@@ -291,6 +287,20 @@ def check_manifest(dataset):
     return len(manifest["files"])
 
 
+def check_conversions(recording, messages):
+    """`rosbags-convert` without options writes every format that it knows, and each is read back whole."""
+    with tempfile.TemporaryDirectory() as folder:
+        for name in ["as.bag", "as-sqlite3", "as-mcap"]:
+            options = ["--dst-storage", name.removeprefix("as-")] if name != "as.bag" else []
+            out = Path(folder) / name
+            convert = str(Path(sys.executable).parent / "rosbags-convert")
+            command = [convert, "--src", str(recording), "--dst", str(out), *options]
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            check(done.returncode == 0, f"{' '.join(command)}: {done.stderr}")
+            with AnyReader([out]) as reader:
+                check(reader.message_count == len(messages), f"{name} has {reader.message_count} messages")
+
+
 def main():
     """Checks one dataset."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -308,15 +318,16 @@ def main():
 
     messages = read_with_mcap(recording)
     check_agreement(messages, read_with_rosbags(recording))
+    check_conversions(recording, messages)
     for topic, kind, _, _ in messages:
-        known = None if topic == LABEL_TOPIC else TYPES.get(topic, "geometry_msgs/msg/PoseStamped")
+        known = TYPES.get(topic, "geometry_msgs/msg/PoseStamped")
         check(kind == known, f"{topic} holds {kind}, not {known}")
     check_static(messages, session)
 
     stretches = []
     for topic, _, time, message in messages[1:]:
         if topic == LABEL_TOPIC:
-            stretches.append((message, []))
+            stretches.append((json.loads(message["data"]), []))
         else:
             check(stretches, f"{topic}: a message before the first label")
             stretches[-1][1].append((topic, time, message))

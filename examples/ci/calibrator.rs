@@ -3,7 +3,7 @@
 use catoptric::calib::{CalibError, Calibrator, Method};
 use catoptric::model::{Calibration, Dataset};
 use catoptric::sim::Scene;
-use catoptric::testing::{self, Anees, Coverage, Significance};
+use catoptric::testing::{self, Anees, Bias, Coverage, Significance};
 use proptest::prelude::*;
 
 /// Yours; here it calls one of ours.
@@ -41,9 +41,10 @@ proptest! {
 #[test]
 fn states_its_errors() {
     let trials = testing::trials(&scene(), 1..=40, &Mine).unwrap();
-    let significance = Significance::PER_MILLE.among(2);
+    let significance = Significance::PER_MILLE.among(3);
     Anees::over(&trials).assert(significance);
     Coverage::over(&trials, 0.95).assert(significance);
+    Bias::over(&trials).assert(0.0, significance); // in radians: no mean error at all
 }
 
 #[test]

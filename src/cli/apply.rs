@@ -1,6 +1,6 @@
 //! `catoptric apply`: turns a stretch of scans into a point cloud, given a calibration.
 
-use super::context::Context;
+use super::context::{Context, Reading};
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print};
@@ -29,13 +29,15 @@ pub(crate) struct Arguments {
     /// The pose whose scans are taken; those of the empty room by default.
     #[arg(long, value_name = "N")]
     pose: Option<usize>,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let path = &arguments.out;
     // Said before anything is read.
     CloudFormat::of_path(path).map_err(|e| CliError::invalid(e.to_string(), None))?;
-    let dataset = context.read_dataset(&arguments.dataset)?;
+    let dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
     let calibration = read_calibration_for(&arguments.calibration, &dataset.session)?;
     let cloud = apply_into(&dataset, &calibration, arguments.pose, arguments.frame, path)?;
     if cloud.mount_is_nominal {

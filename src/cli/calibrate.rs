@@ -1,6 +1,6 @@
 //! `catoptric calibrate`: estimates a calibration from a dataset. The truth is never read.
 
-use super::context::Context;
+use super::context::{Context, Reading};
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print, quoted};
@@ -39,10 +39,12 @@ pub(crate) struct Arguments {
         default_value = JacobianForm::default().name()
     )]
     jacobian: JacobianForm,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let mut dataset = context.read_dataset(&arguments.dataset)?;
+    let mut dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
     context.check()?;
     if let Some(path) = &arguments.characterization {
         let found = read_characterization(path)?;
@@ -64,7 +66,8 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let begin = Instant::now();
     let calibration = calibrate_with(&dataset, method, &options, &context.control())?;
     context.detail(&format!("calibrated in {:.2} s", begin.elapsed().as_secs_f64()));
-    for warning in &calibration.warnings {
+    let known = |warning: &&String| !dataset.warnings.contains(warning);
+    for warning in calibration.warnings.iter().filter(known) {
         context.say(&format!("warning: {warning}"));
     }
     write_json(&arguments.out, &calibration)?;
@@ -75,7 +78,27 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         cross_validation(&calibration),
         quoted(&arguments.dataset),
         quoted(&arguments.out)
-    ))
+    ))?;
+    let solved = calibration.beams.iter().any(|b| b.status == Status::Solved);
+    // Without a mirror, no element has a direction to solve.
+    if solved || dataset.session.facets.is_empty() {
+        return Ok(());
+    }
+    Err(CliError::Verdict(format!(
+        "not good enough: no element is solved{}",
+        most_frequent(&calibration)
+    )))
+}
+
+/// The most frequent reason why elements are not solved.
+fn most_frequent(calibration: &Calibration) -> String {
+    let abstentions = catoptric::score::words::abstentions(calibration);
+    abstentions.first().map_or_else(String::new, |a| {
+        format!(
+            "; the most frequent reason: {} {} ({})",
+            a.count, a.status, a.reason
+        )
+    })
 }
 
 /// How well the boards are predicted by the others; empty unless requested.

@@ -1,6 +1,6 @@
 //! `catoptric characterize`: measures the range errors of the bare sensor (step 1), from a dataset or a scene.
 
-use super::context::Context;
+use super::context::{Context, Reading};
 use super::error::CliError;
 use super::output::{print, print_json, quoted};
 use catoptric::model::{Characterization, RangeBias};
@@ -27,6 +27,8 @@ pub(crate) struct Arguments {
     /// Print the characterization as JSON instead of tables.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
@@ -37,7 +39,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
             return Err(CliError::invalid(message, None));
         }
         let truth = read_truth(&arguments.input)?;
-        (context.read_dataset(&arguments.input)?, truth)
+        (context.read_dataset(&arguments.input, arguments.reading)?, truth)
     } else {
         let mut scene = Scene::load_with(&arguments.input, &arguments.set)?;
         if let Some(seed) = arguments.seed {

@@ -1,12 +1,14 @@
 //! `catoptric compare`: tabulates several calibrations of one dataset, ours and third-party ones.
 
-use super::context::Context;
+use super::context::{Context, Reading};
 use super::error::CliError;
+use super::judging::{Judging, conclude, write_junit};
 use super::output::{counted, print};
 use super::score::figure;
 use catoptric::compare::{CONTRADICTION, Row};
+use catoptric::junit::Suite;
 use catoptric::score::Honesty;
-use catoptric::{Comparison, Contestant, Error, compare, read_calibration_for, read_truth};
+use catoptric::{Comparison, Contestant, compare_with, read_reference};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -18,36 +20,39 @@ pub(crate) struct Arguments {
     /// The calibrations, ours or third-party.
     #[arg(required = true, num_args = 1.., value_name = "CALIBRATION")]
     calibrations: Vec<PathBuf>,
+    #[command(flatten)]
+    judging: Judging,
     /// Print the table as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    reading: Reading,
 }
 
-/// Succeeds whatever the verdicts are; judging a single calibration is up to `score`.
+/// Succeeds if every calibration does.
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let dataset = context.read_dataset(&arguments.dataset)?;
-    let truth = read_truth(&arguments.dataset)?;
+    let rules = arguments.judging.rules()?;
+    let dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
+    let truth = read_reference(&arguments.dataset, arguments.judging.blind)?;
     let contestants: Vec<Contestant> = arguments
         .calibrations
         .iter()
         .map(|path| {
             Ok(Contestant {
                 name: path.display().to_string(),
-                calibration: read_calibration_for(path, &dataset.session)?,
+                calibration: arguments.judging.read(path)?,
             })
         })
         .collect::<Result<_, CliError>>()?;
-    let found = compare(&dataset, &contestants, truth.as_ref()).map_err(Error::from)?;
+    let found = compare_with(&dataset, &contestants, truth.as_ref(), &rules)?;
+    write_junit(arguments.judging.junit.as_ref(), &Suite::of_comparison(&found))?;
     if arguments.json {
         let json = serde_json::to_string_pretty(&found).map_err(|e| CliError::Output(e.into()))?;
         print(&format!("{json}\n"))?;
     } else {
         print(&words(&found))?;
     }
-    match found.failures.is_empty() {
-        true => Ok(()),
-        false => Err(CliError::Verdict(found.failures.join("\n"))),
-    }
+    conclude(found.verdict, &found.failures)
 }
 
 /// A calibration as a row of a table.
@@ -67,6 +72,11 @@ fn words(found: &Comparison) -> String {
         (&HEADS, cells)
     };
     text += &table(heads, found.rows.iter().map(cells).collect());
+    for row in &found.rows {
+        for mistake in &row.mistakes {
+            text += &format!("{}: {mistake}\n", row.name);
+        }
+    }
     if found.pairs.is_empty() {
         return text;
     }
@@ -111,7 +121,15 @@ const HEADS: [&str; 14] = [
     "verdict",
 ];
 
-const BLIND_HEADS: [&str; 6] = ["calibration", "method", "solved", "abstained", "boards", "walls"];
+const BLIND_HEADS: [&str; 7] = [
+    "calibration",
+    "method",
+    "solved",
+    "abstained",
+    "boards",
+    "walls",
+    "verdict",
+];
 
 fn cells(row: &Row) -> Vec<String> {
     let count = |n: Option<usize>| n.map_or_else(|| "–".to_owned(), |n| n.to_string());
@@ -150,6 +168,7 @@ fn blind_cells(row: &Row) -> Vec<String> {
         row.abstained.to_string(),
         figure(row.boards_rms_mm, 2, " mm"),
         figure(row.walls_rms_mm, 2, " mm"),
+        row.verdict.word().to_owned(),
     ]
 }
 

@@ -2,7 +2,7 @@
 
 use super::error::CliError;
 use super::progress::Reporter;
-use catoptric::{Control, Dataset, Stop, read_dataset_with};
+use catoptric::{Control, Damage, Dataset, Stop, read_dataset_with};
 use clap::{ArgAction, Args};
 use std::ffi::OsString;
 use std::io::Write;
@@ -21,6 +21,14 @@ pub(super) struct Global {
     /// Print nothing but errors on stderr.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub(super) quiet: bool,
+}
+
+/// How a dataset is read.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub(crate) struct Reading {
+    /// Leave out the damaged stretches of a recording, with the reason, and use the rest.
+    #[arg(long)]
+    partial: bool,
 }
 
 /// What every verb receives in addition to its own arguments.
@@ -43,9 +51,19 @@ impl Context {
         }
     }
 
-    /// Reads a dataset; Ctrl-C stops that, and every later pass over its readings.
-    pub(super) fn read_dataset(&self, folder: &Path) -> Result<Dataset, CliError> {
-        Ok(read_dataset_with(folder, &self.control())?)
+    /// Reads a dataset, and says what was unusual in its recording. Ctrl-C stops that, and every later pass over its
+    /// readings.
+    pub(super) fn read_dataset(&self, folder: &Path, reading: Reading) -> Result<Dataset, CliError> {
+        let damage = if reading.partial {
+            Damage::LeftOut
+        } else {
+            Damage::Refused
+        };
+        let dataset = read_dataset_with(folder, damage, &self.control())?;
+        for warning in &dataset.warnings {
+            self.say(&format!("warning: {warning}"));
+        }
+        Ok(dataset)
     }
 
     /// Returns an error once Ctrl-C has been pressed.

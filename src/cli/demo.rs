@@ -1,8 +1,9 @@
 //! `catoptric demo`: simulates, calibrates, scores and reports on the built-in scene.
 
 use super::calibrate::summary;
-use super::context::Context;
+use super::context::{Context, Reading};
 use super::error::CliError;
+use super::judging::conclude;
 use super::output::{counted, grouped, print, quoted};
 use super::score::figure;
 use catoptric::apply::{CloudSketch, Lift};
@@ -10,8 +11,8 @@ use catoptric::calib::Options;
 use catoptric::files;
 use catoptric::report::MAX_POINTS;
 use catoptric::{
-    CloudFrame, Error, Method, Recording, Scene, Template, Verdict, apply_into, calibrate_with, read_truth,
-    report, score, simulate_into, write_json,
+    CloudFrame, Error, Method, Recording, Scene, Template, apply_into, calibrate_with, read_truth, report,
+    score, simulate_into, write_json,
 };
 use clap::Args;
 use std::path::PathBuf;
@@ -56,7 +57,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let figures = simulate_into(&scene, &dataset_folder, &recording, &control)?;
 
     context.say("reading the dataset back");
-    let dataset = context.read_dataset(&dataset_folder)?;
+    let dataset = context.read_dataset(&dataset_folder, Reading::default())?;
     let truth = read_truth(&dataset_folder)?;
     let mut results = Vec::new();
     let mut lines = Vec::new();
@@ -120,11 +121,5 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         quoted(&cloud_path),
         counted(cloud.points, "point"),
     ))?;
-    match score.verdict {
-        Verdict::Fail => Err(CliError::Verdict(format!(
-            "not good enough: {}",
-            score.warnings.first().map_or("", String::as_str)
-        ))),
-        Verdict::Pass | Verdict::Blind => Ok(()),
-    }
+    conclude(score.verdict, &score.reasons())
 }

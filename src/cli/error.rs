@@ -15,6 +15,9 @@ pub(crate) enum CliError {
     /// The verdict is "not good enough"; the results have been printed already.
     #[error("{0}")]
     Verdict(String),
+    /// The verdict is "invalid"; the results have been printed already.
+    #[error("{0}")]
+    Invalid(String),
     /// Writing to standard output failed.
     #[error("{0}")]
     Output(std::io::Error),
@@ -54,6 +57,7 @@ impl CliError {
         match self {
             Self::ClosedPipe => 0,
             Self::Verdict(_) => 1,
+            Self::Invalid(_) => 2,
             Self::Output(_) => 3,
             Self::Library(error) => error.exit_code(),
         }
@@ -71,7 +75,7 @@ impl CliError {
             Self::Library(Error::Stopped(_)) => {
                 writeln!(stderr, "interrupted; no incomplete files were left behind")
             }
-            Self::Verdict(_) => writeln!(stderr, "{self}"),
+            Self::Verdict(_) | Self::Invalid(_) => writeln!(stderr, "{self}"),
             Self::Library(error) => match help(error) {
                 Some(help) => writeln!(stderr, "error: {error}\nhelp: {help}"),
                 None => writeln!(stderr, "error: {error}"),
@@ -88,6 +92,13 @@ fn help(error: &Error) -> Option<String> {
         Error::Setup(SimError::Placement { .. }) => {
             Some("use a larger room, a smaller board, or a shorter experiment.range_m".to_owned())
         }
+        Error::File(IoError::Damaged { .. }) => {
+            Some("--partial leaves out what is damaged and uses the rest".to_owned())
+        }
+        Error::File(IoError::Changed { path, .. }) if path.extension().is_some_and(|e| e == "mcap") => {
+            Some("--partial uses what can be read of it nevertheless".to_owned())
+        }
+        Error::File(IoError::NoTruth { .. }) => Some("--blind judges by boards and walls alone".to_owned()),
         Error::File(IoError::Exists { .. }) => Some("use --replace or another --out".to_owned()),
         other => other.help(),
     }

@@ -1,6 +1,6 @@
 //! `catoptric export`: writes a layout as files for manufacturing and use, or a dataset's boards as a table.
 
-use super::context::Context;
+use super::context::{Context, Reading};
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print, quoted};
@@ -39,6 +39,8 @@ pub(crate) struct Arguments {
     /// Change a value of the scene first: superstructure.mirror.thickness_mm=2.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
@@ -100,7 +102,7 @@ fn boards(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
             "a dataset is exported as recorded".to_owned(),
         ));
     }
-    let dataset = context.read_dataset(&arguments.input)?;
+    let dataset = context.read_dataset(&arguments.input, arguments.reading)?;
     let (table, boards) = export_boards(&dataset).map_err(|error| match error {
         Error::Invalid { message, help } => CliError::invalid(format!("{message} in {shown}"), help),
         other => other.into(),

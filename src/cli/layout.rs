@@ -2,7 +2,9 @@
 
 use super::context::Context;
 use super::error::CliError;
+use super::judging::{Limits, write_junit};
 use super::output::{print, quoted};
+use catoptric::junit::{Case, Ended, Suite};
 use catoptric::layout::{Analysis, Class, FacetView, Requirement, RequirementError};
 use catoptric::{LAYOUT_PAGE, LayoutOptions, Scene, layout, layout_json, write_layouts};
 use clap::Args;
@@ -27,10 +29,11 @@ pub(crate) struct Arguments {
     /// Change a value of every scene first: superstructure.mirror.reflectivity=0.95.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// A limit to meet, otherwise the exit code is 1: "field_of_regard>=0.004", "facets.*.margin_mm>0.5". May be given
-    /// more than once.
-    #[arg(long, value_name = "FIGURE>=NUMBER")]
-    require: Vec<String>,
+    #[command(flatten)]
+    limits: Limits,
+    /// Also write the requirements as JUnit XML.
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
     /// Write layout.json, the pictures and a page, report.html, to this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -40,7 +43,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let requirements = requirements(&arguments.require, EXAMPLE)?;
+    let requirements = arguments.limits.requirements(EXAMPLE)?;
     let mut scenes = Vec::new();
     for path in &arguments.scenes {
         scenes.push(Scene::load_with(path, &arguments.set)?);
@@ -57,7 +60,8 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         analyses.push(layout(scene, &options)?);
     }
     context.detail(&format!("analyzed in {:.3} s", begin.elapsed().as_secs_f64()));
-    let unmet = unmet(&requirements, &analyses)?;
+    let (unmet, suites) = unmet(&requirements, &analyses)?;
+    write_junit(arguments.junit.as_ref(), &suites)?;
     let mut said = String::new();
     if let Some(out) = &arguments.out {
         let layouts: Vec<(&Scene, &Analysis)> = scenes.iter().zip(&analyses).collect();
@@ -85,33 +89,34 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
 /// An example of a requirement.
 const EXAMPLE: &str = "field_of_regard>=0.004";
 
-/// Parses the values of `--require`.
-pub(super) fn requirements(texts: &[String], example: &str) -> Result<Vec<Requirement>, CliError> {
-    texts
-        .iter()
-        .map(|text| Requirement::parse(text).map_err(|e| refused(e, example)))
-        .collect()
-}
-
-/// The error for an invalid requirement.
+/// The error for a requirement that names no figure.
 pub(super) fn refused(error: RequirementError, example: &str) -> CliError {
     let message = format!("--require: {error}");
     let help = match error {
-        RequirementError::Form { .. } => format!("--require '{example}'"),
+        RequirementError::Form { .. } | RequirementError::Limit { .. } => format!("--require '{example}'"),
         RequirementError::Unknown { help, .. } => help,
     };
     CliError::invalid(message, help)
 }
 
-fn unmet(requirements: &[Requirement], analyses: &[Analysis]) -> Result<Vec<String>, CliError> {
-    let mut unmet = Vec::new();
+/// What is not met, and one suite for each layout.
+fn unmet(requirements: &[Requirement], analyses: &[Analysis]) -> Result<(Vec<String>, Vec<Suite>), CliError> {
+    let (mut unmet, mut suites) = (Vec::new(), Vec::new());
     for analysis in analyses {
+        let mut cases = Vec::new();
         for requirement in requirements {
-            let found = requirement.judge(analysis).map_err(|e| refused(e, EXAMPLE))?;
+            let found = layout::judge(requirement, analysis).map_err(|e| refused(e, EXAMPLE))?;
+            cases.push(Case::of_requirement(&requirement.to_string(), &found));
             unmet.extend(found.iter().map(|u| format!("not met: {u}")));
         }
+        let passes = cases.iter().all(|c| c.ended == Ended::Passed);
+        suites.push(Suite {
+            name: analysis.name.clone(),
+            verdict: if passes { "pass" } else { "fail" }.to_owned(),
+            cases,
+        });
     }
-    Ok(unmet)
+    Ok((unmet, suites))
 }
 
 fn next(arguments: &Arguments) -> String {

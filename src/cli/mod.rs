@@ -11,6 +11,7 @@ mod demo;
 mod error;
 mod export;
 mod interrupt;
+mod judging;
 mod layout;
 mod man;
 mod new;
@@ -72,7 +73,7 @@ enum Verb {
     /// Compare several calibrations of one dataset, ours or third-party
     Compare(compare::Arguments),
     /// Run many experiments and report the statistics of their errors
-    Study(study::Arguments),
+    Study(Box<study::Arguments>),
     /// Plan which board poses to record next, and what each one gains
     Plan(plan::Arguments),
     /// Analyze the coverage, losses and attainable accuracy of mirror layouts

@@ -2,8 +2,9 @@
 
 use super::context::Context;
 use super::error::CliError;
+use super::judging::Limits;
 use super::output::{counted, grouped, print, print_json, quoted};
-use catoptric::layout::{Detail, Requirement, RequirementError};
+use catoptric::layout::{Detail, RequirementError};
 use catoptric::optimize::{
     Better, Goal, GoalError, LayoutCandidate, OptimizeError, Optimum, SearchOptions, Wanted,
 };
@@ -27,10 +28,8 @@ pub(crate) struct Arguments {
     /// more than once.
     #[arg(long, value_name = "AZIMUTH,ELEVATION[,ELEMENTS]", allow_hyphen_values = true)]
     direction: Vec<String>,
-    /// A limit that every layout must meet: "facets.*.margin_mm>=0.3", "stopped_by_facets<=0". May be given more than
-    /// once.
-    #[arg(long, value_name = "FIGURE>=NUMBER")]
-    require: Vec<String>,
+    #[command(flatten)]
+    limits: Limits,
     /// Number of layouts to evaluate.
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(20..=10_000_000))]
     evaluations: u32,
@@ -112,14 +111,9 @@ fn options(arguments: &Arguments) -> Result<SearchOptions, CliError> {
             return Err(CliError::invalid(message, None));
         }
     }
-    let requirements: Result<Vec<Requirement>, RequirementError> = arguments
-        .require
-        .iter()
-        .map(|text| Requirement::parse(text))
-        .collect();
     Ok(SearchOptions {
         goals,
-        requirements: requirements.map_err(|e| refused(e.into()))?,
+        requirements: arguments.limits.requirements(EXAMPLE)?,
         evaluations: arguments.evaluations as usize,
         seed: arguments.seed,
         detail: if arguments.coarse {
@@ -129,6 +123,9 @@ fn options(arguments: &Arguments) -> Result<SearchOptions, CliError> {
         },
     })
 }
+
+/// An example of a requirement.
+const EXAMPLE: &str = "facets.*.margin_mm>=0.3";
 
 fn refused(error: OptimizeError) -> CliError {
     let help = match &error {
@@ -142,8 +139,8 @@ fn refused(error: OptimizeError) -> CliError {
             Some("--goal directions --direction 90,-60,4 --direction -90,60,4".to_owned())
         }
         OptimizeError::Goal(GoalError::Direction { .. }) | OptimizeError::NoGoal => None,
-        OptimizeError::Requirement(RequirementError::Form { .. }) => {
-            Some("--require 'facets.*.margin_mm>=0.3'".to_owned())
+        OptimizeError::Requirement(RequirementError::Form { .. } | RequirementError::Limit { .. }) => {
+            Some(format!("--require '{EXAMPLE}'"))
         }
         OptimizeError::Requirement(RequirementError::Unknown { help, .. }) => Some(help.clone()),
         OptimizeError::Search(_) => return Error::from(error).into(),

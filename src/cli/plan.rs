@@ -1,6 +1,6 @@
 //! `catoptric plan`: plans which board poses to record next, from the drawing or for what a dataset lacks.
 
-use super::context::Context;
+use super::context::{Context, Reading};
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print, print_json, quoted};
@@ -54,6 +54,8 @@ pub(crate) struct Arguments {
     /// Print the plan as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 /// Where the plan starts from.
@@ -92,7 +94,7 @@ fn source(arguments: &Arguments, context: &Context) -> Result<Source, CliError> 
         return Err(CliError::invalid(message, None));
     }
     Ok(Source::Recording(Box::new(
-        context.read_dataset(&arguments.input)?,
+        context.read_dataset(&arguments.input, arguments.reading)?,
     )))
 }
 

@@ -1,11 +1,12 @@
 //! `catoptric report`: writes one HTML page about calibrations and their scores.
 
-use super::context::Context;
+use super::context::{Context, Reading};
 use super::error::CliError;
+use super::judging::conclude;
 use super::output::print;
 use catoptric::apply::{CloudSketch, Lift};
 use catoptric::report::MAX_POINTS;
-use catoptric::{CloudFrame, Error, files, read_calibration_for, read_truth, report, score};
+use catoptric::{CloudFrame, Error, Verdict, files, read_calibration, read_reference, report, score};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -17,19 +18,32 @@ pub(crate) struct Arguments {
     /// The calibrations; the fans of the first one are drawn.
     #[arg(required = true)]
     calibrations: Vec<PathBuf>,
+    /// Judge by boards and walls alone, as if there were no truth.
+    #[arg(long)]
+    blind: bool,
     /// The page to write.
     #[arg(long, value_name = "report.html")]
     out: PathBuf,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let dataset = context.read_dataset(&arguments.dataset)?;
-    let truth = read_truth(&arguments.dataset)?;
+    let dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
+    let truth = read_reference(&arguments.dataset, arguments.blind)?;
     let mut results = Vec::new();
     for path in &arguments.calibrations {
         context.check()?;
-        let calibration = read_calibration_for(path, &dataset.session)?;
+        let calibration = read_calibration(path)?;
         let result = score(&dataset, &calibration, truth.as_ref()).map_err(Error::from)?;
+        if result.verdict == Verdict::Invalid {
+            let reasons: Vec<String> = result
+                .reasons()
+                .iter()
+                .map(|w| format!("{}: {w}", path.display()))
+                .collect();
+            return conclude(result.verdict, &reasons);
+        }
         results.push((calibration, result));
     }
     let cloud = results

@@ -1,9 +1,11 @@
 //! `catoptric score`: compares a calibration with the truth or, on blind data, with boards and walls.
 
-use super::context::Context;
+use super::context::{Context, Reading};
 use super::error::CliError;
+use super::judging::{Judging, conclude, write_junit};
 use super::output::{print, quoted};
-use catoptric::{Error, Score, Verdict, read_calibration_for, read_truth, score};
+use catoptric::junit::Suite;
+use catoptric::{Score, read_reference, score_with};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -18,9 +20,13 @@ pub(crate) struct Arguments {
     /// data.
     #[arg(long, value_name = "X", value_parser = positive)]
     max_rms_deg: Option<f64>,
+    #[command(flatten)]
+    judging: Judging,
     /// Print the score as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    reading: Reading,
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -31,13 +37,19 @@ fn positive(text: &str) -> Result<f64, String> {
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
-    let dataset = context.read_dataset(&arguments.dataset)?;
-    let truth = read_truth(&arguments.dataset)?;
-    let calibration = read_calibration_for(&arguments.calibration, &dataset.session)?;
-    let mut result = score(&dataset, &calibration, truth.as_ref()).map_err(Error::from)?;
+    let rules = arguments.judging.rules()?;
+    let dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
+    let truth = read_reference(&arguments.dataset, arguments.judging.blind)?;
+    let calibration = arguments.judging.read(&arguments.calibration)?;
+    let mut result = score_with(&dataset, &calibration, truth.as_ref(), &rules)?;
     if let Some(limit) = arguments.max_rms_deg {
         result = result.with_limit(limit);
     }
+    let name = arguments.calibration.display().to_string();
+    write_junit(
+        arguments.judging.junit.as_ref(),
+        &[Suite::of_score(&name, &result)],
+    )?;
     if arguments.json {
         let json = serde_json::to_string_pretty(&result).map_err(|e| CliError::Output(e.into()))?;
         print(&format!("{json}\n"))?;
@@ -52,13 +64,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
             quoted(&arguments.calibration)
         ))?;
     }
-    match result.verdict {
-        Verdict::Pass | Verdict::Blind => Ok(()),
-        Verdict::Fail => {
-            let reason = result.warnings.first().cloned().unwrap_or_default();
-            Err(CliError::Verdict(format!("not good enough: {reason}")))
-        }
-    }
+    conclude(result.verdict, &result.reasons())
 }
 
 /// A score as a few lines of text.
@@ -103,6 +109,16 @@ fn against_truth(score: &Score, line: &mut impl FnMut(&str, String)) {
         "distance",
         format!("{} rms", figure(score.distance_mm.rms, 2, " mm")),
     );
+    if let Some(mounting) = &score.mounting {
+        line(
+            "mounting",
+            format!(
+                "{}, {}",
+                figure(mounting.attitude_deg, 4, "°"),
+                figure(mounting.position_mm, 2, " mm")
+            ),
+        );
+    }
     line(
         "point",
         format!(

@@ -27,7 +27,7 @@ pub(crate) struct Arguments {
     /// Replace an existing dataset.
     #[arg(long)]
     replace: bool,
-    /// Write no truth/: the dataset is blind. A run of the same scene and seed without this option has the truth.
+    /// Write no truth/, and neither seed nor command into the manifest: the dataset is blind. A run of the same scene and seed without this option has the truth.
     #[arg(long, conflicts_with_all = ["returns", "readings", "sub_rays"])]
     blind: bool,
     /// Also write what every beam hits, truth/returns.csv.

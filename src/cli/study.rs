@@ -2,10 +2,13 @@
 
 use super::context::Context;
 use super::error::CliError;
+use super::judging::{Limits, conclude, unknown, write_junit};
 use super::output::{print, print_json, quoted};
+use catoptric::junit::Suite;
+use catoptric::requirement::Requirement;
 use catoptric::study::folder::RESULT;
 use catoptric::study::{Axis, Contestant, Part, Program, Study, StudyError, Summary, grid};
-use catoptric::{Error, STUDY_PAGE, Scene, Stop, merge_studies, study_into};
+use catoptric::{Error, STUDY_PAGE, Scene, Stop, Verdict, merge_studies, study_into};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -33,9 +36,21 @@ struct MergeArguments {
     /// The folder to write.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    #[command(flatten)]
+    judging: Judging,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
+}
+
+/// What a study has to meet.
+#[derive(Debug, Args)]
+struct Judging {
+    #[command(flatten)]
+    limits: Limits,
+    /// Also write the verdict on every contestant as JUnit XML.
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -77,6 +92,8 @@ struct StudyArguments {
     // Required for a study, absent when merging shards; the same holds for `scene`.
     #[arg(long, value_name = "DIR", required = true)]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    judging: Judging,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -85,8 +102,10 @@ struct StudyArguments {
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     match &arguments.verb {
         Some(Verb::Merge(merge)) => {
+            let requirements = merge.judging.limits.requirements(EXAMPLE)?;
             let summary = merge_studies(&merge.shards, &merge.out)?;
-            show(&summary, &merge.out, merge.json)
+            show(&summary, &merge.out, merge.json)?;
+            judge(&summary, &requirements, &merge.out, &merge.judging)
         }
         None => study_scene(&arguments.study, context),
     }
@@ -106,6 +125,7 @@ fn option(error: StudyError) -> CliError {
 
 fn study_scene(arguments: &StudyArguments, context: &Context) -> Result<(), CliError> {
     let part: Part = arguments.shard.parse().map_err(option)?;
+    let requirements = arguments.judging.limits.requirements(EXAMPLE)?;
     let (Some(scene), Some(out)) = (&arguments.scene, &arguments.out) else {
         return Err(invalid(
             "a scene and --out are required".to_owned(),
@@ -132,7 +152,30 @@ fn study_scene(arguments: &StudyArguments, context: &Context) -> Result<(), CliE
         stop: Stop::default(),
     };
     let summary = study_into(&study, part, arguments.elements, out, &context.control())?;
-    show(&summary, out, arguments.json)
+    show(&summary, out, arguments.json)?;
+    judge(&summary, &requirements, out, &arguments.judging)
+}
+
+/// An example of a requirement.
+const EXAMPLE: &str = "anees<=1.5";
+
+/// Fails if a contestant has no result, or does not meet a requirement.
+fn judge(
+    summary: &Summary,
+    requirements: &[Requirement],
+    out: &Path,
+    judging: &Judging,
+) -> Result<(), CliError> {
+    let reasons = summary.reasons(requirements).map_err(|e| unknown(&e))?;
+    let suite = Suite::of_study(&out.display().to_string(), summary, &reasons);
+    write_junit(judging.junit.as_ref(), &[suite])?;
+    let words: Vec<String> = reasons.into_iter().map(|(_, why)| why).collect();
+    let verdict = if words.is_empty() {
+        Verdict::Pass
+    } else {
+        Verdict::Fail
+    };
+    conclude(verdict, &words)
 }
 
 /// The contestants, each under a different name.

@@ -2,7 +2,8 @@
 
 use super::context::Context;
 use super::error::CliError;
-use super::layout::{refused, requirements};
+use super::judging::Limits;
+use super::layout::refused;
 use super::output::{print, print_json, quoted};
 use catoptric::tolerance::{Distribution, Tolerance};
 use catoptric::{Error, Scene, TOLERANCE_PAGE, ToleranceOptions, tolerance, write_tolerance};
@@ -30,10 +31,8 @@ pub(crate) struct Arguments {
     /// Change a value of the scene first: superstructure.as_built.tilt_sd_deg=0.1.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// A limit to meet, otherwise the exit code is 1: "direction_deg.p95<=2", "facets.*.point_at_4m_mm.max<500". May be
-    /// given more than once.
-    #[arg(long, value_name = "FIGURE<=NUMBER")]
-    require: Vec<String>,
+    #[command(flatten)]
+    limits: Limits,
     /// Write tolerance.json, the plot and a page, report.html, to this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -51,7 +50,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         seed: arguments.seed,
         bounds: arguments.bounds,
         calibrate: arguments.calibrate,
-        requirements: requirements(&arguments.require, EXAMPLE)?,
+        requirements: arguments.limits.requirements(EXAMPLE)?,
     };
     let scene = Scene::load_with(&arguments.scene, &arguments.set)?;
     let (found, unmet) = tolerance(&scene, &options, &context.control()).map_err(|error| match error {

@@ -2,24 +2,61 @@
 
 use super::calibrate::summary;
 use super::error::CliError;
-use super::output::{counted, print, quoted};
-use catoptric::validate::Severity;
-use catoptric::{Calibration, files, validate};
+use super::judging::{conclude, unread, write_junit};
+use super::output::{counted, print, print_json, quoted};
+use catoptric::junit::Suite;
+use catoptric::validate::{Problem, Severity};
+use catoptric::{Calibration, Error, Verdict, files, validate};
 use clap::Args;
+use serde_json::json;
 use std::path::PathBuf;
+
+/// Version of what `validate --json` prints.
+const SCHEMA_VERSION: u32 = 1;
 
 /// Arguments of `validate`.
 #[derive(Debug, Args)]
 pub(crate) struct Arguments {
     /// The calibration.
     calibration: PathBuf,
+    /// Print the problems as JSON.
+    #[arg(long)]
+    json: bool,
+    /// Also write them as JUnit XML.
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
-    let path = &arguments.calibration;
-    let calibration: Calibration = files::read_json(path)?;
+    let (path, junit) = (&arguments.calibration, arguments.junit.as_ref());
+    let calibration: Calibration = match files::read_json(path) {
+        Ok(calibration) => calibration,
+        Err(error) => {
+            let error = Error::from(error);
+            if error.exit_code() == 2 {
+                write_junit(junit, &[unread(path, &error)])?;
+            }
+            return Err(error.into());
+        }
+    };
     let problems = validate(&calibration);
+    let name = path.display().to_string();
+    write_junit(junit, &[Suite::of_problems(&name, &problems)])?;
     let errors = problems.iter().filter(|p| p.severity == Severity::Error).count();
+    let verdict = if errors > 0 {
+        Verdict::Invalid
+    } else {
+        Verdict::Pass
+    };
+    if arguments.json {
+        print_json(&json!({
+            "schema_version": SCHEMA_VERSION,
+            "verdict": verdict.word(),
+            "problems": problems.iter().map(as_json).collect::<Vec<_>>(),
+        }))?;
+        let errors = problems.iter().filter(|p| p.severity == Severity::Error);
+        return conclude(verdict, &errors.map(ToString::to_string).collect::<Vec<_>>());
+    }
     if errors > 0 {
         let list: Vec<String> = problems.iter().map(|p| format!("  {p}")).collect();
         let message = format!(
@@ -37,4 +74,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
     text.push_str(&format!("ok: {}: {}\n", path.display(), summary(&calibration)));
     text.push_str(&format!("next: catoptric score DATASET {}\n", quoted(path)));
     print(&text)
+}
+
+fn as_json(problem: &Problem) -> serde_json::Value {
+    let severity = match problem.severity {
+        Severity::Warning => "warning",
+        Severity::Error => "error",
+    };
+    json!({ "severity": severity, "key": problem.key, "beam": problem.beam, "message": problem.message })
 }

@@ -149,6 +149,36 @@ fn the_schema_describes_every_key_of_a_scene() {
     );
 }
 
+/// A number without limits would be a number that nothing checks.
+#[test]
+fn every_number_of_a_scene_has_limits() {
+    fn without_limits(node: &serde_json::Value, path: &str, found: &mut Vec<String>) {
+        let types = |name: &str| match &node["type"] {
+            serde_json::Value::String(only) => only == name,
+            serde_json::Value::Array(all) => all.iter().any(|t| t == name),
+            _ => false,
+        };
+        if types("number") && !(node["minimum"].is_number() && node["maximum"].is_number()) {
+            found.push(path.to_owned());
+        }
+        let children: Vec<(String, &serde_json::Value)> = match node {
+            serde_json::Value::Object(map) => map.iter().map(|(k, v)| (k.clone(), v)).collect(),
+            serde_json::Value::Array(all) => {
+                all.iter().enumerate().map(|(i, v)| (i.to_string(), v)).collect()
+            }
+            _ => Vec::new(),
+        };
+        for (key, child) in children {
+            without_limits(child, &format!("{path}/{key}"), found);
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let output = run(folder.path(), &["schema"]);
+    let mut found = Vec::new();
+    without_limits(&serde_json::from_str(&stdout(&output)).unwrap(), "", &mut found);
+    assert_eq!(found, Vec::<String>::new());
+}
+
 #[test]
 fn completions_and_manual_pages_know_the_verbs() {
     let folder = tempfile::tempdir().unwrap();

@@ -81,8 +81,9 @@ fn the_truth_as_a_third_party_submission_has_no_error() {
     write(at, "truth.json", &submission(&truth, 0.0, None));
     let output = run(at, &["validate", "truth.json"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    let score = json_of(at, &["score", "data", "truth.json", "--json"], 0);
-    assert_eq!(score["verdict"], "pass");
+    let score = json_of(at, &["score", "data", "truth.json", "--json"], 1);
+    // It has no error, but it does not state a covariance either.
+    assert_eq!(score["verdict"], "not_judged");
     assert_eq!(
         (&score["per_axis_rms_deg"], &score["point_mm"]["at_10m"]),
         (&json!(0.0), &json!(0.0))
@@ -160,8 +161,9 @@ fn compare_sorts_by_the_point_error_and_reports_over_confidence() {
     write(at, "near.json", &submission(&truth, lift, Some(lift)));
     write(at, "truth.json", &submission(&truth, 0.0, Some(lift)));
     let arguments = ["compare", "data", "far.json", "near.json", "truth.json"];
-    // The verdict on one of them is "fail", and yet the comparison succeeds.
-    let found = json_of(at, &[&arguments[..], &["--json"]].concat(), 0);
+    // The verdict on one of them is "fail", and so is that of the comparison.
+    let found = json_of(at, &[&arguments[..], &["--json"]].concat(), 1);
+    assert_eq!(found["verdict"], "fail");
     let names: Vec<&Value> = found["rows"]
         .as_array()
         .unwrap()
@@ -201,6 +203,7 @@ fn compare_sorts_by_the_point_error_and_reports_over_confidence() {
     );
 
     std::fs::remove_dir_all(at.join("data/truth")).unwrap();
+    let arguments = [&arguments[..], &["--blind"]].concat();
     let blind = json_of(at, &[&arguments[..], &["--json"]].concat(), 0);
     assert_eq!(blind["blind"], true);
     assert_eq!(blind["rows"][0]["name"], "truth.json");
@@ -212,7 +215,7 @@ fn compare_sorts_by_the_point_error_and_reports_over_confidence() {
     );
     let output = run(at, &["compare", "data"]);
     assert_eq!(output.status.code(), Some(2));
-    let output = run(at, &["compare", "data", "nowhere.json"]);
+    let output = run(at, &["compare", "data", "nowhere.json", "--blind"]);
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
 }
 
@@ -237,8 +240,9 @@ fn a_blind_run_is_the_same_recording_without_the_truth() {
     assert_eq!(files, ["manifest.json", "observations.mcap", "session.toml"]);
     let manifest: Value = serde_json::from_slice(&read("blind/manifest.json")).unwrap();
     assert!(manifest["scene_sha256"].is_null());
-    assert!(manifest["command_line"].as_str().unwrap().ends_with(" --blind"));
-    write(at, "c.json", &submission(&truth_of(at, "open"), 0.0, None));
+    assert!(manifest["command_line"].is_null() && manifest["seed"].is_null());
+    assert_eq!(manifest["blind"], true);
+    write(at, "c.json", &submission(&truth_of(at, "open"), 0.0, Some(1e-3)));
     let score = json_of(at, &["score", "blind", "c.json", "--json"], 0);
     assert_eq!(score["verdict"], "blind");
     // A limit is not tested without a truth; that is reported, but is not a failure.
@@ -261,14 +265,18 @@ fn a_scanner_without_mirrors_does_not_pass() {
     let mut nothing = submission(&truth_of(at, "data"), 0.0, None);
     assert_eq!(nothing["beams"], json!([]));
     write(at, "nothing.json", &nothing);
-    let score = json_of(at, &["score", "data", "nothing.json", "--json"], 0);
+    // A calibration lists at least one element.
+    json_of(at, &["score", "data", "nothing.json", "--json"], 2);
+    nothing["beams"] = json!([{ "beam": 540, "status": "direct" }]);
+    write(at, "nothing.json", &nothing);
+    let score = json_of(at, &["score", "data", "nothing.json", "--json"], 1);
     assert_eq!(
         (&score["verdict"], &score["beams"]["deflected"]),
-        (&json!("blind"), &json!(0))
+        (&json!("not_judged"), &json!(0))
     );
     let said = stdout(&run(at, &["score", "data", "nothing.json"]));
     assert!(
-        said.starts_with("blind: ") && said.contains("there is nothing to judge"),
+        said.starts_with("not_judged: ") && said.contains("there is nothing to judge"),
         "{said}"
     );
     nothing["beams"] = json!([{ "beam": 540, "status": "solved", "azimuth_rad": 0.1, "elevation_rad": 0.5 }]);

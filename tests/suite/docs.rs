@@ -433,6 +433,7 @@ fn every_key() -> Calibration {
         elevation_rad: Some(0.7),
         distance_m: Some(0.07),
         covariance_rad2: Some([[1e-6, 0.0], [0.0, 1e-6]]),
+        distance_sd_m: Some(0.002),
         noise_covariance_rad2: Some([[1e-8, 0.0], [0.0, 1e-8]]),
         null_direction: Some([0.0, 1.0]),
         poses: Some(6),
@@ -538,7 +539,13 @@ moved_mm = [0, 0, 4]
     );
 
     let calibration = calib::calibrate(&dataset, calib::Method::Beam, &calib::Options::default()).unwrap();
-    let score = score(&dataset, &calibration, Some(&truth)).expect("in memory");
+    let mut score = score(&dataset, &calibration, Some(&truth)).expect("in memory");
+    score.mistakes.push(score::Mistake {
+        correction: "φ negated".to_owned(),
+        figure: "per_axis_rms_deg",
+        found: 90.0,
+        would_be: 0.1,
+    });
     same(
         "score.json",
         &json(serde_json::to_value(&score)),

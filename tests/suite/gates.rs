@@ -8,7 +8,7 @@ use catoptric::model::{Calibration, Dataset};
 use catoptric::sim::noise::{Draws, Purpose};
 use catoptric::sim::{Laboratory, Scene, check};
 use catoptric::testing::{
-    Anees, Coverage, Drawn, Efficiency, Failure, Significance, Trial, closure, deterministic, layouts,
+    Anees, Bias, Coverage, Drawn, Efficiency, Failure, Significance, Trial, closure, deterministic, layouts,
     scenes, trials, without_errors,
 };
 use proptest::prelude::*;
@@ -173,7 +173,11 @@ fn false_alarms_are_as_rare_as_the_significance_states() {
                     stated,
                     bound,
                 });
-                Trial { seed, drawn }
+                Trial {
+                    seed,
+                    drawn,
+                    mean_error: None,
+                }
             })
             .collect();
         let gates = [
@@ -191,7 +195,11 @@ fn false_alarms_are_as_rare_as_the_significance_states() {
 
 #[test]
 fn what_cannot_be_judged_does_not_pass() {
-    let abstaining = [Trial { seed: 1, drawn: None }];
+    let abstaining = [Trial {
+        seed: 1,
+        drawn: None,
+        mean_error: None,
+    }];
     assert!(matches!(
         Anees::over(&abstaining).gate(Significance::PER_MILLE),
         Err(Failure::Nothing(_))
@@ -204,9 +212,44 @@ fn what_cannot_be_judged_does_not_pass() {
     let silent = [Trial {
         seed: 4,
         drawn: Some(silent),
+        mean_error: None,
     }];
     let failure = Coverage::over(&silent, 0.95)
         .gate(Significance::PER_MILLE)
         .unwrap_err();
     assert!(failure.to_string().starts_with("seed 4: beam 9"), "{failure}");
+}
+
+/// Within what is stated, a constant error passes every gate on a covariance.
+#[test]
+fn a_constant_error_of_one_angle_is_a_bias() {
+    let scene = scene(include_str!("../../scenes/two-mirror.toml"));
+    let scene = Scene {
+        experiment: catoptric::sim::scene::Experiment {
+            scans_per_pose: 10,
+            ..scene.experiment.clone()
+        },
+        scanner: catoptric::sim::scene::Scanner {
+            sub_rays: 1,
+            ..scene.scanner.clone()
+        },
+        ..scene
+    };
+    let significance = Significance::PER_MILLE;
+    let off = 0.05_f64.to_radians();
+    let shifted = Changed(Method::BeamGls, |c: &mut Calibration| {
+        for azimuth in c.beams.iter_mut().filter_map(|b| b.azimuth_rad.as_mut()) {
+            *azimuth += off;
+        }
+    });
+    let found = trials(&scene, 1..=40, &shifted).unwrap();
+    Anees::over(&found).gate(significance).unwrap();
+    Coverage::over(&found, 0.95).gate(significance).unwrap();
+    let failure = Bias::over(&found).gate(0.0, significance).unwrap_err();
+    assert!(
+        failure.to_string().starts_with("the mean error of θ_a"),
+        "{failure}"
+    );
+    let honest = trials(&scene, 1..=40, &Method::BeamGls).unwrap();
+    Bias::over(&honest).gate(0.0, significance).unwrap();
 }

@@ -31,6 +31,7 @@ mod physics;
 mod pipeline;
 mod plan;
 mod properties;
+mod referee;
 mod scan_geometry;
 mod scenes;
 mod streaming;

@@ -64,6 +64,7 @@ fn exchanged_labels_are_reported_and_corrected() {
                 session: laboratory.session().expect("known"),
                 poses: vec![laboratory.pose_record(pose as usize).expect("recorded")],
                 id: None,
+                warnings: Vec::new(),
             };
             let (right, warnings) = calib::tracking::put_right(&dataset);
             assert_eq!(warnings.len(), 1, "{warnings:?}");

@@ -100,7 +100,7 @@ fn from_scene_to_report() {
     std::fs::remove_dir_all(folder.path().join("data/truth")).unwrap();
     succeeds(&at(&["calibrate", "data", "--out", "blind.json"]));
     assert_eq!(read("blind.json"), read("beam.json"));
-    assert!(succeeds(&at(&["score", "data", "blind.json"])).starts_with("blind"));
+    assert!(succeeds(&at(&["score", "data", "blind.json", "--blind"])).starts_with("blind"));
 }
 
 #[test]

@@ -249,7 +249,8 @@ fn programs_are_contestants_and_their_failures_are_results() {
         run(at, &arguments)
     };
     let output = go("s", "2", "broken=cat {dataset}/no-such-file");
-    assert!(output.status.success(), "{}", stderr(&output));
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    assert!(stderr(&output).contains("silent failed in all 4 runs: it wrote no calibration"));
     let found: serde_json::Value = serde_json::from_str(&stdout(&output)).unwrap();
     let of = |name: &str| {
         let all = found["methods"].as_array().unwrap();
@@ -280,7 +281,8 @@ fn programs_are_contestants_and_their_failures_are_results() {
         );
         assert_eq!(of(name)["nulls"]["anees"], "nothing was solved");
     }
-    assert!(go("t", "1", "broken=cat {dataset}/no-such-file").status.success());
+    let again = go("t", "1", "broken=cat {dataset}/no-such-file");
+    assert_eq!(again.status.code(), Some(1));
     assert_eq!(read(at, "t/runs.csv"), read(at, "s/runs.csv"));
     let other = go("t", "1", "broken=cat {dataset}/another-file");
     assert_eq!(other.status.code(), Some(2));
@@ -351,7 +353,7 @@ fn child_processes_of_a_hanging_program_end_with_it() {
             "--quiet",
         ],
     );
-    assert!(done.status.success(), "{}", stderr(&done));
+    assert_eq!(done.status.code(), Some(1), "{}", stderr(&done));
     assert!(
         stdout(&done).contains("it did not end within 1 s"),
         "{}",
@@ -412,7 +414,8 @@ fn ctrl_c_ends_programs_and_keeps_none_of_their_failures() {
     std::fs::write(at.join("go"), "").unwrap();
     for out in ["s", "t"] {
         let done = catoptric().args(arguments(out)).current_dir(at).output().unwrap();
-        assert!(done.status.success(), "{}", stderr(&done));
+        // One contestant fails on its own, which is its result.
+        assert_eq!(done.status.code(), Some(1), "{}", stderr(&done));
     }
     let runs = read(at, "s/runs.csv");
     assert_eq!(runs, read(at, "t/runs.csv"));

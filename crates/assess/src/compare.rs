@@ -11,8 +11,8 @@
 //! Two calibrations of one dataset share its errors, so the value of honest ones is below 1; if it is above 1, at least
 //! one of them is over-confident. This needs no truth.
 
-use crate::score::words::foreign;
-use crate::score::{Honesty, Score, Verdict, score};
+use crate::requirement::{Requirement, RequirementError};
+use crate::score::{Gate, Honesty, Knowable, MIN_SOLVED, Mistake, Score, Verdict, knowable, score_by};
 use catoptric_calib::observations;
 use catoptric_model::{BeamEstimate, Calibration, Dataset, Unreadable, beam};
 use catoptric_sim::Truth;
@@ -24,7 +24,7 @@ pub const SCHEMA_VERSION: u32 = 1;
 
 /// Mean normalized square of the differences above which one of two calibrations is over-confident beyond statistical
 /// fluctuation: if all elements share one error, honest and independent calibrations exceed it with probability e⁻⁶.
-pub const CONTRADICTION: f64 = crate::score::DISHONEST_NEES;
+pub const CONTRADICTION: f64 = 6.0;
 
 /// A calibration with a name, usually that of its file.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,11 +42,14 @@ pub struct Comparison {
     pub schema_version: u32,
     /// Whether there is no truth, so that only boards and walls are available.
     pub blind: bool,
+    /// The worst of the rows' verdicts.
+    pub verdict: Verdict,
     /// One row per calibration, sorted by point error at 4 m or, on blind data, by the residual on the walls.
     pub rows: Vec<Row>,
     /// All pairs, in the order of the rows.
     pub pairs: Vec<Pair>,
-    /// A sentence for each calibration that says that it is of another dataset or scanner.
+    /// What keeps calibrations from passing, one sentence for each gate that is not met, beginning with the name of the
+    /// calibration.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub failures: Vec<String>,
 }
@@ -60,6 +63,10 @@ pub struct Row {
     pub method: String,
     /// Verdict of its score.
     pub verdict: Verdict,
+    /// What decides it.
+    pub gates: Vec<Gate>,
+    /// The usual mistakes that would explain the errors.
+    pub mistakes: Vec<Mistake>,
     /// Whether its errors are as large as it states.
     pub honesty: Option<Honesty>,
     /// Elements with a direction; deflected and unsplit ones, unless the data are blind.
@@ -108,6 +115,35 @@ pub struct Pair {
     pub normalized_square: f64,
 }
 
+/// What every calibration of a comparison has to meet in addition to the gates of its score.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rules {
+    /// Share of the knowable elements that must be solved.
+    pub min_solved: f64,
+    /// Limits on the figures of a score.
+    pub requirements: Vec<Requirement>,
+}
+
+impl Default for Rules {
+    fn default() -> Self {
+        Self {
+            min_solved: MIN_SOLVED,
+            requirements: Vec::new(),
+        }
+    }
+}
+
+/// Why there is no comparison.
+#[derive(Debug, thiserror::Error)]
+pub enum CompareError {
+    /// The recording of the dataset can no longer be read.
+    #[error(transparent)]
+    Unreadable(#[from] Unreadable),
+    /// A requirement names no figure of a score.
+    #[error(transparent)]
+    Requirement(#[from] RequirementError),
+}
+
 /// Compares calibrations of one dataset, with its truth or without.
 ///
 /// # Errors
@@ -117,10 +153,46 @@ pub fn compare(
     contestants: &[Contestant],
     truth: Option<&Truth>,
 ) -> Result<Comparison, Unreadable> {
+    compared(dataset, contestants, truth, Ok)
+}
+
+/// Compares calibrations of one dataset under rules of your own.
+///
+/// # Errors
+/// [`CompareError`] if the recording can no longer be read, or a requirement names no figure.
+pub fn compare_by(
+    dataset: &Dataset,
+    contestants: &[Contestant],
+    truth: Option<&Truth>,
+    rules: &Rules,
+) -> Result<Comparison, CompareError> {
+    compared(dataset, contestants, truth, |score| Ok(rules.applied(score)?))
+}
+
+impl Rules {
+    /// Returns a score under these rules.
+    ///
+    /// # Errors
+    /// [`RequirementError::Unknown`] if a requirement names no figure.
+    pub fn applied(&self, score: Score) -> Result<Score, RequirementError> {
+        let score = score.with_min_solved(self.min_solved);
+        self.requirements.iter().try_fold(score, Score::with_requirement)
+    }
+}
+
+/// Compares calibrations by their scores, each of them changed by `rules`.
+fn compared<E: From<Unreadable>>(
+    dataset: &Dataset,
+    contestants: &[Contestant],
+    truth: Option<&Truth>,
+    rules: impl Fn(Score) -> Result<Score, E>,
+) -> Result<Comparison, E> {
+    let known: Option<Knowable> = truth.map(|truth| knowable(dataset, truth)).transpose()?;
+    let scored_of = |c: &Contestant| rules(score_by(dataset, &c.calibration, truth.zip(known.as_ref()))?);
     let mut scored: Vec<(&Contestant, Score)> = contestants
         .iter()
-        .map(|c| Ok((c, score(dataset, &c.calibration, truth)?)))
-        .collect::<Result<_, Unreadable>>()?;
+        .map(|c| Ok((c, scored_of(c)?)))
+        .collect::<Result<_, E>>()?;
     let key = |s: &Score| {
         if truth.is_some() {
             s.point_mm.at_4m
@@ -136,17 +208,21 @@ pub fn compare(
         .flat_map(|(i, (first, _))| scored[i + 1..].iter().map(move |(second, _)| (*first, *second)))
         .map(|(first, second)| pair(dataset, first, second))
         .collect();
+    let passes = if truth.is_some() {
+        Verdict::Pass
+    } else {
+        Verdict::Blind
+    };
+    let verdicts = scored.iter().map(|(_, s)| s.verdict);
     Ok(Comparison {
         schema_version: SCHEMA_VERSION,
         blind: truth.is_none(),
+        verdict: verdicts.fold(passes, Verdict::worse),
         rows: scored.iter().map(|(c, s)| row(&c.name, s)).collect(),
         pairs,
-        failures: contestants
+        failures: scored
             .iter()
-            .flat_map(|c| {
-                let failures = foreign(dataset, &c.calibration);
-                failures.into_iter().map(|why| format!("{}: {why}", c.name))
-            })
+            .flat_map(|(c, s)| s.reasons().into_iter().map(|why| format!("{}: {why}", c.name)))
             .collect(),
     })
 }
@@ -156,6 +232,8 @@ fn row(name: &str, score: &Score) -> Row {
         name: name.to_owned(),
         method: score.method.clone(),
         verdict: score.verdict,
+        gates: score.gates.clone(),
+        mistakes: score.mistakes.clone(),
         honesty: score.honesty,
         solved: score.beams.solved,
         abstained: score.beams.abstained,

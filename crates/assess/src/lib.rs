@@ -3,7 +3,9 @@
 
 pub mod apply;
 pub mod compare;
+pub mod junit;
 pub mod palette;
+pub mod requirement;
 pub mod score;
 pub mod study;
 pub mod tables;
@@ -12,6 +14,7 @@ pub mod testing;
 pub mod validate;
 
 pub use apply::apply;
-pub use compare::{Comparison, Contestant, compare};
+pub use compare::{CompareError, Comparison, Contestant, Rules, compare, compare_by};
+pub use requirement::{Requirement, RequirementError};
 pub use score::{Score, Verdict, score};
 pub use validate::{Problem, validate};

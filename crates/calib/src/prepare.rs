@@ -26,7 +26,8 @@ pub(crate) struct Prepared {
 pub(crate) fn believable(dataset: &Dataset) -> Result<(Cow<'_, Dataset>, Vec<String>), CalibError> {
     dataset.check()?;
     check_session(&dataset.session)?;
-    Ok(tracking::put_right(dataset))
+    let (repaired, found) = tracking::put_right(dataset);
+    Ok((repaired, dataset.warnings.iter().cloned().chain(found).collect()))
 }
 
 /// Places the sensor in the rig (steps 5 and 6) from a [`believable`] dataset.

@@ -277,6 +277,41 @@ fn a_world_casts_packets_as_it_casts_single_rays() {
     }
 }
 
+/// Beyond the range of f32 nothing is found, and nothing panics.
+#[test]
+fn no_finite_coordinate_makes_the_index_panic() {
+    for size in [
+        1e5, 1e12, 1e18, 1e20, 1e30, 1e37, 1e38, 3.5e38, 1e39, 1e100, 1e200, 1e308,
+    ] {
+        let mut source = soup(3, 300);
+        for number in [0, 7, 400] {
+            let mut vertices = source.vertices().to_vec();
+            vertices[number].coords[number % 3] = if number == 7 { -size } else { size };
+            source = Mesh::new(vertices, source.triangles().to_vec()).expect("finite");
+            let mesh = Arc::new(Triangles::new(&source, 1.0, &Pose::identity()));
+            let far = Pose::translation(size, 0.0, 0.0);
+            let world = World::new(vec![
+                Shape::Mesh(Arc::clone(&mesh)),
+                Shape::Block(Block::new(far, Vector3::new(1.0, 0.5, 0.7))),
+                Shape::Cylinder(Cylinder::new(far, 0.4, size)),
+            ]);
+            for from in [0.0, -size, size] {
+                let mut draws = Draws::new(1, 0);
+                let target = Point3::from(vector(&mut draws, 2.0));
+                let rays = cone(&mut draws, Point3::new(from, 0.0, 0.0), target, 64, 0.0);
+                let mut found = vec![None; rays.len()];
+                world.cast_packets(&rays, None, &mut found);
+                for (ray, found) in rays.iter().zip(&found) {
+                    let alone = world.cast(&ray, None);
+                    if size < 1e18 {
+                        assert_eq!(alone, *found, "{size:e}");
+                    }
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn an_empty_world_and_an_empty_packet_have_no_hits() {
     let world = World::new(Vec::new());

@@ -41,9 +41,8 @@ pub enum Error {
     #[error(transparent)]
     Optimize(#[from] catoptric_design::optimize::OptimizeError),
     /// A requirement names no existing figure.
-    #[cfg(feature = "design")]
     #[error(transparent)]
-    Requirement(#[from] catoptric_design::layout::RequirementError),
+    Requirement(#[from] catoptric_assess::RequirementError),
     /// An invalid request.
     #[error("{message}")]
     Invalid {
@@ -77,7 +76,6 @@ impl Error {
             Self::Calibration(error) => error.help(),
             #[cfg(feature = "design")]
             Self::Optimize(error) => error.help(),
-            #[cfg(feature = "design")]
             Self::Requirement(error) => error.help(),
             Self::Scene(_)
             | Self::Setup(_)
@@ -101,8 +99,9 @@ impl Error {
             #[cfg(feature = "design")]
             Self::Optimize(catoptric_design::optimize::OptimizeError::Search(_)) => 3,
             #[cfg(feature = "design")]
-            Self::Optimize(_) | Self::Requirement(_) => 2,
+            Self::Optimize(_) => 2,
             Self::Scene(SceneErrors::Invalid(_))
+            | Self::Requirement(_)
             | Self::Setup(_)
             | Self::Calibration(_)
             | Self::Apply(_)

@@ -62,7 +62,8 @@ mod verbs;
 #[cfg(feature = "testing")]
 pub use catoptric_assess::testing;
 pub use catoptric_assess::{
-    Comparison, Contestant, Problem, Score, Verdict, apply, compare, palette, score, study, tables, validate,
+    Comparison, Contestant, Problem, Rules, Score, Verdict, apply, compare, junit, palette, requirement,
+    score, study, tables, validate,
 };
 pub use catoptric_calib as calib;
 pub use catoptric_calib::Method;
@@ -71,9 +72,9 @@ pub use catoptric_cast as cast;
 pub use catoptric_design::{export, layout, optimize, plan, tolerance};
 pub use catoptric_files as files;
 pub use catoptric_files::scene::Template;
-pub use catoptric_files::{read_calibration, read_calibration_for, read_characterization};
 #[cfg(feature = "recording")]
-pub use catoptric_files::{read_dataset, read_truth, write_json};
+pub use catoptric_files::{Damage, read_dataset, read_reference, read_truth, write_json};
+pub use catoptric_files::{read_calibration, read_calibration_for, read_characterization};
 pub use catoptric_model as model;
 pub use catoptric_model::{Calibration, Characterization, CloudFrame, Dataset, PointCloud, Stop, Stopped};
 #[cfg(feature = "report")]

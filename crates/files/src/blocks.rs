@@ -3,6 +3,7 @@
 //! Blocks are read again later and must not have changed by then: every block has a checksum of its messages.
 
 use super::error::IoError;
+use super::records;
 use catoptric_model::Stop;
 use crc32fast::Hasher;
 use mcap::records::op;
@@ -42,6 +43,19 @@ pub(super) struct Block {
     /// Whether it is the body of a chunk record; otherwise it is a run of records.
     is_chunk: bool,
     checksum: u32,
+}
+
+/// What a visit of a recording comes to.
+pub(super) enum Visit<'a> {
+    /// A record of use.
+    Record {
+        opcode: u8,
+        data: &'a [u8],
+        /// Index of its block, and its index there.
+        at: (usize, usize),
+    },
+    /// Something that cannot be read.
+    Damage(&'a str),
 }
 
 /// The relevant records of a block.
@@ -85,22 +99,26 @@ impl Place {
         }
     }
 
-    /// Visits all records in order; `visit` receives the index of each one's block, and its index there. Returns the
-    /// blocks and the length of the recording in bytes.
+    /// Visits all records in order. Returns the blocks and the length of the recording in bytes.
+    ///
+    /// If it is `partial`, what cannot be read is visited as damage: a chunk is passed over, and where no next record can be
+    /// found, the recording ends.
     ///
     /// # Errors
     /// [`IoError`] with the offset if the recording cannot be read, is cut off or corrupt, or if `visit` fails.
     pub(super) fn visit(
         &self,
         stop: &Stop,
-        mut visit: impl FnMut(u8, &[u8], (usize, usize)) -> Result<(), String>,
+        partial: bool,
+        mut visit: impl FnMut(Visit<'_>) -> Result<(), String>,
     ) -> Result<(Vec<Block>, u64), IoError> {
-        // All checksums are checked: damaged readings must not look like readings.
+        // All checksums are checked: damaged readings must not look like readings. Of a partial recording, those of whole
+        // sections say nothing that those of its chunks do not.
         let options = checked()
             .with_emit_chunks(true)
-            .with_validate_data_section_crc(true)
-            .with_validate_summary_section_crc(true)
-            .with_check_finishes_after_end_magic(true);
+            .with_validate_data_section_crc(!partial)
+            .with_validate_summary_section_crc(!partial)
+            .with_check_finishes_after_end_magic(!partial);
         let mut file = self.open().map_err(|e| IoError::read(self.path(), e))?;
         let mut reader = LinearReader::new_with_options(options);
         let mut offset = 0;
@@ -109,7 +127,14 @@ impl Place {
         while let Some(event) = reader.next_event() {
             stop.check()?;
             let at = |what: String| self.corrupt(what, offset);
-            match event.map_err(|e| at(words(&e)))? {
+            let event = match event {
+                Err(e) if partial => {
+                    visit(Visit::Damage(&words(&e))).map_err(at)?;
+                    break;
+                }
+                event => event.map_err(|e| at(words(&e)))?,
+            };
+            match event {
                 LinearReadEvent::ReadRequest(need) => {
                     let read = file.read(reader.insert(need));
                     let read = read.map_err(|e| IoError::read(self.path(), e))?;
@@ -117,15 +142,29 @@ impl Place {
                     offset += read as u64;
                 }
                 LinearReadEvent::Record { data, opcode } if opcode == op::CHUNK => {
-                    let records = Records::of_chunk(data).map_err(|e| at(words(&e)))?;
+                    let records = match Records::of_chunk(data) {
+                        Err(e) if partial => {
+                            let what = format!("{} (by byte {offset})", words(&e));
+                            visit(Visit::Damage(&what)).map_err(at)?;
+                            continue;
+                        }
+                        records => records.map_err(|e| at(words(&e)))?,
+                    };
                     blocks.push(Block {
                         at: offset - data.len() as u64,
                         length: data.len(),
                         is_chunk: true,
                         checksum: records.checksum(),
                     });
+                    let block = blocks.len() - 1;
                     for (number, (opcode, data)) in records.iter().enumerate() {
-                        visit(opcode, data, (blocks.len() - 1, number)).map_err(at)?;
+                        let at_record = (block, number);
+                        visit(Visit::Record {
+                            opcode,
+                            data,
+                            at: at_record,
+                        })
+                        .map_err(at)?;
                     }
                 }
                 LinearReadEvent::Record { data, opcode } if is_of_use(opcode) => {
@@ -147,7 +186,12 @@ impl Place {
                     hasher.update(data);
                     let block = blocks.len() - 1;
                     blocks[block].checksum = hasher.clone().finalize();
-                    visit(opcode, data, (block, *number)).map_err(at)?;
+                    visit(Visit::Record {
+                        opcode,
+                        data,
+                        at: (block, *number),
+                    })
+                    .map_err(at)?;
                     *number += 1;
                 }
                 LinearReadEvent::Record { .. } => {}
@@ -200,6 +244,13 @@ impl Block {
 impl Records {
     /// The records of a chunk, from the body of its record.
     fn of_chunk(body: &[u8]) -> McapResult<Self> {
+        let chunk = records::chunk(body).ok_or(McapError::UnexpectedEof)?;
+        if chunk.size > LONGEST_RECORD as u64 {
+            return Err(McapError::ChunkTooLarge(chunk.size));
+        }
+        if chunk.compression == "zstd" {
+            return Self::of_run(&zstd(&chunk)?);
+        }
         let options = checked().with_skip_start_magic(true).with_skip_end_magic(true);
         let mut reader = LinearReader::new_with_options(options);
         let mut head = vec![op::CHUNK];
@@ -213,9 +264,7 @@ impl Records {
                     reader.notify_read(read);
                 }
                 LinearReadEvent::Record { data, opcode } => {
-                    if is_of_use(opcode) {
-                        records.push(opcode, data);
-                    }
+                    records.push(opcode, data);
                 }
             }
         }
@@ -236,6 +285,9 @@ impl Records {
     }
 
     fn push(&mut self, opcode: u8, data: &[u8]) {
+        if !is_of_use(opcode) {
+            return;
+        }
         let begin = self.bytes.len();
         self.bytes.extend_from_slice(data);
         self.all.push((opcode, begin..self.bytes.len()));
@@ -261,6 +313,44 @@ impl Records {
             .iter()
             .map(|(opcode, range)| (*opcode, &self.bytes[range.clone()]))
     }
+}
+
+/// Decompresses the records of a chunk; they are of the size that it claims, and of its checksum if it has one.
+fn zstd(chunk: &records::Chunk<'_>) -> McapResult<Vec<u8>> {
+    use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
+    let failed = |e: &dyn std::fmt::Display| McapError::DecompressionError(e.to_string());
+    let (mut rest, mut bytes) = (chunk.records, Vec::new());
+    while !rest.is_empty() {
+        match ruzstd::decoding::StreamingDecoder::new(&mut rest) {
+            Ok(decoder) => {
+                let room = chunk.size - bytes.len() as u64;
+                let read = decoder.take(room + 1).read_to_end(&mut bytes);
+                read.map_err(|e| failed(&e))?;
+                if bytes.len() as u64 > chunk.size {
+                    return Err(failed(&"there is more in a chunk than it says"));
+                }
+            }
+            // A frame of other people's data.
+            Err(FrameDecoderError::ReadFrameHeaderError(ReadFrameHeaderError::SkipFrame {
+                length, ..
+            })) => {
+                let length = usize::try_from(length).unwrap_or(usize::MAX);
+                rest = rest.get(length..).ok_or(McapError::UnexpectedEof)?;
+            }
+            Err(e) => return Err(failed(&e)),
+        }
+    }
+    if bytes.len() as u64 != chunk.size {
+        return Err(failed(&"there is less in a chunk than it says"));
+    }
+    let found = crc32fast::hash(&bytes);
+    if chunk.checksum != 0 && found != chunk.checksum {
+        return Err(McapError::BadChunkCrc {
+            saved: chunk.checksum,
+            calculated: found,
+        });
+    }
+    Ok(bytes)
 }
 
 /// Options shared by all readers.

@@ -19,7 +19,7 @@ pub(super) struct Body {
 }
 
 /// The rig and the boards, in the order of the session.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Bodies {
     /// The rig first.
     pub(super) all: Vec<Body>,

@@ -15,17 +15,25 @@ pub(super) struct Capture {
     markers: BTreeMap<u64, Vec<(usize, usize, Point3<f64>)>>,
     /// All frames before this time have been taken out.
     begin: u64,
+    /// By body: the number of its frames in which the tracker reported no pose.
+    pub(super) lost: BTreeMap<usize, usize>,
 }
 
 impl Capture {
-    /// Adds a solved pose of a body.
-    pub(super) fn pose(&mut self, time: u64, body: usize, pose: Pose) -> Result<(), String> {
+    /// Adds the pose of a body in a frame; `None` if the tracker had lost it.
+    pub(super) fn pose(&mut self, time: u64, body: usize, pose: Option<Pose>) -> Result<(), String> {
         self.check(time)?;
-        self.poses.insert((time, body), pose);
+        match pose {
+            Some(pose) => {
+                self.poses.insert((time, body), pose);
+            }
+            None => *self.lost.entry(body).or_default() += 1,
+        }
         Ok(())
     }
 
-    /// Adds the markers of a frame; those of unknown bodies are ignored.
+    /// Adds the markers of a frame. Those of unknown bodies are ignored, and so are those that the tracker had lost:
+    /// their coordinates are zero or not finite.
     pub(super) fn markers(
         &mut self,
         time: u64,
@@ -35,7 +43,9 @@ impl Capture {
         self.check(time)?;
         let known = markers.iter().filter_map(|marker| {
             let (body, place) = bodies.find(&marker.name)?;
-            Some((body, place, marker.point))
+            let point = &marker.point;
+            let seen = point.iter().all(|c| c.is_finite()) && *point != Point3::origin();
+            seen.then_some((body, place, marker.point))
         });
         self.markers.entry(time).or_default().extend(known);
         Ok(())

@@ -14,12 +14,13 @@ use super::blocks::Place;
 use super::error::IoError;
 use super::file::{sha256, sha256_file};
 use super::folder::{Occupant, StagedFile, StagedFolder, list};
-use super::json::to_json;
+use super::json::{parse_json, to_json};
 use super::manifest::{Manifest, Provenance};
-use super::playback::{read_recording, survey};
+use super::playback::read_recording;
+use super::reading::{Damage, Records, records};
 use super::recording::{Encoded, RecordingEncoder, RecordingWriter};
 use super::results::require_version;
-use catoptric_model::{Dataset, ModelError, PoseRecord, Session, Stop, Stretch, session};
+use catoptric_model::{Dataset, Session, Stop, Stretch, session};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs;
@@ -129,6 +130,23 @@ impl DatasetWriter {
     /// # Errors
     /// [`IoError`] if writing fails; then no part of it is left, and an earlier dataset is untouched.
     pub fn finish(self, provenance: Provenance) -> Result<Manifest, IoError> {
+        self.publish(provenance, |manifest| manifest)
+    }
+
+    /// As [`finish`](Self::finish), for a dataset without its truth: the manifest states that it is blind, and neither the
+    /// seed nor the command.
+    ///
+    /// # Errors
+    /// Same as [`finish`](Self::finish).
+    pub fn finish_blind(self, provenance: Provenance) -> Result<Manifest, IoError> {
+        self.publish(provenance, Manifest::hidden)
+    }
+
+    fn publish(
+        self,
+        provenance: Provenance,
+        written: impl FnOnce(Manifest) -> Manifest,
+    ) -> Result<Manifest, IoError> {
         let Self { recording, folder } = self;
         recording.finish()?.finish()?;
         let mut files = BTreeMap::new();
@@ -137,7 +155,7 @@ impl DatasetWriter {
                 sha256_file(&path, &Stop::default()).map_err(|e| IoError::read(folder.shown(&name), e))?;
             files.insert(name, hash);
         }
-        let manifest = Manifest::new(provenance, SCENE, files);
+        let manifest = written(Manifest::new(provenance, SCENE, files));
         let bytes = to_json(folder.shown(MANIFEST), &manifest)?;
         folder.write(MANIFEST, &bytes)?;
         folder.publish()?;
@@ -196,7 +214,7 @@ pub fn read_session(dataset: &Path) -> Result<Session, IoError> {
 /// # Errors
 /// [`IoError`] as [`read_dataset`].
 pub fn read_stretches(dataset: &Path) -> Result<(Session, Vec<Stretch>), IoError> {
-    let (session, stretches, _) = read(dataset, &Stop::default(), |place, session| {
+    let (session, stretches, _, _) = read(dataset, Damage::Refused, &Stop::default(), |place, session| {
         read_recording(place.path(), session)
     })?;
     Ok((session, stretches))
@@ -210,16 +228,23 @@ pub fn read_stretches(dataset: &Path) -> Result<(Session, Vec<Stretch>), IoError
 /// [`IoError`] names the file that is missing, changed since the manifest was written, invalid, or inconsistent
 /// with the others. A third-party dataset without a manifest is accepted unchecked.
 pub fn read_dataset(dataset: &Path) -> Result<Dataset, IoError> {
-    read_dataset_until(dataset, &Stop::default())
+    read_dataset_with(dataset, Damage::Refused, &Stop::default())
 }
 
-/// As [`read_dataset`], but can be stopped before it ends, and so can every later pass over its readings.
+/// As [`read_dataset`], but damaged stretches can be left out. It can be stopped before it ends, and so can every later pass
+/// over its readings.
 ///
 /// # Errors
 /// As [`read_dataset`], and [`IoError::Stopped`].
-pub fn read_dataset_until(dataset: &Path, stop: &Stop) -> Result<Dataset, IoError> {
-    let (session, poses, id) = read(dataset, stop, |place, session| survey(place, session, stop))?;
-    assembled(dataset, session, poses, id)
+pub fn read_dataset_with(dataset: &Path, damage: Damage, stop: &Stop) -> Result<Dataset, IoError> {
+    let (session, mut records, id, changed) = read(dataset, damage, stop, |place, session| {
+        records(&place, session, damage, stop)
+    })?;
+    if changed {
+        let words = format!("{OBSERVATIONS} is not the file that {MANIFEST} names");
+        records.warnings.insert(0, words);
+    }
+    assembled(dataset, session, records, id)
 }
 
 /// As [`read_dataset`], from the session and the bytes of a recording.
@@ -229,16 +254,18 @@ pub fn read_dataset_until(dataset: &Path, stop: &Stop) -> Result<Dataset, IoErro
 pub fn parse_dataset(session: Session, recording: impl Into<Arc<[u8]>>) -> Result<Dataset, IoError> {
     let (path, bytes) = (PathBuf::from(OBSERVATIONS), recording.into());
     let id = sha256(&bytes);
-    let poses = survey(Place::Memory(path.clone(), bytes), &session, &Stop::default())?;
-    assembled(&path, session, poses, id)
+    let place = Place::Memory(path.clone(), bytes);
+    let records = records(&place, &session, Damage::Refused, &Stop::default())?;
+    assembled(&path, session, records, id)
 }
 
 /// Reads the session and the requested part of the observations; returns the hash of the recording as well.
 fn read<T: Send>(
     dataset: &Path,
+    damage: Damage,
     stop: &Stop,
     observations: impl FnOnce(Place, &Session) -> Result<T, IoError> + Send,
-) -> Result<(Session, T, String), IoError> {
+) -> Result<(Session, T, String, bool), IoError> {
     let hashes = read_hashes(dataset)?;
     let session = parse_session(dataset, &read_checked(dataset, SESSION, hashes.as_ref())?)?;
     let path = dataset.join(OBSERVATIONS);
@@ -249,15 +276,19 @@ fn read<T: Send>(
     stop.check()?;
     // For a changed file, the error about the change takes precedence over any other.
     let id = id.map_err(|e| IoError::read(&path, e))?;
-    check(dataset, OBSERVATIONS, &id, hashes.as_ref())?;
-    Ok((session, found?, id))
+    let unchanged = check(dataset, OBSERVATIONS, &id, hashes.as_ref());
+    let changed = damage == Damage::LeftOut && matches!(unchanged, Err(IoError::Changed { .. }));
+    if !changed {
+        unchanged?;
+    }
+    Ok((session, found?, id, changed))
 }
 
 /// A dataset whose parts are consistent.
 fn assembled(
     path: &Path,
     session: Session,
-    poses: Result<Vec<PoseRecord>, ModelError>,
+    Records { poses, warnings }: Records,
     id: String,
 ) -> Result<Dataset, IoError> {
     let fail = |source| IoError::Inconsistent {
@@ -266,15 +297,25 @@ fn assembled(
     };
     let dataset = Dataset {
         session,
-        poses: poses.map_err(fail)?,
+        poses,
         id: Some(id),
+        warnings,
     };
     dataset.check().map_err(fail)?;
+    if dataset.poses.is_empty() {
+        let message = "holds no stretch: none of its topics is one that a dataset has";
+        return Err(IoError::content(path, message));
+    }
     Ok(dataset)
 }
 
 /// The hashes of the manifest, if there is one.
 fn read_hashes(dataset: &Path) -> Result<Option<BTreeMap<String, String>>, IoError> {
+    Ok(read_manifest(dataset)?.map(|manifest| manifest.files))
+}
+
+/// The manifest, if there is one.
+pub(super) fn read_manifest(dataset: &Path) -> Result<Option<Manifest>, IoError> {
     // Reported before any missing file: the wrong folder was given.
     if !dataset.join(SESSION).is_file() && dataset.exists() {
         let reason = format!("it is no dataset: there is no {SESSION} in it");
@@ -286,8 +327,9 @@ fn read_hashes(dataset: &Path) -> Result<Option<BTreeMap<String, String>>, IoErr
     let path = dataset.join(MANIFEST);
     match fs::read(&path) {
         Ok(bytes) => {
-            let manifest: Manifest = serde_json::from_slice(&bytes).map_err(|e| IoError::json(&path, &e))?;
-            Ok(Some(manifest.files))
+            let manifest: Manifest = parse_json(&bytes, &path)?;
+            require_version(&path, manifest.schema_version, super::manifest::SCHEMA_VERSION)?;
+            Ok(Some(manifest))
         }
         Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(e) => Err(IoError::read(path, e)),
@@ -295,14 +337,17 @@ fn read_hashes(dataset: &Path) -> Result<Option<BTreeMap<String, String>>, IoErr
 }
 
 /// The bytes of a file, which must match the manifest.
-fn read_checked(
+pub(super) fn read_checked(
     dataset: &Path,
     name: &str,
     hashes: Option<&BTreeMap<String, String>>,
 ) -> Result<Vec<u8>, IoError> {
     let path = dataset.join(name);
     let bytes = fs::read(&path).map_err(|e| IoError::read(&path, e))?;
-    check(dataset, name, &sha256(&bytes), hashes)?;
+    // An editor may have changed the ends of lines, which mean nothing.
+    let plain = String::from_utf8_lossy(&bytes).replace("\r\n", "\n");
+    check(dataset, name, &sha256(plain.as_bytes()), hashes)
+        .or_else(|_| check(dataset, name, &sha256(&bytes), hashes))?;
     Ok(bytes)
 }
 

@@ -51,6 +51,13 @@ const MARKER: Part = (
      geometry_msgs/Point translation\n",
 );
 
+/// A text.
+pub const STRING: Definition = Definition {
+    name: "std_msgs/msg/String",
+    fields: "string data\n",
+    parts: &[],
+};
+
 /// One scan of the laser.
 pub const LASER_SCAN: Definition = Definition {
     name: "sensor_msgs/msg/LaserScan",

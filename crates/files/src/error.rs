@@ -70,6 +70,14 @@ pub enum IoError {
         /// Byte offset at which it was detected.
         offset: u64,
     },
+    /// A damaged recording of which some can be used.
+    #[error("{source}; the other {kept} stretches can be read")]
+    Damaged {
+        /// The damage.
+        source: Box<IoError>,
+        /// Number of stretches that are whole.
+        kept: usize,
+    },
     /// Inconsistent values.
     #[error("{}: {message}", path.display())]
     Content {
@@ -85,6 +93,14 @@ pub enum IoError {
         path: PathBuf,
         /// The inconsistency.
         source: ModelError,
+    },
+    /// The truth of a dataset that is not known to be blind is missing.
+    #[error("{}: {message}", path.display())]
+    NoTruth {
+        /// The file.
+        path: PathBuf,
+        /// What is missing.
+        message: String,
     },
     /// A file whose SHA-256 is not the one in the manifest.
     #[error("{}: changed since it was written: its SHA-256 is not the one in {}", path.display(), manifest.display())]
@@ -154,8 +170,10 @@ impl IoError {
             Self::Stopped(_) => 130,
             Self::Text { .. }
             | Self::Recording { .. }
+            | Self::Damaged { .. }
             | Self::Content { .. }
             | Self::Inconsistent { .. }
+            | Self::NoTruth { .. }
             | Self::Changed { .. } => 2,
             Self::Read { .. }
             | Self::Write { .. }

@@ -2,15 +2,19 @@
 
 use super::bodies::Bodies;
 use super::capture::{Capture, seconds_between};
+use super::codes::{Codes, Limits};
 use super::messages::{LabeledMarker, Scan};
 use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::frame::Pose;
 use catoptric_model::session::ScannerSheet;
-use catoptric_model::{PoseLabel, Stretch, Track};
+use catoptric_model::{PoseKind, PoseLabel, Stretch, Track};
 use std::f64::consts::TAU;
 
 /// Maximum difference from the scanner's period to be treated as equal to it, in seconds: stamps are whole nanoseconds.
 const PERIOD_TOLERANCE_S: f64 = 1e-9;
+
+/// Maximum difference of a scan's stamp from evenly spaced ones, in seconds: rounding of both to nanoseconds.
+const STAMP_TOLERANCE_S: f64 = 2e-9;
 
 /// Properties shared by all stretches of a recording.
 #[derive(Clone, Copy)]
@@ -43,8 +47,14 @@ pub(super) struct Gathering<R> {
     label_time: u64,
     first_scan: Option<u64>,
     last_scan: u64,
+    /// Time at which the last scan was logged.
+    pub(super) latest_scan: u64,
     scan_time: f64,
     scans: usize,
+    /// Stamp of every scan of a flight.
+    stamps: Vec<u64>,
+    /// What was unusual and is no fault.
+    pub(super) notes: Vec<String>,
     /// Number of scans whose echoes were recorded too.
     echoes: usize,
     pub(super) kept: R,
@@ -67,15 +77,24 @@ impl<R: Keep> Gathering<R> {
             label_time,
             first_scan: None,
             last_scan: label_time,
+            latest_scan: label_time,
             scan_time: 0.0,
             scans: 0,
+            stamps: Vec::new(),
+            notes: Vec::new(),
             echoes: 0,
             capture: Capture::default(),
         }
     }
 
-    /// Adds a scan; its beams must be those of the session.
-    pub(super) fn scan(&mut self, scan: Scan, scanner: &ScannerSheet) -> Result<(), String> {
+    /// Adds a scan, logged at a given time; its beams must be those of the session.
+    pub(super) fn scan(
+        &mut self,
+        mut scan: Scan,
+        logged: u64,
+        scanner: &ScannerSheet,
+        codes: &mut Codes,
+    ) -> Result<(), String> {
         let beams = scanner.scan.beams();
         if scan.ranges.len() != beams {
             return Err(format!("{} beams, session.toml has {beams}", scan.ranges.len()));
@@ -92,8 +111,13 @@ impl<R: Keep> Gathering<R> {
                 scan.angle_min, scan.angle_increment
             ));
         }
+        codes.replace(&mut scan.ranges, Limits::of(scanner, scan.limits_m));
+        if self.label.kind == PoseKind::Flight {
+            self.stamps.push(scan.stamp);
+        }
         self.first_scan.get_or_insert(scan.stamp);
         self.last_scan = scan.stamp;
+        self.latest_scan = logged;
         self.scan_time = scan.scan_time;
         self.scans += 1;
         self.kept.scan(scan.ranges);
@@ -111,12 +135,12 @@ impl<R: Keep> Gathering<R> {
         Ok(())
     }
 
-    /// Adds a solved pose of a body.
+    /// Adds the pose of a body in a frame; `None` if the tracker had lost it.
     pub(super) fn pose(
         &mut self,
         time: u64,
         body: usize,
-        pose: Pose,
+        pose: Option<Pose>,
         known: Known<'_>,
     ) -> Result<(), String> {
         self.capture.pose(time, body, pose)?;
@@ -136,21 +160,82 @@ impl<R: Keep> Gathering<R> {
         Ok(())
     }
 
+    /// Number of its scans so far.
+    pub(super) fn scans(&self) -> usize {
+        self.scans
+    }
+
     /// Number of the pose.
     pub(super) fn number(&self) -> usize {
         self.label.pose
     }
 
-    /// Ends the stretch; an error if the number of its scans differs from its label.
-    pub(super) fn end(self, known: Known<'_>) -> Result<R::Kept, String> {
+    /// Whether the recording has another number of scans than the label.
+    pub(super) fn miscounts(&self) -> bool {
+        self.scans != self.label.scans
+    }
+
+    /// Ends the stretch: what was kept of it, and what was unusual. An error if it has none of its scans, or if it is a flight
+    /// whose scans have no times that motion capture knows.
+    pub(super) fn end(mut self, known: Known<'_>) -> Result<(R::Kept, Vec<String>), String> {
         let (pose, expected, found) = (self.label.pose, self.label.scans, self.scans);
-        if found != expected {
-            return Err(format!("pose {pose}: {found} scans, its label says {expected}"));
+        if found == 0 && expected > 0 {
+            return Err(format!(
+                "pose {pose}: none of its {expected} scans is in the recording"
+            ));
+        }
+        if found < expected {
+            let lost = expected - found;
+            self.notes.push(format!(
+                "pose {pose}: {lost} of its {expected} scans are not in the recording"
+            ));
+        }
+        if found > expected {
+            return Err(format!(
+                "pose {pose}: {found} scans, its label says {expected}; was the next label lost?"
+            ));
         }
         if self.echoes > 0 && self.echoes != found {
             return Err(format!("pose {pose}: echoes of {} scans of {found}", self.echoes));
         }
-        Ok(R::end(self, known))
+        self.check_times()?;
+        let notes = std::mem::take(&mut self.notes);
+        Ok((R::end(self, known), notes))
+    }
+
+    /// Checks that the scans of a flight were stamped one after the other.
+    fn check_times(&self) -> Result<(), String> {
+        let pose = self.label.pose;
+        let Some(k) = self.stamps.windows(2).position(|pair| pair[1] <= pair[0]) else {
+            return Ok(());
+        };
+        let back = seconds_between(self.stamps[k + 1], self.stamps[k]);
+        let how = match back == 0.0 {
+            true => "bear the same stamp".to_owned(),
+            false => format!("are stamped in the wrong order, {back} s apart"),
+        };
+        Err(format!(
+            "pose {pose}: scans {k} and {} {how}; a flight needs the time of each scan",
+            k + 1
+        ))
+    }
+
+    /// Times at which the scans of a flight began, in seconds since the epoch; none if they are evenly spaced.
+    pub(super) fn uneven_starts(&self, known: Known<'_>) -> Vec<f64> {
+        let Some(start) = self.first_scan else {
+            return Vec::new();
+        };
+        let period = self.period(known.scanner, start);
+        let is_even = |(k, stamp): (usize, &u64)| {
+            (seconds_between(start, *stamp) - k as f64 * period).abs() <= STAMP_TOLERANCE_S
+        };
+        if self.stamps.iter().enumerate().all(is_even) {
+            return Vec::new();
+        }
+        self.stamps
+            .iter()
+            .map(|stamp| seconds_between(known.epoch, *stamp))
+            .collect()
     }
 
     /// The stretch without its readings, with times counted from the epoch, and the data kept of them.
@@ -163,7 +248,10 @@ impl<R: Keep> Gathering<R> {
             tracks: self.tracks(known),
             ranges: Vec::new(),
             echoes: None,
-            label: self.label,
+            label: PoseLabel {
+                scans: self.scans,
+                ..self.label
+            },
         };
         (stretch, self.kept)
     }
@@ -173,7 +261,8 @@ impl<R: Keep> Gathering<R> {
         let rated = scanner.scan.scan_period_s();
         let (measured, tolerance) = match self.scans {
             0 => return rated,
-            1 => (self.scan_time, rated * f64::from(f32::EPSILON)),
+            1 if self.scan_time > 0.0 => (self.scan_time, rated * f64::from(f32::EPSILON)),
+            1 => return rated,
             n => (
                 seconds_between(start, self.last_scan) / (n - 1) as f64,
                 PERIOD_TOLERANCE_S,

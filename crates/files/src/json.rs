@@ -23,5 +23,70 @@ pub fn to_json(path: impl AsRef<Path>, value: &impl Serialize) -> Result<Vec<u8>
 pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T, IoError> {
     let path = path.as_ref();
     let bytes = fs::read(path).map_err(|e| IoError::read(path, e))?;
-    serde_json::from_slice(&bytes).map_err(|e| IoError::json(path, &e))
+    parse_json(&bytes, path)
+}
+
+/// Reads a value from the bytes of a JSON file, with or without a byte order mark; `path` names it in errors.
+///
+/// # Errors
+/// [`IoError::Text`] with line and column if they are not valid.
+pub fn parse_json<T: DeserializeOwned>(bytes: &[u8], path: impl AsRef<Path>) -> Result<T, IoError> {
+    let bytes = bytes.strip_prefix(MARK).unwrap_or(bytes);
+    serde_json::from_slice(bytes).map_err(|e| match literal(bytes, &e) {
+        None => IoError::json(path, &e),
+        Some(literal) => IoError::Text {
+            path: path.as_ref().to_owned(),
+            line: e.line(),
+            column: e.column(),
+            message: format!("{literal} is no number in JSON; what is not known is null, or left out"),
+        },
+    })
+}
+
+/// Byte order mark of UTF-8, which some programs put before a text.
+pub(crate) const MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// The literal at which a JSON file went wrong, if it is one that other languages write for numbers.
+fn literal(bytes: &[u8], error: &serde_json::Error) -> Option<&'static str> {
+    let line = bytes
+        .split(|byte| *byte == b'\n')
+        .nth(error.line().checked_sub(1)?)?;
+    // The error stands at the first letter that cannot be, or behind a minus.
+    let from = error.column().saturating_sub(2).min(line.len());
+    let near = &line[from..];
+    ["-Infinity", "Infinity", "NaN", "nan", "inf"]
+        .into_iter()
+        .find(|literal| (0..=2.min(near.len())).any(|skip| near[skip..].starts_with(literal.as_bytes())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mark_is_passed_over_and_literals_of_other_languages_are_named() {
+        assert_eq!(
+            parse_json::<Vec<f64>>(b"\xef\xbb\xbf[1]", "x.json").expect("read"),
+            [1.0]
+        );
+        for (text, name, column) in [
+            ("[NaN]", "NaN", 2),
+            ("[1, -Infinity]", "Infinity", 6),
+            ("{\n\"a\": NaN}", "NaN", 6),
+        ] {
+            let error = parse_json::<serde_json::Value>(text.as_bytes(), "x.json").expect_err("refused");
+            let IoError::Text {
+                column: at, message, ..
+            } = error
+            else {
+                panic!("it has a place");
+            };
+            assert!(message.contains(name), "{message}");
+            assert_eq!(at, column, "{text}");
+        }
+        let plain = parse_json::<Vec<f64>>(b"[1,,2]", "x.json")
+            .expect_err("refused")
+            .to_string();
+        assert!(plain.contains("x.json:1:4: "), "{plain}");
+    }
 }

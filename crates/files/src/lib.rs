@@ -24,15 +24,23 @@ pub mod paths;
 #[cfg(feature = "recording")]
 pub mod cdr;
 #[cfg(feature = "recording")]
+mod codes;
+#[cfg(feature = "recording")]
 pub mod definitions;
 #[cfg(feature = "recording")]
 mod gathering;
+#[cfg(feature = "recording")]
+mod lost;
 #[cfg(feature = "recording")]
 pub mod messages;
 #[cfg(feature = "recording")]
 pub mod playback;
 #[cfg(feature = "recording")]
+mod reading;
+#[cfg(feature = "recording")]
 pub mod recording;
+#[cfg(feature = "recording")]
+mod records;
 #[cfg(feature = "recording")]
 mod schedule;
 #[cfg(feature = "recording")]
@@ -54,6 +62,8 @@ pub mod parametric;
 pub mod scene;
 #[cfg(feature = "scene")]
 mod tree;
+#[cfg(all(feature = "recording", feature = "scene"))]
+mod truth;
 
 pub mod cloud;
 #[cfg(feature = "recording")]
@@ -68,7 +78,7 @@ pub mod rays;
 pub mod results;
 
 #[cfg(feature = "recording")]
-pub use dataset::{DatasetWriter, read_dataset, read_dataset_until, read_session};
+pub use dataset::{DatasetWriter, read_dataset, read_dataset_with, read_session};
 pub use error::IoError;
 #[cfg(feature = "recording")]
 pub use file::{StagedOutput, write_file, write_json};
@@ -78,10 +88,12 @@ pub use manifest::{Manifest, Provenance};
 #[cfg(feature = "recording")]
 pub use playback::read_recording;
 #[cfg(feature = "recording")]
+pub use reading::Damage;
+#[cfg(feature = "recording")]
 pub use recording::RecordingWriter;
-#[cfg(all(feature = "recording", feature = "scene"))]
-pub use results::read_truth;
 pub use results::{read_calibration, read_calibration_for, read_characterization};
+#[cfg(all(feature = "recording", feature = "scene"))]
+pub use truth::{read_reference, read_truth};
 
 #[cfg(all(test, feature = "recording", feature = "scene"))]
 mod tests;

@@ -30,10 +30,15 @@ pub struct Manifest {
     pub version: String,
     /// Commit of catoptric.
     pub git_hash: String,
+    /// Whether the dataset was written without its truth; then seed and command, which would give it, are absent.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub blind: bool,
     /// Seed of all randomness.
-    pub seed: u64,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u64>,
     /// The command that wrote the dataset.
-    pub command_line: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub command_line: Option<String>,
     /// Name of the rule that generates random numbers from the seed.
     pub rng_rule: String,
     /// SHA-256 of the resolved scene, `truth/scene.toml`; `None` if there is none.
@@ -49,11 +54,24 @@ impl Manifest {
             schema_version: SCHEMA_VERSION,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             git_hash: GIT_HASH.to_owned(),
-            seed: provenance.seed,
-            command_line: provenance.command_line,
+            blind: false,
+            seed: Some(provenance.seed),
+            command_line: Some(provenance.command_line),
             rng_rule: provenance.rng_rule,
             scene_sha256: files.get(scene).cloned(),
             files,
+        }
+    }
+
+    /// The same without what would give the truth away.
+    #[must_use]
+    pub fn hidden(self) -> Self {
+        Self {
+            blind: true,
+            seed: None,
+            command_line: None,
+            scene_sha256: None,
+            ..self
         }
     }
 }

@@ -32,11 +32,21 @@ pub enum MessageError {
     /// The bytes.
     #[error(transparent)]
     Cdr(#[from] CdrError),
-    /// An invalid pose.
-    #[error("a pose with a position that is not finite or a quaternion of length {length}")]
+    /// A quaternion that is no rotation.
+    #[error("a quaternion of length {length} at {seconds:.3} s; a rotation has length 1")]
     NotAPose {
-        /// Length of the quaternion, which should be 1.
+        /// Length of the quaternion.
         length: f64,
+        /// Its time, in seconds since 1970.
+        seconds: f64,
+    },
+    /// Angles of a scan that are not finite.
+    #[error("angle_min is {first} and angle_increment {increment}")]
+    NoAngles {
+        /// Azimuth of the first beam.
+        first: f64,
+        /// Azimuth between beams.
+        increment: f64,
     },
     /// A time before 1970.
     #[error("a time stamp of {seconds} s")]
@@ -57,6 +67,8 @@ pub struct Scan {
     pub angle_increment: f64,
     /// Scan period, in seconds.
     pub scan_time: f64,
+    /// Shortest and longest range that the scanner reports, in meters.
+    pub limits_m: [f64; 2],
     /// Readings in meters, with the codes of REP-117.
     pub ranges: Vec<f64>,
 }
@@ -209,6 +221,13 @@ pub fn encode_markers(stamp: u64, frame_number: u32, markers: &[LabeledMarker]) 
     cdr.into_bytes()
 }
 
+/// A `std_msgs/msg/String`.
+pub fn encode_text(text: &str) -> Vec<u8> {
+    let mut cdr = CdrWriter::new();
+    cdr.string(text);
+    cdr.into_bytes()
+}
+
 /// A `tf2_msgs/msg/TFMessage`.
 pub fn encode_transforms(stamp: u64, transforms: &[FrameTransform<'_>]) -> Vec<u8> {
     let mut cdr = CdrWriter::new();
@@ -272,22 +291,40 @@ pub fn decode_scan(message: &[u8]) -> Result<Scan, MessageError> {
     for n in &mut numbers {
         *n = f64::from(cdr.f32()?);
     }
-    let [angle_min, _, angle_increment, _, scan_time, _, _] = numbers;
+    let [angle_min, _, angle_increment, _, scan_time, range_min, range_max] = numbers;
+    if !angle_min.is_finite() || !angle_increment.is_finite() {
+        return Err(MessageError::NoAngles {
+            first: angle_min,
+            increment: angle_increment,
+        });
+    }
     let ranges = read_singles(&mut cdr)?;
     Ok(Scan {
         stamp,
         angle_min,
         angle_increment,
         scan_time,
+        limits_m: [range_min, range_max],
         ranges,
     })
 }
 
-/// Reads the time and the pose of a `PoseStamped`, bit for bit if its quaternion has unit length.
+/// Reads the text of a `String`.
 ///
 /// # Errors
-/// [`MessageError`] if the bytes are not one or the pose is invalid.
-pub fn decode_pose(message: &[u8]) -> Result<(u64, Pose), MessageError> {
+/// [`MessageError`] if the bytes are not one.
+pub fn decode_text(message: &[u8]) -> Result<&str, MessageError> {
+    Ok(CdrReader::new(message)?.string()?)
+}
+
+/// Reads the time and the pose of a `PoseStamped`, bit for bit if its quaternion has unit length.
+///
+/// There is no pose if its numbers are not finite or its quaternion is zero: trackers report so that they have lost the
+/// body.
+///
+/// # Errors
+/// [`MessageError`] if the bytes are not one or the quaternion is no rotation.
+pub fn decode_pose(message: &[u8]) -> Result<(u64, Option<Pose>), MessageError> {
     // Third-party files may hold rounded quaternions; ours have unit length to machine precision.
     const ROUNDED: f64 = 1e-3;
     const EXACT: f64 = 1e-12;
@@ -296,19 +333,23 @@ pub fn decode_pose(message: &[u8]) -> Result<(u64, Pose), MessageError> {
     let [x, y, z, w] = [cdr.f64()?, cdr.f64()?, cdr.f64()?, cdr.f64()?];
     let q = Quaternion::new(w, x, y, z);
     let length = q.norm();
-    let finite = position.iter().all(|c| c.is_finite());
-    if !finite || !length.is_finite() || (length - 1.0).abs() > ROUNDED {
-        return Err(MessageError::NotAPose { length });
+    let finite = position.iter().all(|c| c.is_finite()) && length.is_finite();
+    if !finite || length == 0.0 {
+        return Ok((stamp, None));
+    }
+    if (length - 1.0).abs() > ROUNDED {
+        return Err(MessageError::NotAPose {
+            length,
+            seconds: stamp as f64 / NS_PER_S as f64,
+        });
     }
     let rotation = if (length - 1.0).abs() > EXACT {
         UnitQuaternion::new_normalize(q)
     } else {
         UnitQuaternion::new_unchecked(q)
     };
-    Ok((
-        stamp,
-        Pose::from_parts(Translation3::from(position.coords), rotation),
-    ))
+    let pose = Pose::from_parts(Translation3::from(position.coords), rotation);
+    Ok((stamp, Some(pose)))
 }
 
 /// Reads the time and the markers of a `Markers`.

@@ -220,9 +220,21 @@ pub(super) fn with_expressions(mut schema: Json) -> Json {
     if let Some(parameter) = parameter {
         let table = parameter.take();
         let description = table.get("description").cloned().unwrap_or_default();
+        let limit = |name: &str| {
+            table
+                .pointer(&format!("/properties/value/{name}"))
+                .cloned()
+                .unwrap_or_default()
+        };
+        let (least, greatest) = (limit("minimum"), limit("maximum"));
         *parameter = serde_json::json!({
             "description": description,
-            "anyOf": [{ "type": ["number", "string"], "pattern": PATTERN }, table],
+            "anyOf": [
+                {
+                    "type": ["number", "string"], "pattern": PATTERN, "minimum": least, "maximum": greatest,
+                },
+                table,
+            ],
         });
     }
     schema

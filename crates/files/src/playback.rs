@@ -1,35 +1,61 @@
 //! Reading `observations.mcap`, our own or a third party's.
 //!
-//! A stretch begins with its message on `/session/pose` and lasts to the next. It has exactly as many scans as its
-//! label states. The recording begins with its first message. Topics that are not in the table of
-//! [`recording`](super::recording) are ignored, and so are bodies and markers that are not in the session, and
-//! motion capture before the first label. A frame without a message on `/mocap/markers` has an empty list of markers.
+//! Messages belong together by the times at which they were logged; their order in the file means nothing. A stretch begins
+//! with its label on `/session/pose` and lasts to the next one; of messages logged at the same time the label comes first,
+//! and others in the order of the file. Scans and frames of motion capture happen when their own stamps say. The recording
+//! begins with its first message.
+//!
+//! Topics that are not in the table of [`recording`](super::recording) are ignored, and so are bodies and markers that are
+//! not in the session, and messages before the first label. A frame without a message on `/mocap/markers` has an empty list
+//! of markers. Lost scans, a label sent twice and readings that are no ranges are counted and noted.
 
-use super::blocks::{Place, words};
+use super::blocks::{Block, Place, Visit};
 use super::bodies::{Bodies, MARKERS_TOPIC};
+use super::codes::Codes;
 use super::definitions::{self, Definition};
 use super::error::IoError;
 use super::gathering::{Gathering, Keep, Known, Whole};
 use super::messages;
-use super::source::{Source, Start};
-use super::survey::{Survey, Surveyed, watch};
+use super::records;
+use super::source::{Entry, Position, Source, Start};
 use catoptric_model::session::ScannerSheet;
-use catoptric_model::{ModelError, PoseLabel, PoseRecord, Readings, ScanSource, Session, Stop, Stretch};
-use mcap::records::{Record, op};
-use rayon::prelude::*;
-use std::collections::BTreeMap;
+use catoptric_model::{PoseLabel, Session, Stop, Stretch};
+use mcap::records::op;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
-/// The content of a channel.
+/// The content of a channel, in the order in which messages of equal times are taken.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Topic {
-    Label,
+    Label(Text),
     Scan,
     Echoes,
     Pose(usize),
     Markers,
     Other,
+}
+
+/// How the text of a label is encoded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Text {
+    /// As a `std_msgs/String`.
+    Message,
+    /// As it is, without a schema.
+    Bare,
+}
+
+/// Topic of the labels.
+pub(super) const LABEL_TOPIC: &str = "/session/pose";
+
+/// What reading a recording makes of it.
+pub(super) struct Played<R: Keep> {
+    pub(super) stretches: Vec<R::Kept>,
+    pub(super) source: Source,
+    /// What was unusual, a sentence each.
+    pub(super) notes: Vec<String>,
+    /// The stretches that are left out, each with the reason.
+    pub(super) left_out: Vec<String>,
 }
 
 /// The state of reading a recording.
@@ -38,12 +64,31 @@ struct Playback<'a, R: Keep> {
     bodies: Bodies,
     schemas: BTreeMap<u16, String>,
     topics: BTreeMap<u16, Topic>,
+    /// Names of all topics.
+    names: BTreeSet<String>,
     /// Time of the first message, in nanoseconds.
     epoch: Option<u64>,
+    /// Latest time of the messages taken so far, and that of the current label.
+    latest: u64,
+    labeled: u64,
+    /// Whether messages that belong together are apart, so that they must be sorted; and whether they are.
+    is_unordered: bool,
+    is_sorted: bool,
+    /// Whether a stretch with a fault is left out instead of the whole recording.
+    partial: bool,
+    /// Whether some of the recording cannot be read.
+    has_damage: bool,
     current: Option<Gathering<R>>,
+    /// Numbers of the poses so far.
+    poses: BTreeSet<usize>,
     /// Locations of the stretches.
     starts: Vec<Start>,
     finished: Vec<R::Kept>,
+    codes: Codes,
+    /// Scans before the first label.
+    unlabeled: usize,
+    notes: Vec<String>,
+    left_out: Vec<String>,
 }
 
 /// Reads a recording, frame by frame; all of its stretches are held in memory.
@@ -53,7 +98,8 @@ struct Playback<'a, R: Keep> {
 /// # Errors
 /// [`IoError`] with the file and offset if it cannot be read, is cut off or corrupt, or does not fit the session.
 pub fn read_recording(path: &Path, session: &Session) -> Result<Vec<Stretch>, IoError> {
-    Ok(play::<Whole>(&Place::File(path.to_owned()), session, &Stop::default())?.0)
+    let place = Place::File(path.to_owned());
+    Ok(play::<Whole>(&place, session, false, &Stop::default())?.stretches)
 }
 
 /// Reads a recording from memory; `path` names it in errors.
@@ -62,96 +108,155 @@ pub fn read_recording(path: &Path, session: &Session) -> Result<Vec<Stretch>, Io
 /// [`IoError`] as [`read_recording`].
 pub fn parse_recording(bytes: &[u8], path: &Path, session: &Session) -> Result<Vec<Stretch>, IoError> {
     let place = Place::Memory(path.to_owned(), Arc::from(bytes));
-    Ok(play::<Whole>(&place, session, &Stop::default())?.0)
+    Ok(play::<Whole>(&place, session, false, &Stop::default())?.stretches)
 }
 
-/// Reads what a calibration needs of every stretch of a recording; readings stay in the recording.
-///
-/// The outer error concerns the recording, the inner one a stretch that no calibration can use.
-pub(super) fn survey(
-    place: Place,
+/// Reads a recording once and returns the data kept of every stretch, and the index of its messages. If it is `partial`, what
+/// is damaged is left out.
+pub(super) fn play<R: Keep>(
+    place: &Place,
     session: &Session,
+    partial: bool,
     stop: &Stop,
-) -> Result<Result<Vec<PoseRecord>, ModelError>, IoError> {
-    let (surveyed, source) = play::<Survey>(&place, session, stop)?;
-    let source = Arc::new(source);
-    let complete = |(stretch, surveyed): (usize, Surveyed)| {
-        let mut record = match surveyed.record {
-            Ok(record) => record,
-            Err(error) => return Ok(Err(error)),
-        };
-        if !surveyed.unwatched.is_empty() {
-            record.watched = watch(&source, stretch, surveyed.unwatched)?;
-        }
-        let recording: Arc<dyn ScanSource> = Arc::<Source>::clone(&source);
-        record.readings = Readings::recorded(recording, stretch, record.label.scans, surveyed.statistics);
-        Ok(Ok(record))
-    };
-    let records: Vec<Result<PoseRecord, ModelError>> = surveyed
-        .into_par_iter()
-        .enumerate()
-        .map(complete)
-        .collect::<Result<_, IoError>>()?;
-    Ok(records.into_iter().collect())
-}
-
-/// Reads a recording once and returns the data kept of every stretch, and the index of its messages.
-fn play<R: Keep>(place: &Place, session: &Session, stop: &Stop) -> Result<(Vec<R::Kept>, Source), IoError> {
-    let mut playback = Playback::<R> {
-        scanner: &session.scanner,
-        bodies: Bodies::of(session, place.path())?,
-        schemas: BTreeMap::new(),
-        topics: BTreeMap::new(),
-        epoch: None,
-        current: None,
-        starts: Vec::new(),
-        finished: Vec::new(),
-    };
-    let (blocks, length) = place.visit(stop, |opcode, data, at| playback.record(opcode, data, at))?;
-    let ended = playback.end_stretch();
-    ended.map_err(|what| place.corrupt(what, length))?;
+) -> Result<Played<R>, IoError> {
+    let mut playback = Playback::<R>::new(place, session, partial)?;
+    let visited = place.visit(stop, partial, |event| playback.take(event));
+    if !playback.is_unordered {
+        let (blocks, length) = visited?;
+        let ended = playback.end_stretch(None);
+        ended.map_err(|what| place.corrupt(what, length))?;
+        return playback.finish(place, blocks, None, stop);
+    }
+    // Once more, for the times of all messages, and then in order.
+    let mut index = Index::default();
+    let mut playback = Playback::<R>::new(place, session, partial)?;
+    let (blocks, length) = place.visit(stop, partial, |event| index.take(event, &mut playback))?;
+    index.entries.sort_by_key(|entry| (entry.time, !entry.is_label));
+    playback.epoch = index.epoch;
+    playback.is_sorted = true;
     let source = Source {
-        place: place.clone(),
-        stop: stop.clone(),
-        blocks,
-        stretches: playback.starts,
-        topics: playback.topics,
-        epoch: playback.epoch.unwrap_or_default(),
-        bodies: playback.bodies,
-        kept: Mutex::default(),
+        order: Some(Arc::from(index.entries)),
+        ..Source::new(place, &session.scanner, stop, blocks)
     };
-    Ok((playback.finished, source))
+    for (number, entry) in source.order.iter().flat_map(|order| order.iter()).enumerate() {
+        let records = source.records(entry.block as usize)?;
+        let record = records.get(entry.number as usize);
+        let message = record.and_then(|(_, body)| records::message(body));
+        let message = message.ok_or_else(|| place.changed(source.blocks[entry.block as usize].at()))?;
+        let taken = playback.message(&message, (0, number));
+        taken.map_err(|what| place.corrupt(what, source.blocks[entry.block as usize].at()))?;
+    }
+    playback
+        .end_stretch(None)
+        .map_err(|what| place.corrupt(what, length))?;
+    let Source { blocks, order, .. } = source;
+    playback.finish(place, blocks, order, stop)
 }
 
-impl<R: Keep> Playback<'_, R> {
-    /// Processes a record, given the index of its block and its index there.
-    fn record(&mut self, opcode: u8, data: &[u8], at: (usize, usize)) -> Result<(), String> {
-        if !matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
+/// The times of the messages that matter.
+#[derive(Default)]
+struct Index {
+    entries: Vec<Entry>,
+    /// Earliest time of any message.
+    epoch: Option<u64>,
+}
+
+impl Index {
+    fn take<R: Keep>(&mut self, event: Visit<'_>, playback: &mut Playback<'_, R>) -> Result<(), String> {
+        let Visit::Record { opcode, data, at } = event else {
+            return playback.take(event);
+        };
+        let Some(message) = playback.define(opcode, data)? else {
             return Ok(());
-        }
-        match mcap::parse_record(opcode, data).map_err(|e| words(&e))? {
-            Record::Schema { header, .. } => {
-                self.schemas.insert(header.id, header.name);
+        };
+        self.epoch = Some(self.epoch.map_or(message.time, |epoch| epoch.min(message.time)));
+        match playback.topics.get(&message.channel) {
+            None => Err(playback.no_channel(message.channel)),
+            Some(Topic::Other) => Ok(()),
+            Some(topic) => {
+                let number = |n: usize| u32::try_from(n).map_err(|_| "too many messages".to_owned());
+                self.entries.push(Entry {
+                    time: message.time,
+                    is_label: matches!(topic, Topic::Label(_)),
+                    block: number(at.0)?,
+                    number: number(at.1)?,
+                });
+                Ok(())
             }
-            Record::Channel(channel) => {
+        }
+    }
+}
+
+impl<'a, R: Keep> Playback<'a, R> {
+    fn new(place: &Place, session: &'a Session, partial: bool) -> Result<Self, IoError> {
+        Ok(Self {
+            scanner: &session.scanner,
+            bodies: Bodies::of(session, place.path())?,
+            schemas: BTreeMap::new(),
+            topics: BTreeMap::new(),
+            names: BTreeSet::new(),
+            epoch: None,
+            latest: 0,
+            labeled: 0,
+            is_unordered: false,
+            is_sorted: false,
+            partial,
+            has_damage: false,
+            current: None,
+            poses: BTreeSet::new(),
+            starts: Vec::new(),
+            finished: Vec::new(),
+            codes: Codes::default(),
+            unlabeled: 0,
+            notes: Vec::new(),
+            left_out: Vec::new(),
+        })
+    }
+
+    /// Processes what a visit of the recording comes to.
+    fn take(&mut self, event: Visit<'_>) -> Result<(), String> {
+        match event {
+            Visit::Damage(what) => {
+                self.fault(what.to_owned());
+                self.has_damage = true;
+                Ok(())
+            }
+            Visit::Record { opcode, data, at } => {
+                let Some(message) = self.define(opcode, data)? else {
+                    return Ok(());
+                };
+                self.epoch.get_or_insert(message.time);
+                self.message(&message, at)
+            }
+        }
+    }
+
+    /// Processes a schema or a channel; returns a message.
+    fn define<'m>(&mut self, opcode: u8, data: &'m [u8]) -> Result<Option<records::Message<'m>>, String> {
+        let short = |what: &str| format!("not a whole recording: a {what} claims more than its record has");
+        match opcode {
+            op::SCHEMA => {
+                let schema = records::schema(data).ok_or_else(|| short("schema"))?;
+                self.schemas.insert(schema.id, schema.name.to_owned());
+            }
+            op::CHANNEL => {
+                let channel = records::channel(data).ok_or_else(|| short("channel"))?;
                 let schema = self
                     .schemas
-                    .get(&channel.schema_id)
+                    .get(&channel.schema)
                     .map_or("no schema", String::as_str);
-                let topic = self.topic(&channel.topic, schema, &channel.message_encoding)?;
+                let topic = self.topic(channel.topic, schema, channel.encoding)?;
+                self.names.insert(channel.topic.to_owned());
                 self.topics.insert(channel.id, topic);
             }
-            Record::Message { header, data } => {
-                self.epoch.get_or_insert(header.log_time);
-                let topic = self.topics.get(&header.channel_id);
-                let topic = topic.ok_or_else(|| {
-                    format!("a message on channel {}, which does not exist", header.channel_id)
-                })?;
-                self.message(&topic.clone(), header.log_time, &data, at)?;
-            }
+            op::MESSAGE => return records::message(data).map(Some).ok_or_else(|| short("message")),
             _ => {}
         }
-        Ok(())
+        Ok(None)
+    }
+
+    fn no_channel(&self, channel: u16) -> String {
+        format!("a message on channel {channel}, which does not exist")
     }
 
     /// The meaning of a topic.
@@ -168,8 +273,8 @@ impl<R: Keep> Playback<'_, R> {
         match topic {
             "/scan" => expect(definitions::LASER_SCAN, Topic::Scan),
             "/echoes" => expect(definitions::MULTI_ECHO_SCAN, Topic::Echoes),
-            "/session/pose" if encoding == "json" => Ok(Topic::Label),
-            "/session/pose" => Err(format!("{topic} is {encoding:?}, \"json\" is needed")),
+            LABEL_TOPIC if encoding == "json" => Ok(Topic::Label(Text::Bare)),
+            LABEL_TOPIC => expect(definitions::STRING, Topic::Label(Text::Message)),
             _ => match topic.strip_prefix("/mocap/") {
                 Some(MARKERS_TOPIC) => expect(definitions::MARKERS, Topic::Markers),
                 Some(subject) => match self.bodies.position(subject) {
@@ -181,72 +286,139 @@ impl<R: Keep> Playback<'_, R> {
         }
     }
 
-    /// Processes a message.
-    fn message(
-        &mut self,
-        topic: &Topic,
-        log_time: u64,
-        data: &[u8],
-        at: (usize, usize),
-    ) -> Result<(), String> {
+    /// Processes a message, given the index of its block and its index there.
+    fn message(&mut self, message: &records::Message<'_>, at: Position) -> Result<(), String> {
+        let Some(topic) = self.topics.get(&message.channel).cloned() else {
+            return Err(self.no_channel(message.channel));
+        };
+        // In order, no message comes after a label that was logged later, nor a label after anything logged no earlier.
+        let in_order = match topic {
+            Topic::Other => return Ok(()),
+            Topic::Label(_) => message.time > self.latest || self.latest == 0,
+            Topic::Scan | Topic::Echoes => message.time >= self.latest_scan(),
+            Topic::Pose(_) | Topic::Markers => message.time >= self.labeled,
+        };
+        if !in_order {
+            self.is_unordered = true;
+            return Err("the messages are not in the order of their times".to_owned());
+        }
+        self.latest = self.latest.max(message.time);
+        if let Topic::Label(text) = topic {
+            return self.label(text, message, at);
+        }
+        let Some(current) = &mut self.current else {
+            self.unlabeled += usize::from(self.poses.is_empty() && topic == Topic::Scan);
+            return Ok(());
+        };
         let known = Known {
             scanner: self.scanner,
             bodies: &self.bodies,
             epoch: self.epoch.unwrap_or_default(),
         };
-        match topic {
-            Topic::Label => {
-                let label: PoseLabel =
-                    serde_json::from_slice(data).map_err(|e| format!("/session/pose: {e}"))?;
-                self.end_stretch()?;
-                self.starts.push(Start {
-                    label: at,
-                    scans: label.scans,
-                });
-                self.current = Some(Gathering::new(label, log_time, self.scanner));
-            }
+        let (taken, name) = match topic {
+            Topic::Label(_) | Topic::Other => return Ok(()),
             Topic::Scan => {
-                let scan = messages::decode_scan(data).map_err(|e| format!("/scan: {e}"))?;
-                let current = self.current.as_mut();
-                let current = current.ok_or("/scan: a scan before the first /session/pose")?;
-                current
-                    .scan(scan, self.scanner)
-                    .map_err(|what| format!("/scan: pose {}: {what}", current.number()))?;
+                let scan = messages::decode_scan(message.data).map_err(|e| e.to_string());
+                let taken =
+                    scan.and_then(|scan| current.scan(scan, message.time, self.scanner, &mut self.codes));
+                (taken, "/scan".to_owned())
             }
             Topic::Echoes => {
-                let (_, echoes) = messages::decode_echoes(data).map_err(|e| format!("/echoes: {e}"))?;
-                let current = self.current.as_mut();
-                let current = current.ok_or("/echoes: a scan before the first /session/pose")?;
-                current
-                    .echoes(echoes, self.scanner)
-                    .map_err(|what| format!("/echoes: pose {}: {what}", current.number()))?;
+                let echoes = messages::decode_echoes(message.data).map_err(|e| e.to_string());
+                let taken = echoes.and_then(|(_, echoes)| current.echoes(echoes, self.scanner));
+                (taken, "/echoes".to_owned())
             }
             Topic::Pose(body) => {
-                let subject = &self.bodies.all[*body].subject;
-                let (time, pose) =
-                    messages::decode_pose(data).map_err(|e| format!("/mocap/{subject}: {e}"))?;
-                if let Some(current) = &mut self.current {
-                    let taken = current.pose(time, *body, pose, known);
-                    taken.map_err(|what| format!("/mocap/{subject}: pose {}: {what}", current.number()))?;
-                }
+                let pose = messages::decode_pose(message.data).map_err(|e| e.to_string());
+                let taken = pose.and_then(|(time, pose)| current.pose(time, body, pose, known));
+                (taken, format!("/mocap/{}", self.bodies.all[body].subject))
             }
             Topic::Markers => {
-                let (time, markers) =
-                    messages::decode_markers(data).map_err(|e| format!("/mocap/{MARKERS_TOPIC}: {e}"))?;
-                if let Some(current) = &mut self.current {
-                    let taken = current.markers(time, &markers, known);
-                    taken.map_err(|what| {
-                        format!("/mocap/{MARKERS_TOPIC}: pose {}: {what}", current.number())
-                    })?;
-                }
+                let markers = messages::decode_markers(message.data).map_err(|e| e.to_string());
+                let taken = markers.and_then(|(time, markers)| current.markers(time, &markers, known));
+                (taken, format!("/mocap/{MARKERS_TOPIC}"))
             }
-            Topic::Other => {}
+        };
+        match taken {
+            Ok(()) => Ok(()),
+            Err(what) => {
+                let pose = current.number();
+                self.fault_or(format!("{name}: pose {pose}: {what}"))
+            }
         }
+    }
+
+    /// The least time that a scan in order can have.
+    fn latest_scan(&self) -> u64 {
+        self.current
+            .as_ref()
+            .map_or(self.labeled, |current| current.latest_scan.max(self.labeled))
+    }
+
+    /// Processes a label.
+    fn label(&mut self, text: Text, message: &records::Message<'_>, at: Position) -> Result<(), String> {
+        self.labeled = message.time;
+        let label = match text {
+            Text::Bare => Ok(message.data),
+            Text::Message => messages::decode_text(message.data).map(str::as_bytes),
+        };
+        let label = label.map_err(|e| e.to_string());
+        let label: Result<PoseLabel, String> =
+            label.and_then(|label| serde_json::from_slice(label).map_err(|e| e.to_string()));
+        let label = match label {
+            Ok(label) => label,
+            Err(what) => {
+                self.end_stretch(Some(at))?;
+                return self.fault_or(format!("{LABEL_TOPIC}: {what}"));
+            }
+        };
+        if self
+            .current
+            .as_ref()
+            .is_some_and(|current| current.label == label)
+        {
+            self.notes
+                .push(format!("pose {}: its label was sent more than once", label.pose));
+            return Ok(());
+        }
+        self.end_stretch(Some(at))?;
+        if !self.poses.insert(label.pose) {
+            return self.fault_or(format!(
+                "{LABEL_TOPIC}: there are two stretches of pose {}",
+                label.pose
+            ));
+        }
+        self.starts.push(Start {
+            label: at,
+            end: (usize::MAX, usize::MAX),
+            scans: label.scans,
+        });
+        self.current = Some(Gathering::new(label, message.time, self.scanner));
         Ok(())
     }
 
-    /// Ends the current stretch, if there is one.
-    fn end_stretch(&mut self) -> Result<(), String> {
+    /// A fault in the current stretch: it is left out, or the error is returned.
+    fn fault_or(&mut self, what: String) -> Result<(), String> {
+        if self.partial {
+            self.fault(what);
+            return Ok(());
+        }
+        Err(what)
+    }
+
+    /// Leaves out the current stretch, and all messages up to the next label.
+    fn fault(&mut self, what: String) {
+        if let Some(current) = self.current.take() {
+            self.starts.pop();
+            self.left_out
+                .push(format!("pose {} is left out: {what}", current.number()));
+        } else {
+            self.left_out.push(what);
+        }
+    }
+
+    /// Ends the current stretch, if there is one, at the position of the next label.
+    fn end_stretch(&mut self, end: Option<Position>) -> Result<(), String> {
         let Some(gathering) = self.current.take() else {
             return Ok(());
         };
@@ -255,7 +427,62 @@ impl<R: Keep> Playback<'_, R> {
             bodies: &self.bodies,
             epoch: self.epoch.unwrap_or_default(),
         };
-        self.finished.push(gathering.end(known)?);
-        Ok(())
+        let (number, scans) = (gathering.number(), gathering.scans());
+        let ended = match self.is_sorted && self.has_damage && gathering.miscounts() {
+            // What cannot be read may have been anywhere, and a label among it.
+            true => Err("some of its messages cannot be read".to_owned()),
+            false => gathering.end(known),
+        };
+        match ended {
+            Ok((kept, notes)) => {
+                if let Some(start) = self.starts.last_mut() {
+                    start.scans = scans;
+                    start.end = end.unwrap_or(start.end);
+                }
+                self.notes.extend(notes);
+                self.finished.push(kept);
+                Ok(())
+            }
+            Err(what) => {
+                self.starts.pop();
+                if self.partial {
+                    self.left_out.push(format!("pose {number} is left out: {what}"));
+                    return Ok(());
+                }
+                Err(what)
+            }
+        }
+    }
+
+    /// Everything that was read.
+    fn finish(
+        mut self,
+        place: &Place,
+        blocks: Vec<Block>,
+        order: Option<Arc<[Entry]>>,
+        stop: &Stop,
+    ) -> Result<Played<R>, IoError> {
+        if self.unlabeled > 0 {
+            let words = format!(
+                "{} scans before the first label belong to no stretch",
+                self.unlabeled
+            );
+            self.notes.insert(0, words);
+        }
+        self.notes.extend(self.codes.words());
+        Ok(Played {
+            stretches: self.finished,
+            source: Source {
+                order,
+                stretches: self.starts,
+                topics: self.topics,
+                names: self.names,
+                epoch: self.epoch.unwrap_or_default(),
+                bodies: self.bodies,
+                ..Source::new(place, self.scanner, stop, blocks)
+            },
+            notes: self.notes,
+            left_out: self.left_out,
+        })
     }
 }

@@ -3,7 +3,7 @@
 //! | topic | message | when |
 //! |---|---|---|
 //! | `/tf_static` | `tf2_msgs/TFMessage`: laser in rig, nominal | once, at the beginning |
-//! | `/session/pose` | the [`PoseLabel`](catoptric_model::PoseLabel) as JSON | before the messages of its stretch |
+//! | `/session/pose` | `std_msgs/String`: the [`PoseLabel`](catoptric_model::PoseLabel) as JSON | before the messages of its stretch |
 //! | `/tf` | `tf2_msgs/TFMessage`: the bodies as first seen | at the start of a stretch; in a flight every frame after |
 //! | `/points` | `sensor_msgs/PointCloud2`: the plane as scanned | the first scan of a stretch, not every scan |
 //! | `/scan` | `sensor_msgs/LaserScan` | every scan |
@@ -13,8 +13,6 @@
 //!
 //! Time is [`EPOCH_NS`] plus the time since the recording began, in whole nanoseconds; log time, publish time and
 //! stamp are equal. The messages of a stretch are ordered by time. The same stretches give the same bytes.
-//!
-//! `/session/pose` has no schema: rosbags rejects a recording with a non-ROS schema, and Foxglove needs none.
 
 use super::bodies::{Bodies, MARKERS_TOPIC};
 use super::container::Container;
@@ -107,7 +105,7 @@ impl<W: Write> RecordingWriter<W> {
             .map(|b| add(&topic(&b.subject), definitions::POSE_STAMPED))
             .collect();
         let markers = add(&topic(MARKERS_TOPIC), definitions::MARKERS);
-        let label = container.add_channel(0, "/session/pose", "json");
+        let label = add_channel(&mut container, "/session/pose", definitions::STRING);
         let encoder = RecordingEncoder {
             path: path.to_owned(),
             scanner: session.scanner.clone(),
@@ -295,8 +293,8 @@ impl RecordingEncoder {
         let readings = |scan: usize| (scan - scans.start) * part.beams..(scan - scans.start + 1) * part.beams;
         Ok(Some(match event {
             Event::Label => {
-                let label = serde_json::to_vec(&part.label).map_err(|e| IoError::json(&self.path, &e))?;
-                (channels.label, label)
+                let label = serde_json::to_string(&part.label).map_err(|e| IoError::json(&self.path, &e))?;
+                (channels.label, messages::encode_text(&label))
             }
             Event::Transforms => {
                 let seen = part.tracks.iter().zip(first_seen);

@@ -1,24 +1,9 @@
-//! Results as JSON: calibrations (our own or third-party), characterizations, and the truth of a simulated dataset.
+//! Results as JSON: calibrations (our own or third-party), characterizations.
 
 use super::error::IoError;
 use super::json::read_json;
 use catoptric_model::{Calibration, Characterization, Session, calibration, characterization};
 use std::path::Path;
-
-/// Reads the truth of a dataset; `None` if the dataset is blind.
-///
-/// # Errors
-/// [`IoError`] if it exists and cannot be read, or has an unknown version.
-#[cfg(all(feature = "recording", feature = "scene"))]
-pub fn read_truth(dataset: &Path) -> Result<Option<catoptric_sim::Truth>, IoError> {
-    let path = dataset.join(super::dataset::TRUTH);
-    if !path.exists() {
-        return Ok(None);
-    }
-    let found: catoptric_sim::Truth = read_json(&path)?;
-    require_version(&path, found.schema_version, catoptric_sim::truth::SCHEMA_VERSION)?;
-    Ok(Some(found))
-}
 
 /// Reads a calibration, our own or third-party.
 ///

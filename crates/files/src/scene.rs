@@ -157,19 +157,36 @@ pub fn parse_in(text: &str, file_name: &str, folder: &Path, sets: &[String]) -> 
     }
 }
 
+/// Largest coordinate of a vertex, in meters: as far as rays are cast.
+const LARGEST_COORDINATE_M: f64 = 1e4;
+
 /// Reads the meshes named by a scene; relative names start at a folder.
 ///
 /// # Errors
-/// [`SceneErrors::Mesh`] for the first that is missing or damaged.
+/// [`SceneErrors::Mesh`] for the first that is missing or damaged, or has a vertex beyond 10 km.
 pub fn read_meshes(scene: &mut Scene, folder: &Path) -> Result<(), SceneErrors> {
     let mut meshes = std::mem::take(&mut scene.meshes);
     for (key, shape) in scene.mesh_shapes() {
+        let path = folder.join(&shape.file);
+        let refused = |source| SceneErrors::Mesh {
+            key: key.clone(),
+            source: Box::new(source),
+        };
         if !meshes.0.contains_key(&shape.file) {
-            let read = mesh::read_mesh(folder.join(&shape.file)).map_err(|e| SceneErrors::Mesh {
-                key,
-                source: Box::new(e),
-            })?;
+            let read = mesh::read_mesh(&path).map_err(refused)?;
             meshes.0.insert(shape.file.clone(), Arc::new(read));
+        }
+        let unit = shape.units.in_meters();
+        let vertices = meshes.0[&shape.file].vertices();
+        if let Some(vertex) = vertices
+            .iter()
+            .position(|v| v.coords.amax() * unit > LARGEST_COORDINATE_M)
+        {
+            let coordinate = vertices[vertex].coords.amax() * unit;
+            return Err(refused(IoError::content(
+                &path,
+                format!("vertex {vertex} has a coordinate of {coordinate:e} m; up to 1e4 m is allowed"),
+            )));
         }
     }
     scene.meshes = meshes;

@@ -3,14 +3,17 @@
 use super::blocks::{Block, Place, Records};
 use super::bodies::Bodies;
 use super::capture::Capture;
+use super::codes::{Codes, Limits};
 use super::error::IoError;
 use super::messages;
 use super::playback::Topic;
+use super::records;
 use super::survey::MOST_WAITING;
+use catoptric_model::session::ScannerSheet;
 use catoptric_model::{ScanSource, Scans, Stop, TrackedFrame, Unreadable};
-use mcap::records::Record;
+use mcap::records::op;
 use std::borrow::Cow;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Size of the blocks kept for the next stretch, which is often in the same block, in bytes.
@@ -19,10 +22,23 @@ const MOST_KEPT: usize = 1 << 24;
 /// Location of a stretch.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Start {
-    /// Block and index of its label's message.
-    pub(super) label: (usize, usize),
+    /// Its label.
+    pub(super) label: Position,
+    /// The first message beyond it.
+    pub(super) end: Position,
     /// Its scans.
     pub(super) scans: usize,
+}
+
+/// A message of a recording that is not in order.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Entry {
+    /// When it was logged, in nanoseconds.
+    pub(super) time: u64,
+    pub(super) is_label: bool,
+    /// Its block, and its index there.
+    pub(super) block: u32,
+    pub(super) number: u32,
 }
 
 /// A recording with the index of its contents.
@@ -31,21 +47,30 @@ pub(super) struct Source {
     /// Looked at before each block.
     pub(super) stop: Stop,
     pub(super) blocks: Vec<Block>,
+    /// The messages in the order of their times, if that is not their order in the recording.
+    pub(super) order: Option<Arc<[Entry]>>,
     pub(super) stretches: Vec<Start>,
     pub(super) topics: BTreeMap<u16, Topic>,
+    /// Names of all topics.
+    pub(super) names: BTreeSet<String>,
+    pub(super) scanner: ScannerSheet,
     pub(super) bodies: Bodies,
     /// Time of the first message, in nanoseconds.
     pub(super) epoch: u64,
     pub(super) kept: Mutex<VecDeque<(usize, Arc<Records>)>>,
 }
 
+/// A position among the messages: a block and an index in it; 0 and the index among all if they are sorted.
+pub(super) type Position = (usize, usize);
+
 /// The messages of a stretch, in order.
 struct Messages<'a> {
     source: &'a Source,
-    block: usize,
-    /// Index in its block of the next message.
-    next: usize,
-    records: Option<Arc<Records>>,
+    next: Position,
+    /// The first beyond the stretch.
+    end: Position,
+    /// The block that was read last.
+    records: Option<(usize, Arc<Records>)>,
 }
 
 /// The scans of a stretch.
@@ -55,6 +80,23 @@ struct ScansOf<'a> {
 }
 
 impl Source {
+    /// The blocks of a recording, of which nothing else is known yet.
+    pub(super) fn new(place: &Place, scanner: &ScannerSheet, stop: &Stop, blocks: Vec<Block>) -> Self {
+        Self {
+            place: place.clone(),
+            stop: stop.clone(),
+            blocks,
+            order: None,
+            stretches: Vec::new(),
+            topics: BTreeMap::new(),
+            names: BTreeSet::new(),
+            scanner: scanner.clone(),
+            bodies: Bodies::default(),
+            epoch: 0,
+            kept: Mutex::default(),
+        }
+    }
+
     /// Visits the frames of some bodies in a stretch, in order of time.
     pub(super) fn frames(
         &self,
@@ -77,7 +119,7 @@ impl Source {
                     let taken = capture.markers(time, &markers, &self.bodies);
                     taken.map_err(|_| changed())?;
                 }
-                Topic::Label | Topic::Scan | Topic::Echoes | Topic::Other => {}
+                Topic::Label(_) | Topic::Scan | Topic::Echoes | Topic::Other => {}
             }
             if capture.waiting() > MOST_WAITING {
                 capture.take(MOST_WAITING / 2, &self.bodies, of, self.epoch, &mut each);
@@ -88,16 +130,16 @@ impl Source {
     }
 
     fn messages(&self, stretch: usize) -> Messages<'_> {
-        let (block, label) = self.stretches[stretch].label;
+        let Start { label, end, .. } = self.stretches[stretch];
         Messages {
             source: self,
-            block,
-            next: label + 1,
+            next: (label.0, label.1 + 1),
+            end,
             records: None,
         }
     }
 
-    fn records(&self, block: usize) -> Result<Arc<Records>, IoError> {
+    pub(super) fn records(&self, block: usize) -> Result<Arc<Records>, IoError> {
         self.stop.check()?;
         let kept = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, records)) = kept().iter().find(|(b, _)| *b == block) {
@@ -118,31 +160,39 @@ impl Messages<'_> {
     /// The next message and its kind; `None` after the last of the stretch.
     fn next(&mut self) -> Result<Option<(&Topic, &[u8])>, IoError> {
         let (topic, number, length) = loop {
-            if self.block >= self.source.blocks.len() {
+            if self.next >= self.end {
                 return Ok(None);
             }
-            let records = match &self.records {
-                Some(records) => records,
-                None => self.records.insert(self.source.records(self.block)?),
+            let (block, number) = match &self.source.order {
+                None => self.next,
+                Some(order) => match order.get(self.next.1) {
+                    Some(entry) => (entry.block as usize, entry.number as usize),
+                    None => return Ok(None),
+                },
             };
-            let Some((opcode, record)) = records.get(self.next) else {
-                (self.block, self.next, self.records) = (self.block + 1, 0, None);
+            if block >= self.source.blocks.len() {
+                return Ok(None);
+            }
+            if self.records.as_ref().is_none_or(|(last, _)| *last != block) {
+                self.records = Some((block, self.source.records(block)?));
+            }
+            let records = self.records.as_ref().map(|(_, records)| records);
+            let Some((opcode, record)) = records.and_then(|records| records.get(number)) else {
+                self.next = (self.next.0 + 1, 0);
                 continue;
             };
-            self.next += 1;
-            let Ok(Record::Message { header, data }) = mcap::parse_record(opcode, record) else {
+            self.next.1 += 1;
+            let Some(message) = (opcode == op::MESSAGE)
+                .then(|| records::message(record))
+                .flatten()
+            else {
                 continue;
             };
-            match self.source.topics.get(&header.channel_id) {
-                Some(Topic::Label) => {
-                    self.block = self.source.blocks.len();
-                    return Ok(None);
-                }
-                Some(topic) => break (topic, self.next - 1, data.len()),
-                None => {}
+            if let Some(topic) = self.source.topics.get(&message.channel) {
+                break (topic, number, message.data.len());
             }
         };
-        let record = self.records.as_ref().and_then(|r| r.get(number));
+        let record = self.records.as_ref().and_then(|(_, records)| records.get(number));
         Ok(record.map(|(_, record)| (topic, &record[record.len() - length..])))
     }
 }
@@ -153,7 +203,9 @@ impl ScansOf<'_> {
         while let Some((topic, message)) = self.messages.next()? {
             if let Topic::Scan = topic {
                 let scan = messages::decode_scan(message);
-                let scan = scan.map_err(|_| source.place.changed(0))?;
+                let mut scan = scan.map_err(|_| source.place.changed(0))?;
+                let limits = Limits::of(&source.scanner, scan.limits_m);
+                Codes::default().replace(&mut scan.ranges, limits);
                 return Ok(scan.ranges);
             }
         }

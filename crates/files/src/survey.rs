@@ -3,15 +3,19 @@
 //! If a stretch is long for motion capture, its markers are averaged in another pass over its messages, when their
 //! frames have been counted.
 
+use super::bodies::Bodies;
 use super::capture::Capture;
 use super::error::IoError;
 use super::gathering::{Gathering, Keep, Known, followed};
+use super::lost::{Seen, Sieve};
 use super::source::Source;
 use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::selection::Median;
 use catoptric_model::tracking::{Jumping, MeanPose, Watching, median_jump};
 use catoptric_model::{BeamStatistics, Gathered, ModelError, Motion, Pose, PoseKind, PoseLabel, PoseRecord};
-use catoptric_model::{TrackedFrame, Watched};
+use catoptric_model::{Readings, ScanSource, TrackedFrame, Unreadable, Watched};
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Maximum number of motion-capture messages waiting to form frames; stretches with fewer may have them in any order.
 ///
@@ -41,6 +45,7 @@ struct Followed {
     jumps: Jumps,
     /// Trajectory of the rig, in a flight.
     path: Vec<(f64, Pose)>,
+    seen: Seen,
 }
 
 /// Squares of displacements, or the reason why they are not held.
@@ -62,6 +67,13 @@ pub(super) struct Surveyed {
     pub(super) statistics: Vec<BeamStatistics>,
     /// Bodies whose markers remain to be averaged.
     pub(super) unwatched: Vec<Unwatched>,
+    /// What the poses of each body look like.
+    pub(super) seen: Vec<Seen>,
+    /// Number of frames in which the tracker reported no pose of a body.
+    pub(super) lost: BTreeMap<usize, usize>,
+    pub(super) label: PoseLabel,
+    /// Whether the label's number of scans was wrong, and with it the halves of the statistics.
+    pub(super) is_miscounted: bool,
 }
 
 /// A body whose frames are known in number only.
@@ -122,6 +134,7 @@ impl Followed {
         let jumps = &mut self.jumps;
         self.jumping.add(&frame.markers, |square| jumps.add(square));
         if let Some(pose) = frame.pose {
+            self.seen.add(&pose);
             self.mean.add(&pose);
             if keeps_path {
                 self.path.push((frame.time_s, pose));
@@ -171,53 +184,92 @@ impl Keep for Survey {
         if stretch.kept.followed.is_some() {
             stretch.kept.follow(&mut stretch.capture, 0, known);
         }
+        let lost = std::mem::take(&mut stretch.capture.lost);
+        let (is_miscounted, starts) = (stretch.miscounts(), stretch.uneven_starts(known));
         let (stretch, kept) = stretch.into_stretch(known);
-        let statistics = kept.gathered.finish();
+        let (statistics, label) = (kept.gathered.finish(), stretch.label.clone());
         let Some(mut all) = kept.followed else {
+            let mut seen = vec![Seen::default(); known.bodies.all.len()];
+            for track in &stretch.tracks {
+                let body = known.bodies.position(&track.subject);
+                let seen = &mut seen[body.expect("a tracked body")];
+                let poses = track.frames.iter().filter_map(|frame| frame.pose);
+                poses.for_each(|pose| seen.add(&pose));
+            }
+            let mut record = stretch.into_record();
+            if let Ok(PoseRecord {
+                motion: Some(motion), ..
+            }) = &mut record
+            {
+                motion.scan_starts_s = starts;
+            }
             return Surveyed {
-                record: stretch.into_record(),
+                record,
                 statistics,
                 unwatched: Vec::new(),
+                seen,
+                lost,
+                label,
+                is_miscounted,
             };
         };
-        let position = |subject: &str| known.bodies.position(subject);
+        let seen = all.iter().map(|body| body.seen).collect();
+        let rig = known.bodies.position(RIG_SUBJECT);
         let motion = kept.is_flight.then(|| Motion {
             start_s: stretch.start_s,
             scan_period_s: stretch.scan_period_s,
-            frames: position(RIG_SUBJECT).map_or_else(Vec::new, |rig| std::mem::take(&mut all[rig].path)),
+            scan_starts_s: starts,
+            frames: rig.map_or_else(Vec::new, |rig| std::mem::take(&mut all[rig].path)),
         });
-        let mut unwatched = Vec::new();
-        if motion.is_none() {
-            let seen: Vec<usize> = (0..all.len()).filter(|body| all[*body].is_seen).collect();
-            let bodies = followed(&stretch.label, known.bodies, seen.into_iter());
-            for body in bodies {
-                let of = &mut all[body];
-                if of.markers > 0 {
-                    unwatched.push(Unwatched {
-                        body,
-                        subject: known.bodies.all[body].subject.clone(),
-                        frames: of.frames,
-                        markers: of.markers,
-                        median: std::mem::take(&mut of.jumps).median(),
-                    });
-                }
-            }
-        }
-        let mean = |subject: &str| all[position(subject)?].mean.finish();
-        let readings = catoptric_model::Readings::in_memory(stretch.beams, Vec::new());
+        let (record, unwatched) = of_followed(&label, motion, all, known.bodies, stretch.beams);
         Surveyed {
-            record: PoseRecord::new(stretch.label, motion, mean, Vec::new(), readings),
+            record,
             statistics,
             unwatched,
+            seen,
+            lost,
+            label,
+            is_miscounted,
         }
     }
 }
 
+/// The record of a stretch whose frames were discarded, and the bodies whose markers remain to be averaged.
+fn of_followed(
+    label: &PoseLabel,
+    motion: Option<Motion>,
+    mut all: Vec<Followed>,
+    bodies: &Bodies,
+    beams: usize,
+) -> (Result<PoseRecord, ModelError>, Vec<Unwatched>) {
+    let mut unwatched = Vec::new();
+    if motion.is_none() {
+        let seen: Vec<usize> = (0..all.len()).filter(|body| all[*body].is_seen).collect();
+        for body in followed(label, bodies, seen.into_iter()) {
+            let of = &mut all[body];
+            if of.markers > 0 {
+                unwatched.push(Unwatched {
+                    body,
+                    subject: bodies.all[body].subject.clone(),
+                    frames: of.frames,
+                    markers: of.markers,
+                    median: std::mem::take(&mut of.jumps).median(),
+                });
+            }
+        }
+    }
+    let mean = |subject: &str| all[bodies.position(subject)?].mean.finish();
+    let readings = Readings::in_memory(beams, Vec::new());
+    let record = PoseRecord::new(label.clone(), motion, mean, Vec::new(), readings);
+    (record, unwatched)
+}
+
 /// The markers of bodies over a stretch whose frames were discarded.
-pub(super) fn watch(
+fn watch(
     source: &Source,
     stretch: usize,
     mut unwatched: Vec<Unwatched>,
+    sieve: &Sieve,
 ) -> Result<Vec<Watched>, IoError> {
     let bodies: Vec<usize> = unwatched.iter().map(|u| u.body).collect();
     let begun = unwatched.iter().map(|u| Watching::new(u.frames, u.markers));
@@ -225,7 +277,11 @@ pub(super) fn watch(
     let mut is_first = true;
     while is_first || unwatched.iter().any(|u| !u.median.is_known()) {
         let mut jumping = vec![Jumping::default(); bodies.len()];
+        let mut sieve = sieve.clone();
         source.frames(stretch, &bodies, |body, frame| {
+            if !sieve.passes(body, &frame) {
+                return;
+            }
             let place = bodies.iter().position(|b| *b == body);
             let place = place.expect("only these were asked for");
             if is_first {
@@ -246,4 +302,65 @@ pub(super) fn watch(
     Ok(all
         .map(|(watching, u)| watching.finish(u.subject, u.median.value()))
         .collect())
+}
+
+impl Surveyed {
+    /// Averages the stretch again, without the frames in which a body was lost.
+    fn again(&mut self, source: &Source, stretch: usize, sieve: &Sieve) -> Result<(), IoError> {
+        let bodies = &source.bodies;
+        let of: Vec<usize> = (0..bodies.all.len()).collect();
+        let rig = bodies
+            .position(RIG_SUBJECT)
+            .filter(|_| self.label.kind == PoseKind::Flight);
+        let (mut all, mut passing) = (vec![Followed::default(); of.len()], sieve.clone());
+        source.frames(stretch, &of, |body, frame| {
+            if passing.passes(body, &frame) {
+                all[body].add(&frame, rig == Some(body));
+            }
+        })?;
+        let motion = self.record.as_ref().ok().and_then(|record| record.motion.clone());
+        let motion = motion.map(|motion| Motion {
+            frames: rig.map_or_else(Vec::new, |rig| std::mem::take(&mut all[rig].path)),
+            ..motion
+        });
+        let beams = source.scanner.scan.beams();
+        (self.record, self.unwatched) = of_followed(&self.label, motion, all, bodies, beams);
+        Ok(())
+    }
+
+    /// The statistics of the readings once more, if the label's number of scans was wrong.
+    fn counted(&mut self, source: &Source, stretch: usize) -> Result<(), Unreadable> {
+        if self.is_miscounted {
+            let mut gathered = Gathered::new(source.scanner.scan.beams(), source.stretches[stretch].scans);
+            for scan in source.scans(stretch) {
+                gathered.add(&scan?);
+            }
+            self.statistics = gathered.finish();
+        }
+        Ok(())
+    }
+
+    /// The complete record of the stretch, whose readings stay in the recording.
+    pub(super) fn complete(
+        mut self,
+        source: &Arc<Source>,
+        stretch: usize,
+        sieve: &Sieve,
+    ) -> Result<Result<PoseRecord, ModelError>, IoError> {
+        if !sieve.is_empty() {
+            self.again(source, stretch, sieve)?;
+        }
+        self.counted(source, stretch)
+            .map_err(|_| source.place.changed(0))?;
+        let mut record = match self.record {
+            Ok(record) => record,
+            Err(error) => return Ok(Err(error)),
+        };
+        if !self.unwatched.is_empty() {
+            record.watched = watch(source, stretch, self.unwatched, sieve)?;
+        }
+        let recording: Arc<dyn ScanSource> = Arc::<Source>::clone(source);
+        record.readings = Readings::recorded(recording, stretch, record.label.scans, self.statistics);
+        Ok(Ok(record))
+    }
 }

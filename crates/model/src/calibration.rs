@@ -70,6 +70,9 @@ pub struct BeamEstimate {
     /// d, in meters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distance_m: Option<f64>,
+    /// Standard deviation of d under all assumed errors, in meters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distance_sd_m: Option<f64>,
     /// Covariance of (θ_a, φ) under all assumed errors, in square radians.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance_rad2: Option<[[f64; 2]; 2]>,
@@ -153,6 +156,7 @@ impl BeamEstimate {
             azimuth_rad: None,
             elevation_rad: None,
             distance_m: None,
+            distance_sd_m: None,
             covariance_rad2: None,
             noise_covariance_rad2: None,
             null_direction: None,

@@ -87,6 +87,8 @@ pub struct Dataset {
     pub poses: Vec<PoseRecord>,
     /// SHA-256 of the recording it was read from, in hexadecimal; `None` for a dataset made in memory.
     pub id: Option<String>,
+    /// What was unusual in the recording, and how it was dealt with: a sentence each, for the warnings of a calibration.
+    pub warnings: Vec<String>,
 }
 
 impl Stretch {
@@ -123,6 +125,7 @@ impl Stretch {
         Motion {
             start_s: self.start_s,
             scan_period_s: self.scan_period_s,
+            scan_starts_s: Vec::new(),
             frames: frames.filter_map(|f| Some((f.time_s, f.pose?))).collect(),
         }
     }

@@ -3,6 +3,10 @@
 use crate::frame::{self, Pose};
 use nalgebra::Translation3;
 
+/// Longest time from the nearest frame at which a pose is interpolated or extrapolated, in seconds: farther from it, the
+/// pose would be a guess.
+pub const LONGEST_GAP_S: f64 = 0.5;
+
 /// The rig as tracked during a stretch of scans in which it moved.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {
@@ -10,30 +14,46 @@ pub struct Motion {
     pub start_s: f64,
     /// Time from the start of one scan to the start of the next, in seconds.
     pub scan_period_s: f64,
+    /// Time at which each scan began, in seconds since the recording began; empty if they are evenly spaced.
+    pub scan_starts_s: Vec<f64>,
     /// Times of the frames in which the rig was solved, in seconds since the recording began, ascending, with
     /// `room_from_rig` in each.
     pub frames: Vec<(f64, Pose)>,
 }
 
 impl Motion {
-    /// Time at which a beam of a scan is read, in seconds since the recording began: start + k·T + i·beam time.
+    /// Time at which a beam of a scan is read, in seconds since the recording began: the scan's start, or start + k·T if
+    /// scans are evenly spaced, + i·beam time.
     ///
     /// ```
     /// use catoptric_model::Motion;
-    /// let motion = Motion { start_s: 2.0, scan_period_s: 0.025, frames: Vec::new() };
+    /// let motion = Motion { start_s: 2.0, scan_period_s: 0.025, scan_starts_s: Vec::new(), frames: Vec::new() };
     /// assert!((motion.time_s(4, 72, 0.025 / 1440.0) - 2.10125).abs() < 1e-15 * 4.0);
     /// ```
     pub fn time_s(&self, scan: usize, beam: usize, beam_time_s: f64) -> f64 {
-        self.start_s + (scan as f64 * self.scan_period_s + beam as f64 * beam_time_s)
+        match self.scan_starts_s.get(scan) {
+            Some(start) => start + beam as f64 * beam_time_s,
+            None => self.start_s + (scan as f64 * self.scan_period_s + beam as f64 * beam_time_s),
+        }
     }
 
-    /// `room_from_rig` at a given time; `None` if the rig was never solved.
+    /// Time from a given time to the nearest frame, in seconds; infinite without any.
+    pub fn gap_s(&self, time_s: f64) -> f64 {
+        let after = self.frames.partition_point(|(t, _)| *t <= time_s);
+        let near = self.frames[after.saturating_sub(1)..self.frames.len().min(after + 1)].iter();
+        near.fold(f64::INFINITY, |gap, (t, _)| gap.min((time_s - t).abs()))
+    }
+
+    /// `room_from_rig` at a given time; `None` if the rig was never solved, or not within [`LONGEST_GAP_S`].
     ///
     /// Between two frames the position is linear in time and the attitude turns at a constant rate along the shorter
     /// arc. Before the first frame and after the last, the motion between the two nearest frames is extrapolated: a
-    /// scan ends up to one frame after the last frame of its stretch. A single frame holds for all times.
+    /// scan ends up to one frame after the last frame of its stretch. A single frame holds for all times near it.
     pub fn room_from_rig(&self, time_s: f64) -> Option<Pose> {
         let (last, before) = self.frames.split_last()?;
+        if self.gap_s(time_s) > LONGEST_GAP_S {
+            return None;
+        }
         if before.is_empty() {
             return Some(last.1);
         }
@@ -70,6 +90,7 @@ mod tests {
         Motion {
             start_s: 0.0,
             scan_period_s: 0.025,
+            scan_starts_s: Vec::new(),
             frames: times.iter().map(|t| (*t, truth(*t))).collect(),
         }
     }
@@ -87,8 +108,9 @@ mod tests {
     }
 
     #[test]
-    fn one_frame_holds_for_all_times_and_no_frame_gives_no_pose() {
-        assert_eq!(motion(&[0.01]).room_from_rig(7.0), Some(truth(0.01)));
+    fn one_frame_holds_for_a_while_and_no_frame_gives_no_pose() {
+        assert_eq!(motion(&[0.01]).room_from_rig(0.4), Some(truth(0.01)));
+        assert_eq!(motion(&[0.01]).room_from_rig(7.0), None);
         assert_eq!(motion(&[]).room_from_rig(0.0), None);
     }
 }

@@ -185,6 +185,10 @@ fn honesty(score: &Score) -> String {
                 let times = number(score.nees_mean.sqrt(), 1);
                 format!("smaller than the actual errors, which are {times} times as large")
             }
+            Some(Honesty::Doubtful) => {
+                let times = number(score.nees_mean.sqrt(), 1);
+                format!("perhaps smaller than the actual errors, which are {times} times as large")
+            }
             Some(Honesty::UnderConfident) => "larger than the actual errors".to_owned(),
             Some(Honesty::Honest) | None => "consistent with the actual errors".to_owned(),
         };

@@ -37,6 +37,9 @@ pub(super) fn scores(results: &[(Calibration, Score)]) -> String {
     row("– solved", &|s| s.beams.solved.to_string());
     row("– abstained, with a reason", &|s| s.beams.abstained.to_string());
     row("– missed", &|s| count(s.beams.missed));
+    row("Determined by their boards: solved / all", &|s| {
+        format!("{} / {}", count(s.knowable_solved), count(s.knowable))
+    });
     row("False: solved but not deflected", &|s| count(s.beams.wrong));
     row("Per-axis error (°)", &|s| number(s.per_axis_rms_deg, 4));
     row("– bound, each element separately (°)", &|s| {
@@ -65,6 +68,18 @@ pub(super) fn scores(results: &[(Calibration, Score)]) -> String {
             number(s.distance_mm.rms, 2),
             number(s.distance_mm.max, 2)
         )
+    });
+    row("– in units of its standard deviation, mean square", &|s| {
+        number(s.distance_nees, 2)
+    });
+    row("Mounting: attitude (°) / position (mm)", &|s| {
+        s.mounting.map_or_else(
+            || "–".to_owned(),
+            |m| format!("{} / {}", number(m.attitude_deg, 4), number(m.position_mm, 2)),
+        )
+    });
+    row("– normalized squared error", &|s| {
+        s.mounting.map_or_else(|| "–".to_owned(), |m| number(m.nees, 2))
     });
     row("Point 1 / 4 / 10 m behind the mirror (mm)", &|s| {
         points(&s.point_mm)

@@ -1,8 +1,8 @@
 //! The verdict on each calibration: a badge and the findings, which calibrations with the same result share.
 
-use super::page::{escape, number};
+use super::page::{escape, number, table};
 use super::prose::findings;
-use catoptric_assess::score::{Score, Verdict};
+use catoptric_assess::score::{Outcome, Score, Verdict};
 use catoptric_model::{Calibration, ScanGeometry, beam};
 use std::collections::BTreeMap;
 
@@ -28,14 +28,53 @@ pub(super) fn verdicts(scan: &ScanGeometry, results: &[(Calibration, Score)]) ->
                 &format!("<p>Method “{method}” gives the same result (largest difference {size}°).</p>\n");
             continue;
         }
+        let gates = gates(score);
         let class = score.verdict.word();
         let badge = class.to_uppercase();
         html += &format!(
-            "<section class=\"verdict {class}\">\n<h3><span class=\"badge\">{badge}</span> – method “{method}”</h3>\n{text}</section>\n"
+            "<section class=\"verdict {class}\">\n<h3><span class=\"badge\">{badge}</span> – method “{method}”</h3>\n{text}{gates}</section>\n"
         );
         above = Some((calibration, score.verdict, text));
     }
     html
+}
+
+/// The gates of a score: what was found, what is allowed, and how often an honest calibration does not meet it.
+fn gates(score: &Score) -> String {
+    let rows: Vec<Vec<String>> = score
+        .gates
+        .iter()
+        .map(|gate| {
+            let allowed = match (gate.at_most, gate.at_least) {
+                (Some(most), _) => format!("at most {}", number(most, 2)),
+                (None, Some(least)) => format!("at least {}", number(least, 2)),
+                (None, None) => "–".to_owned(),
+            };
+            let rate = gate.false_alarm_rate;
+            vec![
+                gate.name.clone(),
+                outcome(gate.outcome).to_owned(),
+                number(gate.found, 2),
+                allowed,
+                rate.map_or_else(|| "–".to_owned(), |r| format!("{} %", number(100.0 * r, 1))),
+            ]
+        })
+        .collect();
+    let headings = ["Gate", "Outcome", "Found", "Allowed", "False alarms"];
+    format!(
+        "<details><summary>What decides the verdict</summary>\n{}</details>\n",
+        table(&headings, &rows)
+    )
+}
+
+fn outcome(outcome: Outcome) -> &'static str {
+    match outcome {
+        Outcome::Pass => "met",
+        Outcome::Fail => "not met",
+        Outcome::NotJudged => "not judged",
+        Outcome::NotTested => "not tested",
+        Outcome::Invalid => "invalid",
+    }
 }
 
 /// Largest angle between the directions that two calibrations give an element, in degrees; `None` unless both give

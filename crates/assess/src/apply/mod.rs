@@ -175,8 +175,12 @@ impl<'a> Lift<'a> {
                 let terms = self.bias.terms(range, 1.0, self.color);
                 let corrected = range - terms.distance - terms.color;
                 let in_sensor = cloud::lift(deflection, self.scan.azimuth(beam), corrected);
+                // During a flight, the rig is nowhere known while motion capture has lost it.
+                let Some(frame_from_sensor) = self.frame_from_sensor(scan, beam) else {
+                    continue;
+                };
                 take(CloudPoint {
-                    position: self.frame_from_sensor(scan, beam) * in_sensor,
+                    position: frame_from_sensor * in_sensor,
                     beam,
                     scan,
                 })?;
@@ -185,19 +189,19 @@ impl<'a> Lift<'a> {
         Ok(())
     }
 
-    fn frame_from_sensor(&self, scan: usize, beam: usize) -> Pose {
+    fn frame_from_sensor(&self, scan: usize, beam: usize) -> Option<Pose> {
         match self.sheet.frame {
-            CloudFrame::Sensor => Pose::identity(),
-            CloudFrame::Rig => self.rig_from_sensor,
-            CloudFrame::Room => self.room_from_rig(scan, beam) * self.rig_from_sensor,
+            CloudFrame::Sensor => Some(Pose::identity()),
+            CloudFrame::Rig => Some(self.rig_from_sensor),
+            CloudFrame::Room => Some(self.room_from_rig(scan, beam)? * self.rig_from_sensor),
         }
     }
 
-    fn room_from_rig(&self, scan: usize, beam: usize) -> Pose {
-        let motion = self.record.motion.as_ref();
-        motion
-            .and_then(|m| m.room_from_rig(m.time_s(scan, beam, self.scan.beam_time_s())))
-            .unwrap_or(self.record.room_from_rig)
+    fn room_from_rig(&self, scan: usize, beam: usize) -> Option<Pose> {
+        match &self.record.motion {
+            Some(motion) => motion.room_from_rig(motion.time_s(scan, beam, self.scan.beam_time_s())),
+            None => Some(self.record.room_from_rig),
+        }
     }
 }
 

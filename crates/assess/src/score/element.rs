@@ -1,8 +1,9 @@
 //! The errors of each solved element, with its stated covariance and its bounds.
 
 use super::bound::Knowable;
+use super::distance;
 use super::statistics::mahalanobis_squared;
-use catoptric_model::{BeamEstimate, Calibration, Deflection};
+use catoptric_model::{BeamEstimate, Calibration, Deflection, Session};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
 use nalgebra::{Matrix2, Vector2};
@@ -22,6 +23,8 @@ pub struct ElementError {
     pub estimate: Deflection,
     /// Whether the calibration has d.
     pub has_distance: bool,
+    /// Standard deviation of d, in meters: as stated, or as its facet's plane or the session has it.
+    pub distance_sd: f64,
     /// cos φ·δθ.
     pub across: f64,
     /// δφ.
@@ -37,9 +40,15 @@ pub struct ElementError {
 }
 
 /// Computes the errors of every solved element that is deflected once in truth.
-pub(super) fn compare(calibration: &Calibration, truth: &Truth, knowable: &Knowable) -> Vec<ElementError> {
+pub(super) fn compare(
+    session: &Session,
+    calibration: &Calibration,
+    truth: &Truth,
+    knowable: &Knowable,
+) -> Vec<ElementError> {
     let mut elements = Vec::new();
-    for true_beam in &truth.beams {
+    let beams = session.scanner.scan.beams();
+    for true_beam in truth.beams.iter().filter(|b| b.beam < beams) {
         let (Some(actual), Some(estimate)) = (true_beam.deflection(), calibration.beam(true_beam.beam))
         else {
             continue;
@@ -66,6 +75,7 @@ pub(super) fn compare(calibration: &Calibration, truth: &Truth, knowable: &Knowa
             truth: actual,
             estimate: found,
             has_distance: estimate.distance_m.is_some(),
+            distance_sd: distance::sd(session, calibration, estimate),
             across: cos * error.x,
             up: error.y,
             sigma: covariance.map(|c| [cos * c[(0, 0)].sqrt(), c[(1, 1)].sqrt()]),

@@ -19,19 +19,26 @@
 //! is outside its stated 99.9 % ellipse (a method may know more than the boards, from a facet or the drawing). Figures
 //! that do not exist are NaN here and `null` in JSON, with the reason in `nulls`.
 
+mod allowed;
 mod bound;
 pub mod counts;
 mod directions;
+mod distance;
 mod element;
 mod figures;
+pub mod gate;
 mod honesty;
+mod judge;
+mod mistakes;
+mod mounting;
 mod nulls;
 pub mod residual;
 mod statistics;
 pub mod words;
 
+use crate::validate::{Severity, validate_for};
 use catoptric_model::frame::Pose;
-use catoptric_model::{Calibration, Dataset, PoseRecord, Track, TrackedFrame, Unreadable};
+use catoptric_model::{Calibration, Dataset, PoseRecord, Track, TrackedFrame, Unreadable, beam};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
 use counts::{apart, count, open, statuses};
@@ -40,16 +47,18 @@ use element::compare;
 use statistics::{largest, mean, rms};
 use std::collections::BTreeMap;
 
-#[cfg(feature = "testing")]
 pub(crate) use element::wrap;
 #[cfg(feature = "testing")]
 pub(crate) use statistics::mahalanobis_squared;
 
-pub use bound::true_directions;
 pub use bound::{Knowable, knowable};
+pub use bound::{bounds, true_directions};
 pub use element::ElementError;
 pub use figures::{ApartScore, BeamCounts, DistanceError, OpenCounts, PointError, Score, Spread, Verdict};
+pub use gate::{Gate, MIN_SOLVED, Outcome};
 pub use honesty::Honesty;
+pub use mistakes::Mistake;
+pub use mounting::Mounting;
 pub use residual::SurfaceResidual;
 pub use statistics::percentile;
 
@@ -62,19 +71,13 @@ pub const CHI_SQUARED_95: f64 = 5.991_464_547_107_979;
 /// 99.9 % quantile of the same: −2·ln 0.001.
 pub const CHI_SQUARED_999: f64 = 13.815_510_557_964_274;
 
-/// Mean NEES above which a covariance is dishonest beyond statistical fluctuation.
-///
-/// Elements share errors, so the mean over one run scatters more than over independent draws: at worst all elements
-/// have the same error, and the mean is χ² with two degrees of freedom divided by two, which exceeds 6 with probability
-/// e⁻⁶ = 0.25 %.
-pub const DISHONEST_NEES: f64 = 6.0;
-
 /// Distances behind the mirror at which point errors are computed, in meters.
 pub const POINT_RANGES_M: [f64; 3] = [1.0, 4.0, 10.0];
 
 /// Scores a calibration against the truth, `&truth`; without one, `None`, against boards and walls only.
 ///
-/// A calibration that says that it was made from another dataset, or of another scanner, fails.
+/// It is validated first. The verdict follows from [`Score::gates`]; [`Score::with_min_solved`], [`Score::with_limit`] and
+/// [`Score::with_requirement`] change them.
 ///
 /// # Errors
 /// [`Unreadable`] if the recording of the dataset can no longer be read.
@@ -97,12 +100,22 @@ pub fn score_by(
     calibration: &Calibration,
     reference: Option<(&Truth, &Knowable)>,
 ) -> Result<Score, Unreadable> {
+    let problems = validate_for(calibration, &dataset.session);
+    let invalid = problems.iter().any(|p| p.severity == Severity::Error);
+    // An entry that is not valid has no figures.
+    let nothing = Calibration {
+        beams: Vec::new(),
+        ..calibration.clone()
+    };
+    let given = calibration;
+    let calibration = if invalid { &nothing } else { calibration };
     let truth = reference.map(|(truth, _)| truth);
     let knowable = reference.map(|(_, knowable)| knowable);
-    let boards_mm = residual::boards(dataset, calibration)?;
-    let walls_mm = residual::walls(dataset, calibration)?;
+    let blind = truth.is_none();
+    let boards = residual::judged_boards(dataset, calibration, blind)?;
+    let walls = residual::judged_walls(dataset, calibration, blind)?;
     let elements = reference.map_or_else(Vec::new, |(truth, knowable)| {
-        compare(calibration, truth, knowable)
+        compare(&dataset.session, calibration, truth, knowable)
     });
     let scored: Vec<&ElementError> = elements
         .iter()
@@ -110,34 +123,54 @@ pub fn score_by(
         .collect();
 
     let scan = &dataset.session.scanner.scan;
+    let rig = tracked_rig(dataset);
     let in_sensor = Directions::of(scan, &scored, &Pose::identity(), &Pose::identity());
-    let in_room = truth
+    let placed = truth
         .zip(calibration.rig_from_sensor.as_ref())
-        .zip(tracked_rig(dataset))
+        .zip(rig)
+        .filter(|_| !invalid)
         .map(|((truth, mount), room_from_rig)| {
             let believed = room_from_rig * mount.pose();
             let actual = Pose::from(&truth.room_from_rig) * Pose::from(&truth.rig_from_sensor);
-            Directions::of(scan, &scored, &believed, &actual)
-        })
-        .unwrap_or_else(|| Directions::of(scan, &[], &Pose::identity(), &Pose::identity()));
+            (mount, believed, actual)
+        });
+    let in_room = match &placed {
+        Some((_, believed, actual)) => Directions::of(scan, &scored, believed, actual),
+        None => Directions::of(scan, &[], &Pose::identity(), &Pose::identity()),
+    };
+    let tolerance = &dataset.session.mount_tolerance;
+    let mounting = placed
+        .as_ref()
+        .map(|(mount, believed, actual)| Mounting::of(mount, tolerance, actual, believed));
 
     let squares = |e: &&ElementError| e.across.powi(2) + e.up.powi(2);
     let mahalanobis: Vec<f64> = scored.iter().filter_map(|e| e.mahalanobis_squared).collect();
-    let distances: Vec<f64> = scored
+    let with_distance = || scored.iter().filter(|e| e.has_distance);
+    let off = |e: &ElementError| e.estimate.distance - e.truth.distance;
+    let bounded: Vec<&ElementError> = scored
         .iter()
-        .filter(|e| e.has_distance)
-        .map(|e| (e.estimate.distance - e.truth.distance) * 1e3)
+        .copied()
+        .filter(|e| e.bound.as_ref().is_some_and(bounds))
         .collect();
-    let bounded: Vec<&ElementError> = scored.iter().copied().filter(|e| e.bound.is_some()).collect();
     let bound_trace = mean(bounded.iter().filter_map(|e| e.bound).map(|b| b.trace()));
+    let alone: Vec<f64> = scored
+        .iter()
+        .filter_map(|e| e.alone_bound.filter(bounds))
+        .map(|b| b.trace())
+        .collect();
 
     let mut score = Score {
         schema_version: SCHEMA_VERSION,
         method: calibration.method.clone(),
         verdict: Verdict::Blind,
+        gates: Vec::new(),
+        mistakes: Vec::new(),
         honesty: None,
         beams: count(calibration, truth),
         open: knowable.map(|k| open(calibration, &elements, &k.open)),
+        knowable: knowable.map(|k| k.well.len()),
+        knowable_solved: knowable.map(|k| elements.iter().filter(|e| k.well.contains(&e.beam)).count()),
+        stated: mahalanobis.len() as f64 / scored.len() as f64,
         statuses: statuses(dataset, calibration),
         direction_deg: in_sensor.spread_deg(),
         per_axis_rms_deg: (0.5 * mean(scored.iter().map(squares))).sqrt().to_degrees(),
@@ -147,9 +180,11 @@ pub fn score_by(
         per_axis_rms_room_deg: in_room.per_axis_deg,
         common_mode_room_deg: in_room.common_mode_deg,
         distance_mm: DistanceError {
-            rms: rms(distances.iter().copied()),
-            max: largest(distances.iter().map(|d| d.abs())),
+            rms: rms(with_distance().map(|e| 1e3 * off(e))),
+            max: largest(with_distance().map(|e| 1e3 * off(e).abs())),
         },
+        distance_nees: mean(with_distance().map(|e| (off(e) / e.distance_sd).powi(2))),
+        mounting,
         point_mm: in_sensor.point_mm,
         point_room_mm: in_room.point_mm,
         nees_mean: mean(mahalanobis.iter().map(|m| 0.5 * m)),
@@ -159,21 +194,61 @@ pub fn score_by(
                 .map(|&m| f64::from(u8::from(m <= CHI_SQUARED_95))),
         ),
         crlb_per_axis_deg: (0.5 * bound_trace).sqrt().to_degrees(),
-        alone_crlb_per_axis_deg: (0.5 * mean(scored.iter().filter_map(|e| e.alone_bound).map(|b| b.trace())))
-            .sqrt()
-            .to_degrees(),
+        crlb_elements: bounded.len(),
+        alone_crlb_per_axis_deg: (0.5 * mean(alone.iter().copied())).sqrt().to_degrees(),
+        alone_crlb_elements: alone.len(),
         efficiency: bound_trace / mean(bounded.iter().map(squares)),
         split: apart(calibration, truth, &elements, BeamClass::Split),
         multi_bounce: apart(calibration, truth, &elements, BeamClass::MultiBounce),
-        boards_mm,
-        walls_mm,
+        boards_mm: boards.residual,
+        walls_mm: walls.residual,
+        boards_normalized: boards.normalized,
+        walls_normalized: walls.normalized,
         nulls: BTreeMap::new(),
         warnings: Vec::new(),
         elements: Vec::new(),
+        remarks: Vec::new(),
+        has_truth: truth.is_some(),
+        blind_stated: calibration
+            .beams
+            .iter()
+            .filter(|b| element::solved(b).is_some() && b.covariance_rad2.is_some())
+            .count(),
     };
     score.elements = elements;
-    words::judge(&mut score, dataset, calibration, truth.is_some());
-    Ok(score)
+    if invalid {
+        score.gates = vec![judge::valid(&problems)];
+        score.nulls = nulls::nulls(&score, calibration, truth.is_some());
+        if let Some((truth, knowable)) = reference {
+            score.mistakes = mistakes_of_invalid(&score, dataset, given, truth, knowable);
+            score.remarks = score.mistakes.iter().map(ToString::to_string).collect();
+        }
+        return Ok(score.settled());
+    }
+    Ok(words::judge(score, dataset, calibration, truth, rig.as_ref()))
+}
+
+/// The mistakes that would explain what makes a calibration invalid, such as angles or distances in another unit.
+fn mistakes_of_invalid(
+    score: &Score,
+    dataset: &Dataset,
+    calibration: &Calibration,
+    truth: &Truth,
+    knowable: &Knowable,
+) -> Vec<Mistake> {
+    let mut with_errors = score.clone();
+    with_errors.elements = compare(&dataset.session, calibration, truth, knowable);
+    let off: Vec<[f64; 2]> = with_errors
+        .scored()
+        .map(|e| {
+            let base = dataset.session.scanner.scan.azimuth(e.beam);
+            let angle = beam::angle_between(&e.estimate.exit_direction(base), &e.truth.exit_direction(base));
+            [angle, e.estimate.distance - e.truth.distance]
+        })
+        .collect();
+    with_errors.per_axis_rms_deg = (rms(off.iter().map(|o| o[0])) / std::f64::consts::SQRT_2).to_degrees();
+    with_errors.distance_mm.rms = rms(off.iter().map(|o| 1e3 * o[1]));
+    mistakes::recognize(&with_errors, dataset, calibration, truth, None)
 }
 
 /// Returns the tracked pose of the rig: the mean over the stretches, during which it did not move.

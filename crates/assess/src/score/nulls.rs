@@ -1,6 +1,7 @@
 //! Reasons why figures of a score are null.
 
 use super::Score;
+use super::gate::ENOUGH;
 use catoptric_model::Calibration;
 use std::collections::BTreeMap;
 
@@ -64,6 +65,12 @@ pub(super) fn nulls(
             score.distance_mm.rms,
             because("no scored element has a distance_m"),
         ),
+        (
+            "distance_nees",
+            score.distance_nees,
+            because("no scored element has a distance_m"),
+        ),
+        ("stated", score.stated, because(none_scored)),
         ("point_mm", score.point_mm.at_1m, because(none_scored)),
         ("point_room_mm", score.point_room_mm.at_1m, because(room)),
         ("nees_mean", score.nees_mean, because(covariance)),
@@ -102,11 +109,39 @@ pub(super) fn nulls(
         .map(|(key, _, reason)| (key, reason))
         .collect();
     if score.open.is_none() {
-        nulls.insert("open", "there is no truth");
+        for key in ["open", "knowable", "knowable_solved"] {
+            nulls.insert(key, "there is no truth");
+        }
+    }
+    if score.mounting.is_none() {
+        nulls.insert("mounting", if has_truth { room } else { "there is no truth" });
+    }
+    for (key, value, reads) in [
+        (
+            "boards_normalized",
+            score.boards_normalized,
+            score.boards_mm.readings,
+        ),
+        (
+            "walls_normalized",
+            score.walls_normalized,
+            score.walls_mm.readings,
+        ),
+    ] {
+        if !value.is_finite() {
+            let reason = match (has_truth, reads) {
+                (true, _) => "there is a truth to judge by",
+                (false, 0) => "no solved element reads one",
+                (false, _) => "no surface has a variance",
+            };
+            nulls.insert(key, reason);
+        }
     }
     if score.honesty.is_none() {
         let reason = if score.nees_mean.is_nan() {
             "no scored element has a covariance"
+        } else if score.stated < ENOUGH {
+            "too few scored elements have a covariance"
         } else {
             "the errors are only numerical"
         };

@@ -1,5 +1,7 @@
 //! Residuals that need no truth: distances of lifted points from surveyed boards and walls.
 
+use super::allowed::Allowance;
+use super::statistics::percentile;
 use catoptric_calib::observations::{self, BoardInSensor};
 use catoptric_calib::tracking;
 use catoptric_model::{
@@ -25,11 +27,23 @@ pub struct SurfaceResidual {
     pub rms: f64,
 }
 
+/// Standard deviation of a mean of readings that are whole millimeters, in millimeters.
+const ROUNDING_MM: f64 = 0.3;
+
 /// The surface that a beam is expected to hit.
 struct Surface {
     predicted: f64,
     cos_incidence: f64,
     color: String,
+    /// Variance of the range of many readings, in square meters; `None` if it is not asked for.
+    allowed: Option<f64>,
+}
+
+/// Residuals, and their size in units of what is allowed.
+pub(super) struct Judged {
+    pub(super) residual: SurfaceResidual,
+    /// Median over elements and stretches of the squared mean residual over its variance; NaN if it was not asked for.
+    pub(super) normalized: f64,
 }
 
 /// One element's residuals over one stretch.
@@ -51,16 +65,26 @@ struct Visit {
 /// # Errors
 /// [`Unreadable`] if the recording can no longer be read.
 pub fn boards(dataset: &Dataset, calibration: &Calibration) -> Result<SurfaceResidual, Unreadable> {
+    Ok(judged_boards(dataset, calibration, false)?.residual)
+}
+
+pub(super) fn judged_boards(
+    dataset: &Dataset,
+    calibration: &Calibration,
+    judge: bool,
+) -> Result<Judged, Unreadable> {
     // A label on the wrong marker puts a board where it was not.
     let (dataset, _) = tracking::put_right(dataset);
     let dataset = dataset.as_ref();
     let rig_from_sensor = mount(dataset, calibration);
     let cone = observations::cone_half_angle(&dataset.session);
+    let allowance = judge.then(|| Allowance::of(dataset, calibration));
+    let allowance = allowance.as_ref();
     collect(dataset, calibration, PoseKind::Facet, |pose| {
         let board = BoardInSensor::of(pose, &dataset.session, &rig_from_sensor);
-        move |beam: usize, deflection: &Deflection| {
+        move |estimate: &BeamEstimate, deflection: &Deflection| {
             let board = board.as_ref()?;
-            let azimuth = observations::azimuth(&dataset.session, beam);
+            let azimuth = observations::azimuth(&dataset.session, estimate.beam);
             let exit = deflection.exit_direction(azimuth);
             let hit = board.hit(&deflection.deflection_point(azimuth), &exit)?;
             let predicted = deflection.distance + hit.distance;
@@ -68,6 +92,7 @@ pub fn boards(dataset: &Dataset, calibration: &Calibration) -> Result<SurfaceRes
                 predicted,
                 cos_incidence: board.plane.cos_incidence(&exit),
                 color: board.color.clone(),
+                allowed: allowance.and_then(|a| a.variance(estimate, deflection, &board.view(0.0, 1))),
             })
         }
     })
@@ -78,20 +103,34 @@ pub fn boards(dataset: &Dataset, calibration: &Calibration) -> Result<SurfaceRes
 /// # Errors
 /// As [`boards`].
 pub fn walls(dataset: &Dataset, calibration: &Calibration) -> Result<SurfaceResidual, Unreadable> {
+    Ok(judged_walls(dataset, calibration, false)?.residual)
+}
+
+pub(super) fn judged_walls(
+    dataset: &Dataset,
+    calibration: &Calibration,
+    judge: bool,
+) -> Result<Judged, Unreadable> {
+    let allowance = judge.then(|| Allowance::of(dataset, calibration));
+    let allowance = allowance.as_ref();
     let rig_from_sensor = mount(dataset, calibration);
     collect(dataset, calibration, PoseKind::Room, |pose| {
         let room_from_sensor = pose.room_from_rig * rig_from_sensor;
-        move |beam: usize, deflection: &Deflection| {
+        move |estimate: &BeamEstimate, deflection: &Deflection| {
             let room = dataset.session.room.as_ref()?;
-            let azimuth = observations::azimuth(&dataset.session, beam);
+            let azimuth = observations::azimuth(&dataset.session, estimate.beam);
             let origin = room_from_sensor * deflection.deflection_point(azimuth);
-            let exit = deflection.exit_direction(azimuth);
-            let exit = Unit::new_unchecked(room_from_sensor * exit.into_inner());
+            let in_sensor = deflection.exit_direction(azimuth);
+            let exit = Unit::new_unchecked(room_from_sensor * in_sensor.into_inner());
             let (s, wall) = room.cast(&origin, &exit)?;
             Some(Surface {
                 predicted: deflection.distance + s,
                 cos_incidence: wall.cos_incidence(&exit),
                 color: room.color.clone(),
+                allowed: allowance.and_then(|a| {
+                    let view = a.of_wall(&wall, &room_from_sensor, &room.color);
+                    a.variance(estimate, deflection, &view)
+                }),
             })
         }
     })
@@ -119,9 +158,9 @@ fn collect<E>(
     calibration: &Calibration,
     kind: PoseKind,
     expect: impl Fn(&PoseRecord) -> E + Sync,
-) -> Result<SurfaceResidual, Unreadable>
+) -> Result<Judged, Unreadable>
 where
-    E: Fn(usize, &Deflection) -> Option<Surface>,
+    E: Fn(&BeamEstimate, &Deflection) -> Option<Surface>,
 {
     let bias = bias(dataset, calibration);
     let of_stretch = |record: &&PoseRecord| {
@@ -130,7 +169,7 @@ where
             Some(Visit {
                 beam: estimate.beam,
                 stretch: record.label.pose,
-                on: expect(estimate.beam, &estimate.deflection()?)?,
+                on: expect(estimate, &estimate.deflection()?)?,
                 readings: 0,
                 sum: 0.0,
                 sum_of_squares: 0.0,
@@ -152,7 +191,16 @@ where
     };
     let stretches: Vec<&PoseRecord> = dataset.of_kind(kind).collect();
     let visits: Vec<Vec<Visit>> = stretches.par_iter().map(of_stretch).collect::<Result<_, _>>()?;
-    Ok(summarize(&visits.into_iter().flatten().collect::<Vec<_>>()))
+    let visits: Vec<Visit> = visits.into_iter().flatten().collect();
+    let noise_sd_mm = dataset.session.believed.range_noise_sd_mm;
+    let squares: Vec<f64> = visits
+        .iter()
+        .filter_map(|v| v.normalized_square(noise_sd_mm))
+        .collect();
+    Ok(Judged {
+        residual: summarize(&visits),
+        normalized: percentile(&squares, 0.5),
+    })
 }
 
 impl Visit {
@@ -170,6 +218,16 @@ impl Visit {
 
     fn mean(&self) -> f64 {
         self.sum / self.readings as f64
+    }
+
+    /// Squared mean residual in units of its variance, which includes the noise of a mean: as believed, or as large as
+    /// the readings scatter.
+    fn normalized_square(&self, noise_sd_mm: f64) -> Option<f64> {
+        let cos = self.on.cos_incidence;
+        let scatter = (self.sum_of_squares / self.readings as f64 - self.mean().powi(2)).max(0.0);
+        let noise = scatter.max((cos * noise_sd_mm).powi(2)) / self.readings as f64;
+        let variance = cos * cos * self.on.allowed? * 1e6 + noise + ROUNDING_MM * ROUNDING_MM;
+        Some(self.mean().powi(2) / variance)
     }
 
     fn mean_square(&self) -> f64 {

@@ -2,6 +2,7 @@
 
 use super::element::wrap;
 use super::*;
+use crate::requirement::Requirement;
 use catoptric_fixtures::{noisy, perfect, sample, turned};
 use catoptric_model::{BeamEstimate, Status};
 use nalgebra::Vector3;
@@ -209,9 +210,13 @@ fn honesty_is_reported_with_its_size() {
             .count(),
         1
     );
-    assert_eq!(
-        of(&stated(&s.truth, 1.0 / 4.0), Some(&s.truth)).verdict,
-        Verdict::Pass
+    // A mean of 4 could be one error that all share, but not the worst of some 400 elements.
+    let half = of(&stated(&s.truth, 1.0 / 4.0), Some(&s.truth));
+    assert_eq!(half.verdict, Verdict::Fail);
+    assert!(
+        half.reasons()[0].starts_with("fails: the direction of beam "),
+        "{:?}",
+        half.reasons()
     );
     for (not_judged, reason) in [
         (of(&stated(&s.truth, 1.0), None), "there is no truth"),
@@ -287,16 +292,14 @@ fn without_a_mirror_there_is_nothing_to_judge() {
     for b in &mut truth.beams {
         b.status = BeamClass::Direct;
     }
-    let nothing_solved = Calibration {
-        beams: Vec::new(),
-        ..perfect(&s.truth)
-    };
+    let mut nothing_solved = perfect(&truth);
+    nothing_solved.method = "nothing".to_owned();
     let score_of =
         |calibration: &Calibration| score(&s.dataset, calibration, Some(&truth)).expect("in memory");
     let nothing = score_of(&nothing_solved);
     assert_eq!(
         (nothing.verdict, nothing.beams.deflected),
-        (Verdict::Blind, Some(0))
+        (Verdict::NotJudged, Some(0))
     );
     assert!(nothing.warnings[0].ends_with("there is nothing to judge"));
     // A direction for a beam that no mirror deflects is false.
@@ -329,12 +332,12 @@ fn every_deflected_element_is_solved_abstained_or_missed() {
     let without =
         |b, status, reason: Option<&str>| BeamEstimate::without_angles(b, status, reason.map(str::to_owned));
     *estimate(&mut calibration, beams[0]) = without(beams[0], Status::Unobservable, Some("one tilt axis"));
-    *estimate(&mut calibration, beams[1]) = without(beams[1], Status::Unobservable, None);
+    *estimate(&mut calibration, beams[1]) = without(beams[1], Status::Direct, None);
     *estimate(&mut calibration, beams[2]) = without(beams[2], Status::Direct, None);
-    estimate(&mut calibration, beams[3]).azimuth_rad = Some(f64::NAN);
     // As the entry of another beam, this element is absent and the direct beam 540 is called solved.
     estimate(&mut calibration, beams[4]).beam = 540;
     calibration.beams.remove(540);
+    calibration.beams.retain(|b| b.beam != beams[3]);
     let score = score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory");
     let counts = score.beams;
     assert_eq!(counts.deflected, Some(beams.len()));
@@ -344,8 +347,8 @@ fn every_deflected_element_is_solved_abstained_or_missed() {
     );
     assert_eq!(counts.solved, beams.len() - 5);
     assert_eq!(score.verdict, Verdict::Fail);
-    assert_eq!(score.statuses["absent"], 1);
-    assert_eq!(score.statuses["unobservable"], 2);
+    assert_eq!(score.statuses["absent"], 2);
+    assert_eq!(score.statuses["unobservable"], 1);
     assert!(score.scored().all(|e| !beams[..5].contains(&e.beam)));
 }
 
@@ -430,7 +433,7 @@ fn json_has_the_keys_of_the_interface() {
     assert_eq!(json["open"]["elements"], 0);
     assert_eq!(
         json["nulls"].as_object().map(serde_json::Map::len),
-        Some(2),
+        Some(4),
         "{}",
         json["nulls"]
     );
@@ -442,4 +445,407 @@ fn azimuth_differences_wrap_around_the_circle() {
     assert_eq!(wrap(0.3), 0.3);
     assert!((wrap(2.0 * PI - 1e-3) + 1e-3).abs() < 1e-15);
     assert!((wrap(-2.0 * PI + 1e-3) - 1e-3).abs() < 1e-15);
+}
+
+/// The score of a calibration with noise of a milliradian, changed afterwards.
+fn falsified(change: impl FnOnce(&mut Calibration)) -> Score {
+    let s = sample();
+    let mut calibration = noisy(&s.truth, 1e-3, 3);
+    change(&mut calibration);
+    score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory")
+}
+
+/// The names of the gates that are not met.
+fn unmet(score: &Score) -> Vec<&str> {
+    let all = score
+        .gates
+        .iter()
+        .filter(|g| !matches!(g.outcome, Outcome::Pass | Outcome::NotTested));
+    all.map(|g| g.name.as_str()).collect()
+}
+
+fn solved(calibration: &mut Calibration) -> impl Iterator<Item = &mut BeamEstimate> {
+    calibration
+        .beams
+        .iter_mut()
+        .filter(|b| b.status == Status::Solved)
+}
+
+/// The only mistake that was recognized.
+fn mistake(score: &Score) -> &Mistake {
+    assert_eq!(score.mistakes.len(), 1, "{:?}", score.mistakes);
+    &score.mistakes[0]
+}
+
+#[test]
+fn wrong_distances_fail_and_are_explained() {
+    for (change, words) in [
+        ((|d| d + 0.020) as fn(f64) -> f64, "20.0 mm subtracted from all d"),
+        (|d| d - 0.020, "20.0 mm added to all d"),
+        (|d| d * 2.0, "d halved, as of a round trip"),
+        (|d| d / 2.54, "d in inches"),
+    ] {
+        let found = falsified(|c| {
+            for b in solved(c) {
+                b.distance_m = b.distance_m.map(change);
+                if words == "d in inches" {
+                    b.distance_m = b.distance_m.map(|d| d * 100.0);
+                }
+            }
+        });
+        assert_eq!(found.verdict, Verdict::Fail, "{words}");
+        assert_eq!(unmet(&found), ["distance", "worst_distance"], "{words}");
+        assert_eq!(mistake(&found).correction, words);
+        assert!(mistake(&found).would_be < 0.2 * mistake(&found).found);
+    }
+    // One wrong distance among some 450.
+    let one = falsified(|c| {
+        let b = solved(c).next().expect("some are solved");
+        b.distance_m = b.distance_m.map(|d| d + 0.010);
+    });
+    assert_eq!(unmet(&one), ["worst_distance"]);
+    // None at all, and those of one half.
+    let none = falsified(|c| solved(c).for_each(|b| b.distance_m = None));
+    assert_eq!(
+        (none.verdict, unmet(&none)),
+        (Verdict::NotJudged, vec!["distances"])
+    );
+    let half = falsified(|c| solved(c).step_by(2).for_each(|b| b.distance_m = None));
+    assert_eq!((half.verdict, unmet(&half)), (Verdict::Fail, vec!["distances"]));
+    // A stated standard deviation takes the place of the session's belief.
+    let stated = |sd| {
+        falsified(|c| {
+            for b in solved(c) {
+                b.distance_m = b.distance_m.map(|d| d + 0.020);
+                b.distance_sd_m = Some(sd);
+            }
+        })
+    };
+    assert_eq!(stated(0.015).verdict, Verdict::Pass);
+    assert_eq!(unmet(&stated(0.005)), ["distance"]);
+}
+
+#[test]
+fn a_wrong_mounting_fails_with_its_covariance_and_without() {
+    let covariance = |sd: f64| {
+        let mut c = [[0.0; 6]; 6];
+        for (i, row) in c.iter_mut().enumerate() {
+            row[i] = sd * sd;
+        }
+        Some(c)
+    };
+    let turned = |angle: f64, c: Option<[[f64; 6]; 6]>| {
+        falsified(|calibration| {
+            let mount = calibration.rig_from_sensor.as_mut().expect("it has one");
+            let off = nalgebra::UnitQuaternion::from_axis_angle(&Vector3::y_axis(), angle);
+            let data = catoptric_model::PoseData::from(&(mount.pose() * off));
+            mount.rotation_xyzw = data.rotation_xyzw;
+            mount.covariance = c;
+        })
+    };
+    assert_eq!(turned(0.0, covariance(1e-4)).verdict, Verdict::Pass);
+    for c in [covariance(1e-3), None] {
+        let found = turned(5.0_f64.to_radians(), c);
+        assert_eq!((found.verdict, unmet(&found)), (Verdict::Fail, vec!["mounting"]));
+        let mounting = found.mounting.expect("it is tracked");
+        assert!((mounting.attitude_deg - 5.0).abs() < 1e-9 && mounting.position_mm < 1e-9);
+        assert!(found.mistakes.is_empty(), "{:?}", found.mistakes);
+    }
+    let shifted = falsified(|c| c.rig_from_sensor.as_mut().expect("it has one").translation_m[0] += 0.1);
+    assert_eq!(unmet(&shifted), ["mounting"]);
+    // The usual mistakes.
+    let inverted = falsified(|c| {
+        let mount = c.rig_from_sensor.as_mut().expect("it has one");
+        let data = catoptric_model::PoseData::from(&mount.pose().inverse());
+        (mount.translation_m, mount.rotation_xyzw) = (data.translation_m, data.rotation_xyzw);
+    });
+    assert_eq!(
+        mistake(&inverted).correction,
+        "the mounting inverted (it is sensor_from_rig)"
+    );
+    let ordered = falsified(|c| {
+        let mount = c.rig_from_sensor.as_mut().expect("it has one");
+        let [x, y, z, w] = mount.rotation_xyzw;
+        mount.rotation_xyzw = [w, x, y, z];
+    });
+    assert_eq!(
+        mistake(&ordered).correction,
+        "the quaternion in the order (w, x, y, z)"
+    );
+    // Without a mounting there is nothing to test.
+    let none = falsified(|c| c.rig_from_sensor = None);
+    assert_eq!((none.verdict, none.mounting), (Verdict::Pass, None));
+}
+
+#[test]
+fn what_the_boards_determine_has_to_be_solved() {
+    let abstaining = |share: usize| {
+        falsified(|c| {
+            for b in solved(c).step_by(share) {
+                *b = BeamEstimate::without_angles(b.beam, Status::Rejected, Some("no time".to_owned()));
+            }
+        })
+    };
+    let half = abstaining(2);
+    assert_eq!((half.verdict, unmet(&half)), (Verdict::Fail, vec!["solved"]));
+    assert_eq!(half.knowable, half.beams.deflected);
+    assert_eq!(half.clone().with_min_solved(0.4).verdict, Verdict::Pass);
+    assert_eq!(unmet(&abstaining(1)), ["solved"]);
+    assert_eq!(abstaining(11).verdict, Verdict::Pass);
+    assert_eq!(abstaining(11).with_min_solved(0.95).verdict, Verdict::Fail);
+}
+
+#[test]
+fn honest_takes_a_covariance_of_nearly_all() {
+    let without =
+        |every: usize| falsified(|c| solved(c).step_by(every).for_each(|b| b.covariance_rad2 = None));
+    let none = without(1);
+    assert_eq!(
+        (none.verdict, unmet(&none)),
+        (Verdict::NotJudged, vec!["covariance"])
+    );
+    let half = without(2);
+    assert_eq!((half.verdict, half.honesty), (Verdict::Fail, None));
+    assert_eq!(half.nulls["honesty"], "too few scored elements have a covariance");
+    assert!((half.stated - 0.5).abs() < 0.01);
+    assert_eq!(without(50).honesty, Some(Honesty::Honest));
+}
+
+#[test]
+fn figures_can_be_required() {
+    let found = falsified(|_| {});
+    let with = |text: &str| {
+        let requirement = Requirement::parse(text).expect("it is one");
+        found.clone().with_requirement(&requirement)
+    };
+    assert_eq!(
+        with("per_axis_rms_deg<=0.1").expect("a figure").verdict,
+        Verdict::Pass
+    );
+    let missed = with("beams.solved>=1000").expect("a figure");
+    assert_eq!(missed.verdict, Verdict::Fail);
+    assert!(
+        missed.warnings[0].starts_with("fails: beams.solved is "),
+        "{:?}",
+        missed.warnings
+    );
+    assert!(missed.warnings[0].ends_with(", required beams.solved>=1000"));
+    let error = with("per_axis_rms>=1").expect_err("no figure");
+    assert_eq!(error.help().as_deref(), Some("did you mean per_axis_rms_deg?"));
+}
+
+#[test]
+fn the_usual_mistakes_are_recognized() {
+    use catoptric_model::{Deflection, beam, mirror};
+    let s = sample();
+    let scan = &s.dataset.session.scanner.scan;
+    let rig_from_sensor = Pose::from(&s.truth.rig_from_sensor);
+    let room_from_sensor = Pose::from(&s.truth.room_from_rig) * rig_from_sensor;
+    let exit = |base: f64, [azimuth, elevation]: [f64; 2]| beam::spherical(base + azimuth, elevation);
+    let angles = |base: f64, v: Vector3<f64>| {
+        let d = Deflection::from_exit(base, &nalgebra::Unit::new_normalize(v), 0.0);
+        [d.azimuth, d.elevation]
+    };
+    type Change<'c> = (&'c str, &'c dyn Fn(f64, [f64; 2]) -> [f64; 2]);
+    let changes: [Change<'_>; 13] = [
+        ("φ negated", &|_, [a, e]| [a, -e]),
+        ("θ_a negated", &|_, [a, e]| [-a, e]),
+        ("θ_a and φ exchanged", &|_, [a, e]| [e, a.clamp(-1.5, 1.5)]),
+        (
+            "the azimuth read from the sensor's x axis (θ_a is measured from the undeflected beam)",
+            &|base, [a, e]| [wrap(base + a), e],
+        ),
+        ("φ read from the zenith", &|_, [a, e]| {
+            [a, std::f64::consts::FRAC_PI_2 - e]
+        }),
+        ("the angles converted to radians twice", &|_, [a, e]| {
+            [a.to_radians(), e.to_radians()]
+        }),
+        ("the angles halved", &|_, [a, e]| {
+            [wrap(2.0 * a), (2.0 * e).clamp(-1.57, 1.57)]
+        }),
+        ("y negated (a left-handed frame)", &|base, found| {
+            let v = exit(base, found);
+            angles(base, Vector3::new(v.x, -v.y, v.z))
+        }),
+        ("the direction reversed", &|base, found| {
+            angles(base, -exit(base, found).into_inner())
+        }),
+        ("the axes (−y, x, z) taken for (x, y, z)", &|base, found| {
+            let v = exit(base, found);
+            angles(base, Vector3::new(v.y, -v.x, v.z))
+        }),
+        ("the directions read in the rig frame", &|base, found| {
+            angles(base, rig_from_sensor * exit(base, found).into_inner())
+        }),
+        ("the directions read in the room frame", &|base, found| {
+            angles(base, room_from_sensor * exit(base, found).into_inner())
+        }),
+        (
+            "the angles read as those of the mirror's normal",
+            &|base, found| {
+                let u = beam::direction(base);
+                let normal = mirror::normal_between(&u, &exit(base, found)).expect("it is deflected");
+                angles(base, normal.into_inner())
+            },
+        ),
+    ];
+    let of = |words: &str, change: &dyn Fn(f64, [f64; 2]) -> [f64; 2]| {
+        let mut calibration = noisy(&s.truth, 1e-4, 3);
+        for b in solved(&mut calibration) {
+            let found = [b.azimuth_rad, b.elevation_rad].map(|a| a.expect("solved"));
+            let [azimuth, elevation] = change(scan.azimuth(b.beam), found);
+            (b.azimuth_rad, b.elevation_rad) = (Some(azimuth), Some(elevation));
+        }
+        let found = score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory");
+        // Some of the angles from the zenith are beyond what an elevation can be.
+        assert!(found.verdict.exit_code() > 0, "{words}");
+        found
+    };
+    for (words, change) in changes {
+        if ["θ_a and φ exchanged", "the angles halved"].contains(&words) {
+            continue; // not every angle can be the other one
+        }
+        let found = of(words, change);
+        let mistake = found
+            .mistakes
+            .first()
+            .unwrap_or_else(|| panic!("{words}: {:?}", found.warnings));
+        assert_eq!(mistake.correction, words);
+        assert!(mistake.would_be < 0.03, "{words}: {mistake:?}");
+        assert!(
+            found
+                .warnings
+                .iter()
+                .any(|w| w.starts_with(&format!("with {words}, the per-axis error would be 0.0")))
+        );
+    }
+    // Beams counted from 1, and honest errors, which are no mistake.
+    let mut shifted = noisy(&s.truth, 1e-4, 3);
+    for b in &mut shifted.beams {
+        b.beam += 1;
+    }
+    shifted.beams.pop();
+    let found = score(&s.dataset, &shifted, Some(&s.truth)).expect("in memory");
+    assert_eq!(found.mistakes[0].correction, "beams counted from 1");
+    let honest = falsified(|_| {});
+    assert_eq!(honest.mistakes, []);
+    let turned = score(
+        &s.dataset,
+        &turned(noisy(&s.truth, 1e-4, 3), 0.01),
+        Some(&s.truth),
+    )
+    .expect("in memory");
+    assert!(
+        turned.mistakes.iter().all(|m| m.figure == "nees_mean"),
+        "a rotation is no convention: {:?}",
+        turned.mistakes
+    );
+}
+
+#[test]
+fn a_covariance_in_another_form_is_recognized() {
+    let with = |change: fn(f64) -> f64| {
+        let found = falsified(|c| {
+            for b in solved(c) {
+                b.covariance_rad2 = b.covariance_rad2.map(|c| c.map(|row| row.map(change)));
+            }
+        });
+        found
+            .mistakes
+            .into_iter()
+            .map(|m| m.correction)
+            .collect::<Vec<_>>()
+    };
+    let degrees = |x: f64| x * (180.0 / std::f64::consts::PI).powi(2);
+    assert_eq!(with(degrees), ["the covariance in square degrees"]);
+    assert_eq!(with(f64::sqrt), ["standard deviations instead of variances"]);
+    assert_eq!(with(|x| x), [""; 0]);
+    // The reverse of the first makes errors 57 times what is stated, and is recognized too.
+    assert_eq!(
+        with(|x| x * (std::f64::consts::PI / 180.0).powi(2)),
+        ["the covariance converted to square radians twice"]
+    );
+}
+
+#[test]
+fn on_blind_data_boards_and_walls_judge() {
+    let s = sample();
+    let of = |change: &dyn Fn(&mut Calibration)| {
+        let mut calibration = noisy(&s.truth, 1e-3, 3);
+        // Otherwise the mounting would be as uncertain as the drawing.
+        let mut certain = [[0.0; 6]; 6];
+        (0..6).for_each(|i| certain[i][i] = 1e-8);
+        calibration
+            .rig_from_sensor
+            .as_mut()
+            .expect("it has one")
+            .covariance = Some(certain);
+        change(&mut calibration);
+        score(&s.dataset, &calibration, None).expect("in memory")
+    };
+    let honest = of(&|_| {});
+    assert_eq!(honest.verdict, Verdict::Blind, "{:?}", honest.warnings);
+    assert!(honest.walls_normalized < 1.0, "{}", honest.walls_normalized);
+    for (name, change) in [
+        (
+            "φ",
+            (|b| b.elevation_rad = b.elevation_rad.map(|e| -e)) as fn(&mut BeamEstimate),
+        ),
+        ("2°", |b| b.azimuth_rad = b.azimuth_rad.map(|a| a + 0.035)),
+        ("d", |b| b.distance_m = b.distance_m.map(|d| d + 0.02)),
+    ] {
+        let found = of(&|c| solved(c).for_each(change));
+        assert_eq!(found.verdict, Verdict::Fail, "{name}: {:?}", found.gates);
+    }
+    let none = of(&|c| solved(c).for_each(|b| b.covariance_rad2 = None));
+    assert_eq!(none.verdict, Verdict::NotJudged);
+    let nothing = of(&|c| {
+        for b in solved(c) {
+            *b = BeamEstimate::without_angles(b.beam, Status::Rejected, Some("no time".to_owned()));
+        }
+    });
+    assert_eq!(nothing.verdict, Verdict::Fail);
+}
+
+#[test]
+fn what_is_not_valid_has_no_score() {
+    let s = sample();
+    for (key, change) in [
+        ("frame", (|c| c.frame = "room".to_owned()) as fn(&mut Calibration)),
+        ("beam", |c| c.beams[3].beam = 4),
+        ("distance_m", |c| {
+            solved(c).for_each(|b| b.distance_m = Some(-0.06))
+        }),
+        ("covariance_rad2", |c| {
+            solved(c).for_each(|b| b.covariance_rad2 = Some([[1e-6, 2e-6], [1e-6, 1e-6]]));
+        }),
+        ("scanner", |c| {
+            c.scanner.as_mut().expect("it has one").step_deg *= 2.0
+        }),
+    ] {
+        for truth in [Some(&s.truth), None] {
+            let mut calibration = noisy(&s.truth, 1e-3, 3);
+            change(&mut calibration);
+            let found = score(&s.dataset, &calibration, truth).expect("in memory");
+            assert_eq!(
+                (found.verdict, found.verdict.exit_code()),
+                (Verdict::Invalid, 2),
+                "{key}"
+            );
+            assert!(found.warnings[0].starts_with("invalid: ") && found.warnings[0].contains(key));
+            assert!(found.per_axis_rms_deg.is_nan() && found.elements.is_empty());
+        }
+    }
+}
+
+#[test]
+fn an_index_beyond_the_scan_is_no_element() {
+    let s = sample();
+    let mut truth = s.truth.clone();
+    truth.beams.last_mut().expect("there are beams").beam = 1081;
+    let last = truth.beams.iter_mut().rfind(|b| b.status == BeamClass::Deflected);
+    last.expect("some are deflected").beam = 5000;
+    let found = score(&s.dataset, &perfect(&s.truth), Some(&truth)).expect("in memory");
+    assert!(found.verdict != Verdict::Invalid);
 }

@@ -1,22 +1,27 @@
 //! The verdict of a score, with its reasons and warnings as text.
 
+use super::gate::{ENOUGH, Gate, Outcome};
 use super::honesty::{self, Honesty};
+use super::mistakes;
 use super::nulls::nulls;
-use super::{DISHONEST_NEES, Score, Verdict};
-use catoptric_model::{Calibration, Dataset, Status};
+use super::{Score, judge};
+use catoptric_model::{Calibration, Dataset, Pose, Status};
+use catoptric_sim::Truth;
 use std::collections::BTreeMap;
 
 /// Share of the squared error above which one rotation is reported to dominate it.
 pub const DOMINANT_SHARE: f64 = 0.5;
 /// Share of the elements above which abstentions are worth a warning.
 const MANY: f64 = 0.1;
+/// Error over its bound above which the usual mistakes are tried on a calibration that passes.
+const SUSPICIOUS: f64 = 10.0;
 // Phrases of warnings whose subject a report covers in sentences of its own.
 const COMMON: &str = "common mode dominates";
 const UNSOLVED: &str = "elements were not solved";
 
 /// Whether a warning is about accuracy, covariance or abstentions, which a report covers anyway.
 pub fn is_covered_by_report(warning: &str) -> bool {
-    [honesty::OVER, honesty::UNDER, COMMON, UNSOLVED]
+    [honesty::DOUBTFUL, honesty::UNDER, COMMON, UNSOLVED]
         .iter()
         .any(|words| warning.contains(words))
 }
@@ -26,93 +31,40 @@ pub fn common_share(score: &Score) -> f64 {
     1.0 - (score.differential_per_axis_rms_deg / score.per_axis_rms_deg).powi(2)
 }
 
-/// Sets the verdict, and writes down its reasons, the warnings, and why figures are missing.
-pub(super) fn judge(score: &mut Score, dataset: &Dataset, calibration: &Calibration, has_truth: bool) {
-    score.honesty = honesty::of(score);
-    let mut failures = foreign(dataset, calibration);
-    failures.extend(self::failures(score));
-    score.verdict = match (has_truth && !nothing_deflected(score), failures.is_empty()) {
-        (_, false) => Verdict::Fail,
-        (true, true) => Verdict::Pass,
-        (false, true) => Verdict::Blind,
-    };
-    score.warnings = failures;
-    score.warnings.extend(warnings(score, calibration, has_truth));
-    score.nulls = nulls(score, calibration, has_truth);
-}
-
-/// Whether there is a truth, but no element in it with a direction to estimate.
-fn nothing_deflected(score: &Score) -> bool {
-    score.beams.deflected == Some(0)
-}
-
-/// The respects in which a calibration states that it belongs to another scanner or dataset.
-pub(crate) fn foreign(dataset: &Dataset, calibration: &Calibration) -> Vec<String> {
-    let scanner = calibration.check_scanner(&dataset.session).err();
-    let other = calibration.other_dataset(dataset).map(|[its, this]| {
-        format!("fails: the calibration was made from another dataset (SHA-256 {its}); this one is {this}")
-    });
-    scanner
-        .map(|error| format!("fails: {error}"))
-        .into_iter()
-        .chain(other)
-        .collect()
-}
-
-fn failures(score: &Score) -> Vec<String> {
-    let mut failures = Vec::new();
-    if let Some(missed @ 1..) = score.beams.missed {
-        failures.push(format!(
-            "fails: {} deflected by a mirror, with neither a direction nor a reason",
-            elements(missed, "is", "are")
-        ));
+/// Adds the gates, the mistakes that are recognized, the warnings, and why figures are missing; settles the verdict.
+pub(super) fn judge(
+    mut score: Score,
+    dataset: &Dataset,
+    calibration: &Calibration,
+    truth: Option<&Truth>,
+    rig: Option<&Pose>,
+) -> Score {
+    score.honesty = honesty::of(&score);
+    score.gates = judge::gates(&score, dataset, calibration, truth.is_some());
+    let is_met = |g: &Gate| matches!(g.outcome, Outcome::Pass | Outcome::NotTested);
+    let suspicious = !score.gates.iter().all(is_met)
+        || score.honesty == Some(Honesty::UnderConfident)
+        || score.per_axis_rms_deg > SUSPICIOUS * score.crlb_per_axis_deg;
+    if let Some(truth) = truth.filter(|_| suspicious) {
+        score.mistakes = mistakes::recognize(&score, dataset, calibration, truth, rig);
     }
-    if let Some(wrong @ 1..) = score.beams.wrong {
-        failures.push(format!(
-            "fails: {} called solved although no mirror sends {} anywhere",
-            elements(wrong, "is", "are"),
-            if wrong == 1 { "it" } else { "them" }
-        ));
-    }
-    // Infinity is above the limit too; NaN, without a covariance, is not.
-    if score.nees_mean > DISHONEST_NEES {
-        failures.push(format!(
-            "fails: {}; {DISHONEST_NEES} is the limit for a mean normalized squared error",
-            honesty::over_confident(score)
-        ));
-    }
-    // If all of them share one error, they are all wrong under an honest covariance once in a thousand runs.
-    if let Some(open) = score.open.filter(|o| o.wrong > 0 && 2 * o.wrong > o.solved) {
-        failures.push(format!(
-            "fails: {} left open by the boards and given a direction with a covariance that rules out the truth; abstaining would be correct",
-            elements(open.wrong, "is", "are")
-        ));
-    }
-    failures
+    score.remarks = score.mistakes.iter().map(ToString::to_string).collect();
+    let remarks = warnings(&score, calibration, truth.is_some());
+    score.remarks.extend(remarks);
+    score.nulls = nulls(&score, calibration, truth.is_some());
+    score.settled()
 }
 
 fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<String> {
     let mut warnings = Vec::new();
-    if calibration.frame != "sensor" {
-        warnings.push(format!(
-            "the file states its angles in the frame {:?}; they are scored as if in \"sensor\"",
-            calibration.frame
-        ));
-    }
     if !has_truth {
         warnings.push(
             "there is no truth: residuals on boards and walls are the only figures, and the boards may be the ones the calibration was fitted to"
                 .to_owned(),
         );
     }
-    if nothing_deflected(score) {
-        warnings
-            .push("no element is deflected by a mirror and unsplit: there is nothing to judge".to_owned());
-    }
     match score.honesty {
-        Some(Honesty::OverConfident) if score.nees_mean <= DISHONEST_NEES => {
-            warnings.push(honesty::over_confident(score));
-        }
+        Some(Honesty::Doubtful) => warnings.push(honesty::doubtful(score)),
         Some(Honesty::UnderConfident) => warnings.push(honesty::under_confident(score)),
         Some(Honesty::OverConfident | Honesty::Honest) | None => {}
     }
@@ -128,14 +80,15 @@ fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<St
     }
     let stated = score.scored().filter(|e| e.mahalanobis_squared.is_some()).count();
     let scored = score.scored().count();
-    if stated < scored {
+    if stated < scored && score.stated >= ENOUGH {
         warnings.push(format!(
             "{} of {scored} scored elements have no covariance",
             scored - stated
         ));
     }
     let share = common_share(score);
-    if share > DOMINANT_SHARE && score.per_axis_rms_deg > honesty::NEGLIGIBLE_DEG {
+    let explained = score.mistakes.iter().any(|m| m.figure == "per_axis_rms_deg");
+    if !explained && share > DOMINANT_SHARE && score.per_axis_rms_deg > honesty::NEGLIGIBLE_DEG {
         warnings.push(format!(
             "{COMMON}: one rotation of {:.4}° common to all elements accounts for {:.0} % of the squared error, like an error of the sensor's mounting",
             score.common_mode_deg,

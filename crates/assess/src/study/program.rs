@@ -194,7 +194,7 @@ fn record(laboratory: &Laboratory, out: &Path) -> Result<(), Box<dyn std::error:
     for number in 0..laboratory.stretches() {
         writer.write_stretch(&laboratory.stretch(number)?)?;
     }
-    writer.finish(Provenance {
+    writer.finish_blind(Provenance {
         seed: 0,
         command_line: "catoptric study".to_owned(),
         rng_rule: noise::RULE.to_owned(),

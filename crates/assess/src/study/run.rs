@@ -2,7 +2,7 @@
 
 use super::oracle::Oracle;
 use super::{Contestant, ElementAngles, Job, Study};
-use crate::score::{ElementError, Knowable, knowable, score_by};
+use crate::score::{ElementError, Knowable, Verdict, knowable, score_by};
 use catoptric_calib::{Calibrator, Method, calibrate_until};
 use catoptric_model::bias::DistanceBias;
 use catoptric_model::{Calibration, Dataset, Deflection, RangeBias, Stop};
@@ -174,6 +174,10 @@ impl Experiment {
         };
         let known = Some((&self.truth, &self.knowable));
         let score = score_by(&self.dataset, &calibration, known).expect(IN_MEMORY);
+        if score.verdict == Verdict::Invalid {
+            run.failure = score.reasons().join("; ");
+            return (run, Vec::new());
+        }
         run.solved = score.beams.solved;
         run.abstained = score.beams.abstained;
         run.missed = score.beams.missed.unwrap_or_default();

@@ -2,6 +2,7 @@
 
 use super::statistics::{bias_p_value, clopper_pearson, mean_bounds};
 use super::{Run, SCHEMA_VERSION, Study};
+use crate::requirement::{Requirement, RequirementError, numbers};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -80,6 +81,53 @@ pub struct MethodSummary {
     /// Figures that do not exist, and why.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub nulls: BTreeMap<&'static str, &'static str>,
+}
+
+impl MethodSummary {
+    /// Its name, with the values of the axes.
+    pub fn label(&self) -> String {
+        let values = self.axes.iter().map(|(key, value)| format!("{key} = {value}"));
+        let values: Vec<String> = values.collect();
+        if values.is_empty() {
+            self.method.clone()
+        } else {
+            format!("{} ({})", self.method, values.join(", "))
+        }
+    }
+}
+
+impl Summary {
+    /// Why a study is not good enough: the contestants that have no calibration in any run or solved nothing, and the
+    /// requirements that are not met, each with the [label](MethodSummary::label) of its contestant.
+    ///
+    /// # Errors
+    /// [`RequirementError::Unknown`] if a requirement names no figure of a contestant.
+    pub fn reasons(&self, requirements: &[Requirement]) -> Result<Vec<(String, String)>, RequirementError> {
+        let mut reasons = Vec::new();
+        for m in &self.methods {
+            let label = m.label();
+            if m.runs > 0 && m.failed == m.runs {
+                let why = m.failure.as_deref().unwrap_or("no run has a calibration");
+                reasons.push((
+                    label.clone(),
+                    format!("{label} failed in all {} runs: {why}", m.runs),
+                ));
+            } else if m.runs > 0 && m.solved == 0.0 {
+                reasons.push((label.clone(), format!("{label} solved nothing in any run")));
+            }
+            let value = serde_json::to_value(m).unwrap_or_default();
+            let figures = numbers(&value, &["axes", "nulls"]);
+            for requirement in requirements {
+                let unmet = requirement.judge_figures(
+                    &label,
+                    &figures,
+                    "per_axis_rms_deg, anees, coverage_95, failed",
+                )?;
+                reasons.extend(unmet.into_iter().map(|u| (label.clone(), u.to_string())));
+            }
+        }
+        Ok(reasons)
+    }
 }
 
 /// Summarizes runs, which must be in the order of the study's jobs and contestants.

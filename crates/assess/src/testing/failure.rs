@@ -25,6 +25,16 @@ pub enum Failure {
         /// Its error message.
         reason: String,
     },
+    /// The calibration is not valid.
+    #[error("seed {seed}: {calibrator} returned a calibration that is not valid: {problem}")]
+    Invalid {
+        /// Seed of the experiment.
+        seed: u64,
+        /// Name of the calibrator.
+        calibrator: String,
+        /// The first problem.
+        problem: String,
+    },
     /// A deflected element has no direction.
     #[error("seed {seed}: beam {beam} is deflected by {facet:?} and {found}")]
     Unsolved {

@@ -5,6 +5,7 @@
 //! |---|---|
 //! | without noise every deflected element is recovered | [`closure`], [`closure_of`] |
 //! | the stated covariance matches the errors | [`Anees`], [`Coverage`] |
+//! | the errors average out over experiments, θ_a and φ apart | [`Bias`] |
 //! | the errors are as small as the data allow | [`Efficiency`] |
 //! | the same data yield the same bytes on any number of threads | [`deterministic`] |
 //!
@@ -29,6 +30,7 @@
 //! # }
 //! ```
 
+mod bias;
 mod closure;
 mod determinism;
 mod failure;
@@ -37,6 +39,7 @@ mod significance;
 mod strategies;
 mod trial;
 
+pub use bias::Bias;
 pub use closure::{assert_closure, assert_closure_of, closure, closure_of};
 pub use determinism::{assert_deterministic, deterministic, same_result};
 pub use failure::Failure;

@@ -1,8 +1,9 @@
 //! Independent trials: an experiment, its calibration, and one element drawn from it.
 
 use super::Failure;
-use crate::score::{mahalanobis_squared, score};
+use crate::score::{ElementError, mahalanobis_squared, score};
 use crate::study::drawn;
+use crate::validate::{Severity, validate_for};
 use catoptric_calib::Calibrator;
 use catoptric_model::{Calibration, Dataset, Unreadable};
 use catoptric_sim::truth::BeamClass;
@@ -17,6 +18,8 @@ pub struct Trial {
     pub seed: u64,
     /// One of the deflected elements that were solved, drawn by the seed; `None` if there is none.
     pub drawn: Option<Drawn>,
+    /// Mean over all of them of (cos φ·δθ, δφ), in radians; `None` if there is none.
+    pub mean_error: Option<[f64; 2]>,
 }
 
 /// The error of an element, normalized by its stated covariance and by its bound.
@@ -95,9 +98,12 @@ impl Trial {
                 .bound
                 .map(|c| mahalanobis_squared(&Vector2::new(e.across, e.up), &c)),
         });
+        let n = scored.len() as f64;
+        let mean = |of: fn(&ElementError) -> f64| scored.iter().map(|e| of(e)).sum::<f64>() / n;
         Ok(Self {
             seed: truth.seed,
             drawn,
+            mean_error: (!scored.is_empty()).then(|| [mean(|e| e.across), mean(|e| e.up)]),
         })
     }
 }
@@ -115,6 +121,14 @@ pub fn trials<C: Calibrator + Sync + ?Sized>(
     let of_one = |seed: &u64| {
         let experiment = Experiment::of(scene, *seed)?;
         let calibration = experiment.calibrate(calibrator)?;
+        let problems = validate_for(&calibration, &experiment.dataset.session);
+        if let Some(problem) = problems.iter().find(|p| p.severity == Severity::Error) {
+            return Err(Failure::Invalid {
+                seed: *seed,
+                calibrator: calibrator.name().to_owned(),
+                problem: problem.to_string(),
+            });
+        }
         let trial = Trial::of(&experiment.dataset, &experiment.truth, &calibration);
         Ok(trial.expect("a simulated dataset is in memory"))
     };

@@ -5,8 +5,8 @@ mod problem;
 mod sane;
 mod shared;
 
-use catoptric_model::ScanGeometry;
 use catoptric_model::calibration::{self, Calibration};
+use catoptric_model::{ScanGeometry, Session};
 use element::check_element;
 use problem::Problems;
 use shared::{check_bias, check_facet, check_mount};
@@ -46,6 +46,22 @@ const SHA256_DIGITS: usize = 64;
 /// assert_eq!(problems[0].key, "frame");
 /// ```
 pub fn validate(calibration: &Calibration) -> Vec<Problem> {
+    check(calibration, None)
+}
+
+/// Everything wrong with a calibration for use with a dataset of this session: as [`validate`], and it must be of the same
+/// scanner, which is the session's if it states none.
+pub fn validate_for(calibration: &Calibration, session: &Session) -> Vec<Problem> {
+    let mut found = check(calibration, Some(session));
+    if let Err(error) = calibration.check_scanner(session) {
+        let mut problems = Problems::default();
+        problems.error("scanner", format!("does not fit: {error}"));
+        found.extend(problems.list);
+    }
+    found
+}
+
+fn check(calibration: &Calibration, session: Option<&Session>) -> Vec<Problem> {
     let mut problems = Problems::default();
     if !(1..=calibration::SCHEMA_VERSION).contains(&calibration.schema_version) {
         problems.error(
@@ -70,9 +86,10 @@ pub fn validate(calibration: &Calibration) -> Vec<Problem> {
         problems.error(&format!("scanner.{}", wrong.key), wrong.problem);
     }
     // Who does not say which scanner it is has the usual one.
-    let beams = calibration
-        .scanner
-        .map_or(ScanGeometry::default().beams(), |angles| angles.beams);
+    let beams = calibration.scanner.map_or_else(
+        || session.map_or(ScanGeometry::default().beams(), |s| s.scanner.scan.beams()),
+        |angles| angles.beams,
+    );
     if let Some(id) = &calibration.dataset
         && !(id.len() == SHA256_DIGITS && id.chars().all(|c| c.is_ascii_hexdigit()))
     {
@@ -88,9 +105,10 @@ pub fn validate(calibration: &Calibration) -> Vec<Problem> {
     for (place, estimate) in calibration.beams.iter().enumerate() {
         let mut at = problems.of_beam(place, estimate.beam);
         if estimate.beam >= beams {
-            let which = match calibration.scanner {
-                Some(_) => "of `scanner`",
-                None => "of the UST-20LX; name another `scanner`",
+            let which = match (calibration.scanner, session) {
+                (Some(_), _) => "of `scanner`",
+                (None, Some(_)) => "of the dataset's scanner",
+                (None, None) => "of the UST-20LX; name another `scanner`",
             };
             at.error(
                 "beam",

@@ -1,4 +1,5 @@
-//! Estimates one element from its readings: boards and angles are chosen alternately until neither changes.
+//! Estimates the deflection of every element, a beam with its mirror: alternately selects the boards that it hits and solves for
+//! its two angles, until the selection no longer changes.
 
 use crate::element::attempt::{Attempt, ElementFit, Failure, MIN_BOARDS, Workspace, lost};
 use crate::element::choose::choose;

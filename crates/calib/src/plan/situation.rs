@@ -345,6 +345,7 @@ fn expected_mount(session: &Session, room_from_rig: &Pose, placed: &[Placed]) ->
         session: session.clone(),
         poses,
         id: None,
+        warnings: Vec::new(),
     };
     pose::estimate(&dataset, &summaries).uncertainty
 }

@@ -284,6 +284,7 @@ impl World {
                 session,
                 poses,
                 id: None,
+                warnings: Vec::new(),
             },
             deflections,
             rig_from_sensor,

@@ -364,6 +364,7 @@ fn node(items: &mut [Item], part: Part, (level, leaf): (usize, usize), nodes: &m
     let node = &mut nodes[own];
     for (lane, (child, part)) in children.into_iter().zip(&parts).enumerate() {
         node.children[lane] = child;
+        node.used |= 1 << lane;
         for axis in 0..3 {
             node.bounds[axis][0][lane] = part.bounds.low[axis];
             node.bounds[axis][1][lane] = part.bounds.high[axis];

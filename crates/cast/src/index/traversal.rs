@@ -66,6 +66,7 @@ impl Traversal {
     #[inline(always)]
     fn enter<S: Simd>(&mut self, node: &Node, mut hit: u32, near: f32x8<S>) -> Option<Child> {
         const LANE: usize = WIDTH - 1;
+        hit &= node.used;
         if hit == 0 {
             return None;
         }

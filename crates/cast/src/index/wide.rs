@@ -16,6 +16,8 @@ pub(crate) struct Node {
     /// By axis: the low sides and the high sides. An empty slot has them inverted and far apart, so it is never hit.
     pub(crate) bounds: [[[f32; WIDTH]; 2]; 3],
     pub(crate) children: [Child; WIDTH],
+    /// Bits of the slots that have a child: coordinates near the end of f32 make empty ones seem hit.
+    pub(crate) used: u32,
 }
 
 /// Index of a node or of a leaf; for a leaf, also its number of triangles.
@@ -85,6 +87,7 @@ impl Node {
         Self {
             bounds: [[[FAR; WIDTH], [-FAR; WIDTH]]; 3],
             children: [Child::NONE; WIDTH],
+            used: 0,
         }
     }
 }

@@ -2,18 +2,20 @@
 
 use crate::{Control, Error};
 use catoptric_calib::{Method, Options};
+#[cfg(feature = "recording")]
+use catoptric_files::Damage;
 use catoptric_model::{Calibration, Characterization, Dataset};
 #[cfg(feature = "recording")]
 use std::path::Path;
 
-/// Same as [`read_dataset`](crate::read_dataset), under control: a stop ends it, and every later pass over the readings of
-/// the dataset.
+/// Same as [`read_dataset`](crate::read_dataset), with damaged stretches left out on request, and under control: a stop ends
+/// it, and every later pass over the readings of the dataset.
 ///
 /// # Errors
 /// [`Error::File`] names the file that is missing, changed, invalid or inconsistent with the others; [`Error::Stopped`].
 #[cfg(feature = "recording")]
-pub fn read_dataset_with(folder: &Path, control: &Control) -> Result<Dataset, Error> {
-    control.run(|| Ok(catoptric_files::read_dataset_until(folder, &control.stop)?))
+pub fn read_dataset_with(folder: &Path, damage: Damage, control: &Control) -> Result<Dataset, Error> {
+    control.run(|| Ok(catoptric_files::read_dataset_with(folder, damage, &control.stop)?))
 }
 
 /// Calibrates a recorded experiment by the method `joint`: the direction of every mirrored beam, with its covariance.

@@ -11,6 +11,7 @@ mod layout;
 mod optimize;
 #[cfg(feature = "design")]
 mod plan;
+mod score;
 mod simulate;
 mod study;
 #[cfg(feature = "design")]
@@ -35,6 +36,7 @@ pub use optimize::write_optimum;
 pub use optimize::{BEST_SCENE, OPTIMUM_PAGE, optimize, shown_of_front};
 #[cfg(feature = "design")]
 pub use plan::{PlanStart, completed_scene, plan, planned_scene, write_planned};
+pub use score::{compare_with, score_with};
 #[cfg(feature = "recording")]
 pub use simulate::{Figures, Recording, simulate_into};
 pub use simulate::{simulate, simulate_with};

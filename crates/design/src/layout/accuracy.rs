@@ -6,7 +6,7 @@
 //! alternately above and below its noise-free value by the standard deviation of one reading. The structure is as built
 //! under a seed, so that its facets have realistic slope errors.
 
-use catoptric_assess::score::true_directions;
+use catoptric_assess::score::{bounds as bounds_anything, true_directions};
 use catoptric_calib::{TrueDirection, limit};
 use catoptric_model::{Dataset, PoseKind, PoseRecord, Readings};
 use catoptric_sim::laboratory::Returns;
@@ -98,6 +98,7 @@ fn find(scene: &Scene, seed: u64, accuracy: &mut Accuracy) -> Result<(), String>
         session,
         poses: poses.map_err(text)?.into_iter().flatten().collect(),
         id: None,
+        warnings: Vec::new(),
     };
     // Omitted poses leave no gap in the numbering.
     for (number, pose) in dataset.poses.iter_mut().enumerate() {
@@ -108,7 +109,9 @@ fn find(scene: &Scene, seed: u64, accuracy: &mut Accuracy) -> Result<(), String>
         let bound: Matrix2<f64> = bounds.get(&d.beam).copied().flatten()?;
         // Along the axes cos φ·θ_a and φ.
         let cos = libm::cos(d.deflection.elevation);
-        Some(0.5 * (cos * cos * bound[(0, 0)] + bound[(1, 1)]))
+        let to_tangent = Matrix2::new(cos, 0.0, 0.0, 1.0);
+        let square = 0.5 * (cos * cos * bound[(0, 0)] + bound[(1, 1)]);
+        bounds_anything(&(to_tangent * bound * to_tangent)).then_some(square)
     };
     let summary = |of: &dyn Fn(&TrueDirection) -> bool| {
         let some = || directions.iter().filter(|d| of(d));

@@ -55,7 +55,7 @@ pub use field::{Cell, NEAR_DEG};
 pub use footprint::{Footprint, OUTLINE};
 pub use incremental::{Detail, Layout};
 pub(crate) use require::numbers;
-pub use require::{Requirement, RequirementError, Unmet, figures};
+pub use require::{Requirement, RequirementError, Unmet, figures, judge};
 pub use sensitivity::center;
 pub(crate) use size::plate_thickness;
 pub use size::{MIRROR_DENSITY, POST_DENSITY, Size};

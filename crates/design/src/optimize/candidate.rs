@@ -90,7 +90,7 @@ impl<'a> Judge<'a> {
             goal.check(&figures)?;
         }
         for requirement in &options.requirements {
-            requirement.judge(&analysis)?;
+            layout::judge(requirement, &analysis)?;
         }
         Ok(judge)
     }
@@ -174,7 +174,7 @@ impl<'a> Judge<'a> {
         candidate.shortfall = 0.0;
         for requirement in &self.options.requirements {
             candidate.shortfall += requirement.shortfall(&figures);
-            match requirement.judge(&analysis) {
+            match layout::judge(requirement, &analysis) {
                 Ok(unmet) => candidate.unmet.extend(unmet.iter().map(ToString::to_string)),
                 Err(error) => candidate.unmet.push(error.to_string()),
             }

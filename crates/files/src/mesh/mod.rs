@@ -2,11 +2,12 @@
 //!
 //! The extension determines the format: to add one, write its file with its row, and add its variant to [`MeshFormat`].
 //! Damaged files give an error that names the line, or the byte in a binary file; no content can crash the reader, and
-//! sizes stated in a file are not trusted before the bytes are read. Polygons of more than three corners are split into a
-//! fan.
+//! sizes stated in a file are not trusted before the bytes are read. Polygons of more than three corners are split into
+//! triangles.
 
 mod obj;
 mod ply;
+mod polygon;
 mod row;
 mod stl;
 
@@ -148,13 +149,76 @@ mod tests {
         }
     }
 
+    /// A square of 2 m as other programs write it.
+    #[test]
+    fn peculiarities_of_other_programs_change_nothing() {
+        let obj = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n";
+        let ply = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nelement face \
+                   1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n2 0 0\n2 2 0\n0 2 0\n4 0 1 2 3\n";
+        let facet = |[a, b, c]: [&str; 3]| {
+            format!("facet normal 0 0 1\nouter loop\nvertex {a}\nvertex {b}\nvertex {c}\nendloop\nendfacet\n")
+        };
+        let stl = format!(
+            "solid sq\n{}{}endsolid sq\n",
+            facet(["0 0 0", "2 0 0", "2 2 0"]),
+            facet(["0 0 0", "2 2 0", "0 2 0"])
+        );
+        let expected = corners_of(&parse_mesh(obj.as_bytes(), "a.obj").expect("plain"));
+        let strips = ply
+            .replace("element face 1", "element tristrips 1")
+            .replace("4 0 1 2 3", "8 0 1 2 -1 0 2 3 -1");
+        let mut spare = vec![b'x'; 80];
+        spare.extend(2_u32.to_le_bytes());
+        for [a, b, c] in &expected {
+            spare.extend([0; 12]);
+            #[allow(clippy::cast_possible_truncation)]
+            spare.extend(
+                [a, b, c]
+                    .into_iter()
+                    .flatten()
+                    .flat_map(|x| (*x as f32).to_le_bytes()),
+            );
+            spare.extend([0; 2]);
+        }
+        spare.extend(b"end.");
+        let marked = |text: &str| format!("\u{feff}{text}").into_bytes();
+        let cases: [(&str, Vec<u8>); 11] = [
+            ("mark.obj", marked(obj)),
+            ("mark.ply", marked(ply)),
+            ("mark.stl", marked(&stl)),
+            ("upper.stl", stl.to_ascii_uppercase().into_bytes()),
+            ("continued.obj", obj.replace("1 2 3", "1 2 \\\n 3").into_bytes()),
+            ("strips.ply", strips.into_bytes()),
+            ("cr.obj", obj.replace('\n', "\r").into_bytes()),
+            ("cr.ply", ply.replace('\n', "\r").into_bytes()),
+            ("cr.stl", stl.replace('\n', "\r").into_bytes()),
+            ("spare.stl", spare),
+            (
+                "rows.ply",
+                ply.replace("2 2 0\n", "2 2 0 255 128 0\n").into_bytes(),
+            ),
+        ];
+        for (name, bytes) in cases {
+            let mesh = parse_mesh(&bytes, name).unwrap_or_else(|e| panic!("{e}"));
+            assert_eq!(corners_of(&mesh), expected, "{name}");
+        }
+        let nan = obj.replace("2 2 0", "2 2 1.#QNAN0");
+        let error = parse_mesh(nan.as_bytes(), "a.obj")
+            .expect_err("refused")
+            .to_string();
+        assert!(
+            error.starts_with("a.obj:3:1: ") && error.contains("not a number"),
+            "{error}"
+        );
+    }
+
     #[test]
     fn errors_say_where() {
         let said = |bytes: &[u8], name: &str| parse_mesh(bytes, name).expect_err("damaged").to_string();
         assert!(said(b"v 0 0 0\nf 1 2 3\n", "a.obj").starts_with("a.obj:2:1: there is no vertex 2"));
         assert!(said(b"v 0 nan 0\n", "a.obj").contains("not finite"));
         assert!(said(b"solid\nvertex 1 2\n", "a.stl").starts_with("a.stl:2:1: a vertex takes three numbers"));
-        assert!(said(&[0; 90], "a.stl").contains("(by byte 90)"));
+        assert!(said(&[1; 90], "a.stl").contains("(by byte 90)"));
         assert!(
             said(
                 b"ply\nformat ascii 1.0\nelement x 99999999999\nend_header\n",

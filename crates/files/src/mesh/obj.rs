@@ -1,6 +1,7 @@
 //! OBJ: the vertices and faces of a text file; everything else is ignored.
 
-use super::row::{Fault, Parsed, Row, fan, finish, lines, triple};
+use super::polygon;
+use super::row::{Fault, Parsed, Row, finish, lines, text_of, triple};
 
 pub(super) const ROW: Row = Row {
     extension: "obj",
@@ -11,12 +12,22 @@ pub(super) const ROW: Row = Row {
 
 /// Reads a file.
 fn parse(bytes: &[u8]) -> Parsed {
-    let text = String::from_utf8_lossy(bytes);
+    let text = text_of(bytes);
     let mut vertices = Vec::new();
     let mut triangles = Vec::new();
-    for (line, content) in lines(&text) {
-        let content = content.split('#').next().unwrap_or_default();
-        let mut words = content.split_whitespace();
+    let mut lines = lines(&text);
+    while let Some((line, content)) = lines.next() {
+        let mut content = content.to_owned();
+        // A backslash at its end continues a line.
+        while content.ends_with('\\') {
+            content.pop();
+            content.push(' ');
+            content.push_str(lines.next().map_or("", |(_, more)| more));
+        }
+        // A comment begins a word; in `1.#QNAN0` the sign does not.
+        let mut words = content
+            .split_whitespace()
+            .take_while(|word| !word.starts_with('#'));
         match words.next() {
             Some("v") => vertices.push(triple(&mut words, line, "a vertex")?),
             Some("f") => {
@@ -27,7 +38,8 @@ fn parse(bytes: &[u8]) -> Parsed {
                     let message = format!("a face has {} corners; 3 at least are needed", corners.len());
                     return Err(Fault::Line(line, message));
                 }
-                triangles.extend(fan(&corners));
+                let split = polygon::triangles(&corners, &vertices);
+                triangles.extend(split.map_err(|m| Fault::Line(line, m))?);
             }
             // Normals, textures, groups, materials, lines and curves do not affect the surface.
             _ => {}

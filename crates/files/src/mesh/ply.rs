@@ -1,6 +1,8 @@
 //! PLY: a header of elements and their properties, then numbers as text or in either byte order.
 
-use super::row::{Fault, Parsed, Row, fan, finish};
+use super::polygon;
+use super::row::{Fault, Parsed, Row, finish};
+use crate::json::MARK;
 use catoptric_sim::Mesh;
 use nalgebra::Point3;
 
@@ -138,9 +140,8 @@ impl Body<'_> {
     }
 
     fn next_word(&mut self) -> Result<f64, Fault> {
-        while let Some(byte) = self.bytes.get(self.at).filter(|b| b.is_ascii_whitespace()) {
-            self.line += usize::from(*byte == b'\n');
-            self.at += 1;
+        while self.bytes.get(self.at).is_some_and(u8::is_ascii_whitespace) {
+            self.pass();
         }
         let rest = &self.bytes[self.at..];
         let end = rest
@@ -156,6 +157,40 @@ impl Body<'_> {
             .map_err(|_| self.fault(format!("{word:?} is not a number")))?;
         self.at += end;
         Ok(value)
+    }
+
+    /// Passes over one byte of text, and counts the lines.
+    fn pass(&mut self) {
+        let ends_line = match self.bytes[self.at] {
+            b'\n' => true,
+            b'\r' => self.bytes.get(self.at + 1) != Some(&b'\n'),
+            _ => false,
+        };
+        self.line += usize::from(ends_line);
+        self.at += 1;
+    }
+
+    /// Passes over numbers beyond those of an element: some programs write more in a row than they say.
+    fn end_row(&mut self) {
+        if self.encoding == Encoding::Text {
+            while self
+                .bytes
+                .get(self.at)
+                .is_some_and(|byte| !matches!(byte, b'\n' | b'\r'))
+            {
+                self.at += 1;
+            }
+        }
+    }
+
+    /// A vertex of a strip; `None` where a strip ends.
+    fn next_of_strip(&mut self, number: Number) -> Result<Option<u32>, Fault> {
+        let (at, line) = (self.at, self.line);
+        if self.next(number)? == -1.0 {
+            return Ok(None);
+        }
+        (self.at, self.line) = (at, line);
+        self.next_index(number).map(Some)
     }
 
     /// A non-negative integer.
@@ -181,6 +216,8 @@ fn parse(bytes: &[u8]) -> Parsed {
     };
     let mut vertices = Vec::new();
     let mut triangles = Vec::new();
+    // Faces of more than three corners, each with its place among the triangles; vertices may come after them.
+    let mut polygons: Vec<(usize, Vec<u32>, Fault)> = Vec::new();
     for element in &elements {
         // Elements of zero size would let a corrupt count loop forever.
         if element.properties.is_empty() && element.count > 0 {
@@ -210,13 +247,26 @@ fn parse(bytes: &[u8]) -> Parsed {
                     if face.len() < 3 {
                         return Err(body.fault(format!("a face has {count} corners; 3 at least are needed")));
                     }
-                    triangles.extend(fan(&face));
+                    match face[..] {
+                        [a, b, c] => triangles.push([a, b, c]),
+                        _ => polygons.push((triangles.len(), face, body.fault(""))),
+                    }
+                } else if element.name == "tristrips" && corners {
+                    let mut strip = Vec::new();
+                    for _ in 0..count {
+                        match body.next_of_strip(property.number)? {
+                            Some(vertex) => strip.push(vertex),
+                            None => triangles.extend(of_strip(&std::mem::take(&mut strip))),
+                        }
+                    }
+                    triangles.extend(of_strip(&strip));
                 } else {
                     for _ in 0..count {
                         body.next(property.number)?;
                     }
                 }
             }
+            body.end_row();
             if element.name == "vertex" {
                 let [Some(x), Some(y), Some(z)] = point else {
                     return Err(Fault::Whole("its vertices have no x, y and z".to_owned()));
@@ -229,17 +279,65 @@ fn parse(bytes: &[u8]) -> Parsed {
             }
         }
     }
+    let triangles = with_polygons(triangles, polygons, &vertices)?;
     finish(vertices, triangles)
+}
+
+/// The triangles of a strip, every other one with its corners exchanged.
+fn of_strip(strip: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
+    strip
+        .windows(3)
+        .enumerate()
+        .map(|(number, corners)| match number % 2 {
+            0 => [corners[0], corners[1], corners[2]],
+            _ => [corners[1], corners[0], corners[2]],
+        })
+}
+
+/// All triangles in the order of the faces.
+fn with_polygons(
+    triangles: Vec<[u32; 3]>,
+    polygons: Vec<(usize, Vec<u32>, Fault)>,
+    vertices: &[Point3<f64>],
+) -> Result<Vec<[u32; 3]>, Fault> {
+    if polygons.is_empty() {
+        return Ok(triangles);
+    }
+    let mut all = Vec::with_capacity(triangles.len() + 2 * polygons.len());
+    let mut done = 0;
+    for (before, face, place) in polygons {
+        all.extend_from_slice(&triangles[done..before]);
+        done = before;
+        let at = |message: String| match place {
+            Fault::Line(line, _) => Fault::Line(line, message),
+            Fault::Byte(byte, _) => Fault::Byte(byte, message),
+            Fault::Whole(_) => Fault::Whole(message),
+        };
+        let split = match face.iter().find(|v| **v as usize >= vertices.len()) {
+            Some(vertex) => Err(format!(
+                "a face uses vertex {vertex}; there are {}, numbered from 0",
+                vertices.len()
+            )),
+            None => polygon::triangles(&face, vertices),
+        };
+        all.extend(split.map_err(at)?);
+    }
+    all.extend_from_slice(&triangles[done..]);
+    Ok(all)
 }
 
 /// Encoding, elements, offset of the numbers, and their line.
 fn header(bytes: &[u8]) -> Result<(Encoding, Vec<Element>, usize, usize), Fault> {
     let mut encoding = None;
     let mut elements: Vec<Element> = Vec::new();
-    let mut at = 0;
+    let mut at = if bytes.starts_with(MARK) { MARK.len() } else { 0 };
+    // Lines end as the first one does: a binary body may begin with any byte.
+    let first = bytes.iter().position(|b| matches!(b, b'\n' | b'\r'));
+    let ends_in_cr = first.is_some_and(|end| bytes[end] == b'\r' && bytes.get(end + 1) != Some(&b'\n'));
+    let line_end = if ends_in_cr { b'\r' } else { b'\n' };
     for line in 1.. {
         let rest = &bytes[at..];
-        let Some(end) = rest.iter().position(|b| *b == b'\n') else {
+        let Some(end) = rest.iter().position(|b| *b == line_end) else {
             return Err(Fault::Line(
                 line,
                 "the file ends before its `end_header`".to_owned(),

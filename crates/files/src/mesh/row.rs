@@ -1,5 +1,6 @@
 //! The description of a mesh format, and what its readers share.
 
+use crate::json::MARK;
 use catoptric_sim::Mesh;
 use nalgebra::Point3;
 
@@ -52,17 +53,18 @@ pub(super) fn triple<'a>(
     Ok(Point3::new(number()?, number()?, number()?))
 }
 
-/// Numbered lines of text, from 1; invalid UTF-8 becomes replacement characters, which no number contains.
-pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()))
+/// The text of a file, without a byte order mark, and with every kind of line end as `\n`; invalid UTF-8 becomes replacement
+/// characters, which no number contains.
+pub(super) fn text_of(bytes: &[u8]) -> String {
+    let bytes = bytes.strip_prefix(MARK).unwrap_or(bytes);
+    String::from_utf8_lossy(bytes)
+        .replace("\r\n", "\n")
+        .replace('\r', "\n")
 }
 
-/// A polygon as triangles that share its first corner.
-pub(super) fn fan(corners: &[u32]) -> impl Iterator<Item = [u32; 3]> {
-    corners
-        .windows(2)
-        .skip(1)
-        .map(|pair| [corners[0], pair[0], pair[1]])
+/// Numbered lines of text, from 1.
+pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    text.lines().enumerate().map(|(i, line)| (i + 1, line.trim()))
 }
 
 /// The corners of the tetrahedron of the samples.

@@ -1,6 +1,7 @@
 //! STL: triangles without shared vertices, as text or binary.
 
-use super::row::{Fault, Parsed, Row, finish, lines, triple};
+use super::row::{Fault, Parsed, Row, finish, lines, text_of, triple};
+use crate::json::MARK;
 use nalgebra::Point3;
 use std::collections::HashMap;
 
@@ -47,10 +48,13 @@ fn parse(bytes: &[u8]) -> Parsed {
         .and_then(|b| b.try_into().ok())
         .map(|b| u32::from_le_bytes(b) as usize);
     let fits = |n: usize| n.checked_mul(STL_TRIANGLE).map(|size| size + STL_HEADER) == Some(bytes.len());
-    // A binary header may begin with "solid" as text does; its size decides.
-    let is_text = bytes.trim_ascii_start().starts_with(b"solid") && !count.is_some_and(fits);
-    if is_text {
-        return text(&String::from_utf8_lossy(bytes));
+    // A binary header may begin with "solid" as text does; then its size decides, or that text has no zero bytes.
+    let begin = bytes.strip_prefix(MARK).unwrap_or(bytes).trim_ascii_start();
+    let says_solid = begin
+        .get(..5)
+        .is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
+    if says_solid && !count.is_some_and(fits) && !bytes.contains(&0) {
+        return text(&text_of(bytes));
     }
     let Some(count) = count else {
         return Err(Fault::Byte(
@@ -61,7 +65,15 @@ fn parse(bytes: &[u8]) -> Parsed {
             ),
         ));
     };
-    if !fits(count) {
+    // Some programs write more after the last triangle: less than a triangle, or zeros.
+    let is_whole = |end: usize| {
+        let spare = bytes.get(end..);
+        spare.is_some_and(|spare| spare.len() < STL_TRIANGLE || spare.iter().all(|byte| *byte == 0))
+    };
+    let end = count
+        .checked_mul(STL_TRIANGLE)
+        .and_then(|size| size.checked_add(STL_HEADER));
+    let Some(end) = end.filter(|end| is_whole(*end)) else {
         let expected = count as u64 * STL_TRIANGLE as u64 + STL_HEADER as u64;
         return Err(Fault::Byte(
             bytes.len(),
@@ -70,10 +82,10 @@ fn parse(bytes: &[u8]) -> Parsed {
                 bytes.len()
             ),
         ));
-    }
+    };
     let mut welder = Welder::default();
     let mut triangles = Vec::with_capacity(count);
-    for (i, record) in bytes[STL_HEADER..].chunks_exact(STL_TRIANGLE).enumerate() {
+    for (i, record) in bytes[STL_HEADER..end].chunks_exact(STL_TRIANGLE).enumerate() {
         let number = |at: usize| {
             let bytes = record
                 .get(12 + 4 * at..16 + 4 * at)

@@ -2,6 +2,7 @@
 //! `tests/mcap_peers.py` does, on the dataset of the last test of `datasets`.
 
 mod datasets;
+mod foreign;
 mod recordings;
 mod surveys;
 
@@ -141,7 +142,8 @@ fn track(numbers: &mut Numbers, subject: &str, template: &[Marker], start_s: f64
 /// A stretch with a rig and the white board.
 fn stretch(session: &Session, pose: usize, scans: usize, frames: usize, seed: u64) -> Stretch {
     let mut numbers = Numbers(seed + 1);
-    let start_s = 10.0 * pose as f64;
+    // Longer than any of them lasts.
+    let start_s = 1000.0 * pose as f64;
     // The sum of two decimals is not always the number nearest to a decimal, as which times are read back.
     let whole = |t: f64| (t * 1e9).round() / 1e9;
     let mut tracks = vec![

@@ -77,6 +77,7 @@ impl Laboratory {
             session: self.session()?,
             poses,
             id: None,
+            warnings: Vec::new(),
         })
     }
 }

@@ -16,6 +16,7 @@ pub struct RoomMirror {
     pub shape: PlaneShape,
     /// Origin of its own frame in the room, in meters.
     #[serde(default)]
+    #[schemars(inner(range(min = -10000.0, max = 10000.0)))]
     pub position_m: [f64; 3],
     /// Yaw of its own frame, in degrees.
     #[serde(default)]
@@ -51,6 +52,7 @@ pub struct RoomSurface {
     pub shape: SurfaceShape,
     /// Origin of its own frame in the room, in meters.
     #[serde(default)]
+    #[schemars(inner(range(min = -10000.0, max = 10000.0)))]
     pub position_m: [f64; 3],
     /// Yaw of its own frame, in degrees.
     #[serde(default)]
@@ -89,9 +91,11 @@ pub enum PlaneShape {
 pub struct PlaneRectangle {
     /// Center, in meters.
     #[serde(default)]
+    #[schemars(inner(range(min = -10000.0, max = 10000.0)))]
     pub center_m: [f64; 3],
     /// Normal of its face; any length.
     #[serde(default = "up")]
+    #[schemars(inner(range(min = -10000.0, max = 10000.0)))]
     pub normal: [f64; 3],
     /// Extent parallel to the x–y plane, along x if the normal is ±z, in meters.
     #[schemars(range(min = 0.0001, max = 1000.0))]
@@ -111,6 +115,7 @@ fn up() -> [f64; 3] {
 pub struct PlanePolygon {
     /// Corners of a convex plane polygon, in meters, counter-clockwise seen from the face.
     #[schemars(length(min = 3))]
+    #[schemars(inner(inner(range(min = -10000.0, max = 10000.0))))]
     pub corners_m: Vec<[f64; 3]>,
 }
 

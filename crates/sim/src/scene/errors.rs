@@ -136,6 +136,7 @@ pub struct Interference {
 pub struct NoiseTable {
     /// Distances in meters, strictly increasing.
     #[schemars(length(min = 1))]
+    #[schemars(inner(range(min = 0.0, max = 10000.0)))]
     pub range_m: Vec<f64>,
     /// Standard deviations in millimeters at those distances.
     #[schemars(inner(range(min = 0.0, max = 1000.0)))]
@@ -176,8 +177,10 @@ impl Default for Characterization {
 #[allow(dead_code)] // Read by the schema generator alone.
 struct DistanceBiasSchema {
     /// Distances in meters, strictly increasing.
+    #[schemars(inner(range(min = 0.0, max = 10000.0)))]
     range_m: Vec<f64>,
     /// Errors in millimeters at those distances.
+    #[schemars(inner(range(min = -100000.0, max = 100000.0)))]
     error_mm: Vec<f64>,
 }
 
@@ -188,8 +191,10 @@ struct DistanceBiasSchema {
 #[allow(dead_code)]
 struct AngleBiasSchema {
     /// A_a, in millimeters.
+    #[schemars(range(min = -100000.0, max = 100000.0))]
     gain_mm: f64,
     /// B_a, in millimeters.
+    #[schemars(range(min = -100000.0, max = 100000.0))]
     offset_mm: f64,
     /// A table that is added to the law.
     table: Option<AngleTableSchema>,
@@ -205,6 +210,7 @@ struct AngleTableSchema {
     #[schemars(length(min = 1), inner(range(min = 0.0, max = 90.0)))]
     incidence_deg: Vec<f64>,
     /// Errors in millimeters at those incidences.
+    #[schemars(inner(range(min = -100000.0, max = 100000.0)))]
     error_mm: Vec<f64>,
 }
 
@@ -215,8 +221,10 @@ struct AngleTableSchema {
 #[allow(dead_code)]
 struct ColorBiasSchema {
     /// A_c, in millimeters per meter.
+    #[schemars(range(min = -100000.0, max = 100000.0))]
     slope_mm_per_m: f64,
     /// B_c, in millimeters.
+    #[schemars(range(min = -100000.0, max = 100000.0))]
     offset_mm: f64,
 }
 

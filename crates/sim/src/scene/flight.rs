@@ -44,6 +44,7 @@ pub struct Waypoint {
     #[schemars(range(min = 0.0, max = 1000000.0))]
     pub time_s: f64,
     /// Origin of the rig in the room, in meters.
+    #[schemars(inner(range(min = -10000.0, max = 10000.0)))]
     pub position_m: [f64; 3],
     /// Yaw of the rig in the room, in degrees.
     #[serde(default)]

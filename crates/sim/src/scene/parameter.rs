@@ -10,11 +10,14 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct Parameter {
     /// The number.
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub value: f64,
     /// Its minimum; only a parameter with both limits is searched.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub low: Option<f64>,
     /// Its maximum.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -1e12, max = 1e12))]
     pub high: Option<f64>,
 }

@@ -55,6 +55,7 @@ pub struct Room {
     /// Color of walls, floor and ceiling.
     pub color: String,
     /// Origin of the rig in the room, in meters.
+    #[schemars(inner(range(min = -10000.0, max = 10000.0)))]
     pub rig_position_m: [f64; 3],
     /// Yaw of the rig in the room, in degrees.
     #[schemars(range(min = -360.0, max = 360.0))]
@@ -248,8 +249,10 @@ pub struct BoardPose {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub facet: Option<String>,
     /// Center of its face, in meters.
+    #[schemars(inner(range(min = -10000.0, max = 10000.0)))]
     pub center_m: [f64; 3],
     /// Normal of its face; any length.
+    #[schemars(inner(range(min = -10000.0, max = 10000.0)))]
     pub normal: [f64; 3],
     /// Rotation about the normal, in degrees; at 0 the board's x axis is horizontal.
     #[serde(default)]

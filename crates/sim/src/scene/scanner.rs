@@ -85,6 +85,7 @@ impl Scanner {
 #[serde(deny_unknown_fields, default)]
 pub struct Mount {
     /// Origin of the sensor in the rig frame, in millimeters.
+    #[schemars(inner(range(min = -100000.0, max = 100000.0)))]
     pub position_mm: [f64; 3],
     /// Yaw of the sensor in the rig frame, in degrees.
     #[schemars(range(min = -180.0, max = 180.0))]
@@ -118,6 +119,7 @@ impl Default for Mount {
 pub struct Light {
     /// Transmitted peak power P_t, in watts (assumed).
     #[schemars(extend("exclusiveMinimum" = 0.0))]
+    #[schemars(range(min = 0.0, max = 1000000.0))]
     pub power_w: f64,
     /// Transmission of the optics τ_o (assumed).
     #[schemars(range(min = 0.0, max = 1.0))]
@@ -127,9 +129,11 @@ pub struct Light {
     pub air_transmission: f64,
     /// Diameter of the receiver D_R, in millimeters (assumed).
     #[schemars(extend("exclusiveMinimum" = 0.0))]
+    #[schemars(range(min = 0.0, max = 10000.0))]
     pub receiver_diameter_mm: f64,
     /// Solid angle θ_R into which a target scatters, in steradians (π for a Lambertian surface).
     #[schemars(extend("exclusiveMinimum" = 0.0))]
+    #[schemars(range(min = 0.0, max = 100.0))]
     pub target_dispersion_sr: f64,
 }
 

@@ -85,6 +85,7 @@ pub struct BeamShape {
 #[serde(deny_unknown_fields)]
 pub struct HousingBox {
     /// Its center in the sensor frame, in millimeters; the scan plane is z = 0.
+    #[schemars(inner(range(min = -100000.0, max = 100000.0)))]
     pub center_mm: [f64; 3],
     /// Its extents, in millimeters.
     #[schemars(inner(range(min = 0.01, max = 1000.0)))]

@@ -60,10 +60,12 @@ pub struct Post {
     /// Name.
     pub name: String,
     /// Origin of its own frame, in millimeters; the center of a box or cylinder.
+    #[schemars(inner(range(min = -100000.0, max = 100000.0)))]
     pub center_mm: [f64; 3],
     /// Extents of a box along its own x, y and z, in millimeters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(inner(inner(range(min = 0.01, max = 10000.0))))]
+    #[schemars(inner(range(min = 0.0, max = 100000.0)))]
     pub size_mm: Option<[f64; 3]>,
     /// Its shape, if it is not a box.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -96,6 +98,7 @@ pub struct Marker {
     /// Label.
     pub name: String,
     /// Position in the frame of its body, in millimeters.
+    #[schemars(inner(range(min = -100000.0, max = 100000.0)))]
     pub position_mm: [f64; 3],
 }
 

@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 pub struct Recording {
     /// Replace an existing dataset.
     pub replace: bool,
-    /// Write no truth: the dataset is blind.
+    /// Write no truth: the dataset is blind, and its manifest states neither seed nor command.
     pub blind: bool,
     /// Also write what every beam hits, `truth/returns.csv`.
     pub returns: bool,
@@ -153,11 +153,16 @@ fn record(scene: &Scene, out: &Path, recording: &Recording, control: &Control) -
     for (file, _, _) in tables {
         file.finish()?;
     }
-    let manifest = writer.finish(Provenance {
+    let provenance = Provenance {
         seed: scene.seed,
         command_line,
         rng_rule: noise::RULE.to_owned(),
-    })?;
+    };
+    let manifest = if recording.blind {
+        writer.finish_blind(provenance)?
+    } else {
+        writer.finish(provenance)?
+    };
     figures.write_s = (write_time + finish.elapsed()).as_secs_f64();
     let names = manifest.files.keys().map(String::as_str);
     for name in names.chain([dataset::MANIFEST]) {

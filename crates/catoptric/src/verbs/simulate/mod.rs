@@ -57,6 +57,7 @@ pub fn simulate_with(scene: &Scene, control: &Control) -> Result<(Dataset, Truth
             session,
             poses,
             id: None,
+            warnings: Vec::new(),
         };
         Ok((dataset, truth))
     })

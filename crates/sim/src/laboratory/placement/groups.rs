@@ -1,4 +1,4 @@
-//! Groups of beams that one board serves.
+//! Cuts the beams of a scan into groups, one board for each: beams that the same facet deflects, or undeflected neighbors.
 
 use crate::light::optics::{End, RayPath};
 use crate::scene::Board;

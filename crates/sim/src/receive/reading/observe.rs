@@ -1,4 +1,4 @@
-//! One beam in one setting, with all of its light.
+//! What a beam receives in one setting, and where all of its light goes.
 
 use super::part::{Parts, Place};
 use super::returned::Return;

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 pub struct PolygonShape {
     /// Corners of a convex plane polygon, in millimeters, counter-clockwise seen from the reflecting side.
     #[schemars(length(min = 3))]
+    #[schemars(inner(inner(range(min = -100000.0, max = 100000.0))))]
     pub corners_mm: Vec<[f64; 3]>,
 }
 

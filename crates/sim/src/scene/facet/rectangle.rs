@@ -13,8 +13,10 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct RectangleShape {
     /// Center, in millimeters.
+    #[schemars(inner(range(min = -100000.0, max = 100000.0)))]
     pub center_mm: [f64; 3],
     /// Normal of the reflecting side; any length.
+    #[schemars(inner(range(min = -100000.0, max = 100000.0)))]
     pub normal: [f64; 3],
     /// Extent parallel to the scan plane, in millimeters.
     #[schemars(range(min = 0.1, max = 10000.0))]

@@ -1,0 +1,364 @@
+//! The gates of a score: completeness, honesty, distances, mounting and, on blind data, boards and walls.
+
+use super::gate::{ENOUGH, Gate, MIN_SOLVED, Outcome, SIGNIFICANCE, mean_limit, median_limit, worst_limit};
+use super::words::elements;
+use super::{Score, honesty, wrap};
+use crate::validate::{Problem, Severity};
+use catoptric_model::{Calibration, Dataset, Status};
+
+/// Problems that are listed one by one.
+const LISTED: usize = 3;
+
+/// The respects in which a calibration states that it belongs to another dataset.
+fn foreign(dataset: &Dataset, calibration: &Calibration) -> Option<String> {
+    calibration.other_dataset(dataset).map(|[its, this]| {
+        format!("the calibration was made from another dataset (SHA-256 {its}); this one is {this}")
+    })
+}
+
+/// The gate on the file itself.
+pub(super) fn valid(problems: &[Problem]) -> Gate {
+    let errors: Vec<&Problem> = problems
+        .iter()
+        .filter(|p| p.severity == Severity::Error)
+        .collect();
+    if errors.is_empty() {
+        return Gate::at_most("valid", 0.0, 0.0, "the calibration is valid".to_owned());
+    }
+    let mut words: Vec<String> = errors
+        .iter()
+        .take(LISTED)
+        .map(|p| format!("{} {}", place(p), p.message))
+        .collect();
+    if errors.len() > LISTED {
+        words.push(format!(
+            "{} more; `catoptric validate` lists all",
+            errors.len() - LISTED
+        ));
+    }
+    Gate {
+        outcome: Outcome::Invalid,
+        ..Gate::at_most("valid", errors.len() as f64, 0.0, words.join("; "))
+    }
+}
+
+fn place(problem: &Problem) -> String {
+    match problem.beam {
+        Some(beam) => format!("{} (beam {beam})", problem.key),
+        None => problem.key.clone(),
+    }
+}
+
+/// All gates of a score with a truth or without, in the order in which they are reported.
+pub(super) fn gates(
+    score: &Score,
+    dataset: &Dataset,
+    calibration: &Calibration,
+    has_truth: bool,
+) -> Vec<Gate> {
+    let mut gates = vec![valid(&[])];
+    gates.push(match foreign(dataset, calibration) {
+        Some(why) => Gate::of("dataset", false, f64::NAN, why),
+        None if calibration.dataset.is_none() => Gate::without(
+            "dataset",
+            Outcome::NotTested,
+            "the calibration does not state its dataset",
+        ),
+        None => Gate::of(
+            "dataset",
+            true,
+            f64::NAN,
+            "it was made from this dataset".to_owned(),
+        ),
+    });
+    if !has_truth {
+        gates.push(omitted(dataset, calibration));
+        gates.extend(blind(score));
+        return gates;
+    }
+    if score.beams.deflected == Some(0) {
+        gates.extend(of_false(score));
+        gates.push(Gate::without(
+            "solved",
+            Outcome::NotJudged,
+            "no element is deflected by a mirror and unsplit: there is nothing to judge",
+        ));
+        return gates;
+    }
+    gates.extend(missed(score));
+    gates.extend(of_false(score));
+    gates.push(solved(score, MIN_SOLVED));
+    gates.push(covariance(score));
+    gates.extend(directions(score));
+    gates.extend(open(score));
+    gates.extend(distances(score));
+    gates.push(mounting(score));
+    gates
+}
+
+fn missed(score: &Score) -> Option<Gate> {
+    let missed = score.beams.missed?;
+    let words = format!(
+        "{} deflected by a mirror, with neither a direction nor a reason",
+        elements(missed, "is", "are")
+    );
+    Some(Gate::at_most("missed", missed as f64, 0.0, words))
+}
+
+fn of_false(score: &Score) -> Option<Gate> {
+    let wrong = score.beams.wrong?;
+    let words = format!(
+        "{} called solved although no mirror sends {} anywhere",
+        elements(wrong, "is", "are"),
+        if wrong == 1 { "it" } else { "them" }
+    );
+    Some(Gate::at_most("false", wrong as f64, 0.0, words))
+}
+
+/// The gate on completeness: the share of what the boards make knowable that is solved.
+pub(super) fn solved(score: &Score, min_solved: f64) -> Gate {
+    let Some((knowable @ 1.., solved)) = score.knowable.zip(score.knowable_solved) else {
+        return Gate::without("solved", Outcome::NotTested, "the boards determine no element");
+    };
+    let share = solved as f64 / knowable as f64;
+    let words = format!(
+        "{solved} of {knowable} elements that the boards determine are solved, {:.0} %; at least {:.0} % are required",
+        100.0 * share,
+        100.0 * min_solved
+    );
+    Gate::at_least("solved", share, min_solved, words)
+}
+
+/// The gate on how much is stated.
+fn covariance(score: &Score) -> Gate {
+    let scored = score.scored().count();
+    let stated = score.scored().filter(|e| e.mahalanobis_squared.is_some()).count();
+    shares("covariance", "a covariance", stated, scored)
+}
+
+/// A gate on the share of the scored elements that state something; without any there is nothing to judge.
+fn shares(name: &str, what: &str, with: usize, scored: usize) -> Gate {
+    let words = |with: usize| {
+        format!(
+            "{with} of {scored} scored elements state {what}; at least {:.0} % are required",
+            100.0 * ENOUGH
+        )
+    };
+    match (with, scored) {
+        (_, 0) => Gate::without(name, Outcome::NotTested, "no element is scored"),
+        (0, _) => Gate {
+            found: 0.0,
+            at_least: Some(ENOUGH),
+            ..Gate::without(name, Outcome::NotJudged, words(0))
+        },
+        (with, scored) => Gate::at_least(name, with as f64 / scored as f64, ENOUGH, words(with)),
+    }
+}
+
+/// The gates on the honesty of the covariance.
+fn directions(score: &Score) -> Vec<Gate> {
+    let mut gates = Vec::new();
+    if score.nees_mean.is_nan() {
+        return gates;
+    }
+    let limit = mean_limit(2.0);
+    let words = format!(
+        "{}; {limit:.2} is the limit for a mean normalized squared error",
+        honesty::over_confident(score)
+    );
+    let met = score.nees_mean <= limit;
+    let words = if met {
+        format!(
+            "the mean normalized squared error is {:.2}, the limit {limit:.2}",
+            score.nees_mean
+        )
+    } else {
+        words
+    };
+    gates.push(Gate::at_most("directions", score.nees_mean, limit, words).with_rate(SIGNIFICANCE));
+    if let Some((square, limit, element)) = honesty::worst(score) {
+        let words = format!(
+            "the direction of beam {} is {:.1} standard deviations off; {:.1} is the limit for the worst of {}",
+            element.beam,
+            square.sqrt(),
+            limit.sqrt(),
+            counted(score.scored().count())
+        );
+        gates.push(Gate::at_most("worst_direction", square, limit, words).with_rate(SIGNIFICANCE));
+    }
+    let claim = honesty::claim(score);
+    if claim.is_finite() {
+        let words = format!(
+            "it states {claim:.2} times the smallest uncertainty that this dataset allows, and the errors are {:.1} times what it states",
+            score.nees_mean.sqrt()
+        );
+        gates.push(Gate {
+            at_least: Some(honesty::LEAST_CLAIM),
+            ..Gate::of("claim", !honesty::claims_too_much(score), claim, words)
+        });
+    }
+    gates
+}
+
+/// The gate on elements that their own boards leave open.
+///
+/// If all of them share one error, an honest covariance rules out the truth once in a thousand runs, and that of half of
+/// them at most twice, whatever their dependence.
+fn open(score: &Score) -> Option<Gate> {
+    let open = score.open.filter(|o| o.solved > 0)?;
+    let words = format!(
+        "{} left open by the boards and given a direction with a covariance that rules out the truth; abstaining would be correct, and at most half of the {} solved ones are allowed",
+        elements(open.wrong, "is", "are"),
+        open.solved
+    );
+    let share = open.wrong as f64 / open.solved as f64;
+    Some(Gate::at_most("open", share, 0.5, words).with_rate(2e-3))
+}
+
+/// The gates on d.
+fn distances(score: &Score) -> Vec<Gate> {
+    let scored = score.scored().count();
+    let with: Vec<_> = score.scored().filter(|e| e.has_distance).collect();
+    let mut gates = vec![shares("distances", "d", with.len(), scored)];
+    let deviation = |e: &&super::ElementError| (e.estimate.distance - e.truth.distance) / e.distance_sd;
+    let worst = with
+        .iter()
+        .max_by(|a, b| deviation(a).abs().total_cmp(&deviation(b).abs()));
+    let Some(worst) = worst else { return gates };
+    let (limit, rms_sd) = (mean_limit(1.0), sd_of(&with));
+    let words = format!(
+        "the distances are {:.2} mm off (rms), {:.1} times their standard deviation of {rms_sd:.2} mm; {:.1} times is the limit",
+        score.distance_mm.rms,
+        score.distance_nees.sqrt(),
+        limit.sqrt()
+    );
+    gates.push(Gate::at_most("distance", score.distance_nees, limit, words).with_rate(SIGNIFICANCE));
+    let (square, limit) = (deviation(worst).powi(2), worst_limit(1.0, with.len()));
+    let words = format!(
+        "the distance of beam {} is {:+.2} mm off, {:.1} standard deviations; {:.1} is the limit for the worst of {}",
+        worst.beam,
+        1e3 * (worst.estimate.distance - worst.truth.distance),
+        square.sqrt(),
+        limit.sqrt(),
+        counted(with.len())
+    );
+    gates.push(Gate::at_most("worst_distance", square, limit, words).with_rate(SIGNIFICANCE));
+    gates
+}
+
+fn counted(elements: usize) -> String {
+    format!("{elements} element{}", if elements == 1 { "" } else { "s" })
+}
+
+/// Root mean square standard deviation of d, in millimeters.
+fn sd_of(with: &[&super::ElementError]) -> f64 {
+    let sum: f64 = with.iter().map(|e| e.distance_sd * e.distance_sd).sum();
+    1e3 * (sum / with.len() as f64).sqrt()
+}
+
+/// The gate on the mounting.
+fn mounting(score: &Score) -> Gate {
+    let Some(found) = score.mounting else {
+        return Gate::without(
+            "mounting",
+            Outcome::NotTested,
+            "the calibration has no mounting, or the rig was never tracked",
+        );
+    };
+    let limit = mean_limit(6.0);
+    let words = format!(
+        "the mounting is {:.3}° and {:.2} mm off, a mean normalized squared error of {:.2} under {}; {limit:.2} is the limit",
+        found.attitude_deg,
+        found.position_mm,
+        found.nees,
+        if found.states_covariance {
+            "its covariance"
+        } else {
+            "the drawing's tolerance"
+        },
+    );
+    Gate::at_most("mounting", found.nees, limit, words).with_rate(SIGNIFICANCE)
+}
+
+/// Beams inside the fan of a facet as drawn that are not judged, in degrees of the scan: mirrors are off their drawing.
+const DRAWN_WITHIN_DEG: f64 = 3.0;
+
+/// The gate on elements that the drawing has deflected, without a truth: each needs a direction or a reason.
+fn omitted(dataset: &Dataset, calibration: &Calibration) -> Gate {
+    let scan = &dataset.session.scanner.scan;
+    let step = scan.angles().step_deg.abs();
+    let inside = |beam: usize| {
+        let azimuth = scan.azimuth(beam);
+        dataset
+            .session
+            .facets
+            .iter()
+            .filter(|f| scan.holds(f.beams, beam))
+            .any(|f| {
+                let edges = f
+                    .beams
+                    .map(|edge| wrap(scan.azimuth(edge) - azimuth).abs().to_degrees());
+                edges.iter().all(|apart| *apart >= DRAWN_WITHIN_DEG.max(step))
+            })
+    };
+    let missed = (0..scan.beams())
+        .filter(|&beam| inside(beam))
+        .filter(|&beam| match calibration.beam(beam).map(|b| b.status) {
+            None | Some(Status::Direct) => true,
+            Some(
+                Status::Solved
+                | Status::TooFewPoses
+                | Status::Unobservable
+                | Status::NotConverged
+                | Status::Rejected,
+            ) => false,
+        })
+        .count();
+    let words = format!(
+        "{} deflected by a mirror as drawn, with neither a direction nor a reason",
+        elements(missed, "is", "are")
+    );
+    Gate::at_most("missed", missed as f64, 0.0, words)
+}
+
+/// The gates of a score without a truth: how much is stated, and the residuals on boards and walls.
+fn blind(score: &Score) -> Vec<Gate> {
+    let mut gates = vec![shares(
+        "covariance",
+        "a covariance",
+        score.blind_stated,
+        score.beams.solved,
+    )];
+    if score.beams.solved == 0 {
+        gates.push(Gate::without("solved", Outcome::Fail, "no element is solved"));
+        return gates;
+    }
+    let limit = median_limit();
+    let mut judged = false;
+    for (name, residual, normalized) in [
+        ("boards", &score.boards_mm, score.boards_normalized),
+        ("walls", &score.walls_mm, score.walls_normalized),
+    ] {
+        if normalized.is_nan() {
+            gates.push(Gate::without(
+                name,
+                Outcome::NotTested,
+                format!("no solved element reads {name}"),
+            ));
+            continue;
+        }
+        judged = true;
+        let words = format!(
+            "the points are {:.2} mm (rms) off the {name}, and the median element {:.1} times what noise, drift, markers, biases and covariances allow; {:.1} times is the limit",
+            residual.rms,
+            normalized.sqrt(),
+            limit.sqrt()
+        );
+        gates.push(Gate::at_most(name, normalized, limit, words).with_rate(SIGNIFICANCE));
+    }
+    if !judged {
+        let words = "no solved element reads a board or a wall: there is nothing to judge by";
+        gates.push(Gate::without("residuals", Outcome::NotJudged, words));
+    }
+    gates
+}

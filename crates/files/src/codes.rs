@@ -1,0 +1,99 @@
+//! Readings that are no ranges: beside the codes of REP-117, zero and whatever lies beyond the scanner's limits.
+//!
+//! Drivers report "no return" as infinity, NaN, 0, 65.533 m or a distance beyond the longest range. The limits are those of
+//! the session and of the message, whichever are narrower.
+
+use super::messages::single;
+use catoptric_model::range::{INVALID, NO_RETURN, TOO_CLOSE};
+use catoptric_model::session::ScannerSheet;
+
+/// Shortest and longest range, in meters, as 32-bit numbers: readings are recorded as such.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limits {
+    low: f64,
+    high: f64,
+}
+
+/// How many readings of a recording were finite and yet no ranges.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Codes {
+    readings: usize,
+    zero: usize,
+    below: usize,
+    beyond: usize,
+}
+
+impl Limits {
+    /// The narrower of the limits of a session and of a message. A message without a plausible longest range has none.
+    pub(super) fn of(scanner: &ScannerSheet, [low, high]: [f64; 2]) -> Self {
+        let own = [scanner.range_min_m, scanner.range_max_m].map(|limit| f64::from(single(limit)));
+        if low.is_finite() && low >= 0.0 && high > low {
+            Self {
+                low: own[0].max(low),
+                high: own[1].min(high),
+            }
+        } else {
+            Self {
+                low: own[0],
+                high: own[1],
+            }
+        }
+    }
+}
+
+impl Codes {
+    /// Replaces readings that are no ranges by codes of REP-117, and counts them.
+    pub(super) fn replace(&mut self, ranges: &mut [f64], limits: Limits) {
+        self.readings += ranges.len();
+        for range in ranges {
+            if !range.is_finite() || (limits.low..=limits.high).contains(range) {
+                continue;
+            }
+            if *range == 0.0 {
+                self.zero += 1;
+                *range = INVALID;
+            } else if *range < limits.low {
+                self.below += 1;
+                *range = TOO_CLOSE;
+            } else {
+                self.beyond += 1;
+                *range = NO_RETURN;
+            }
+        }
+    }
+
+    /// What was found, if anything: a sentence.
+    pub(super) fn words(&self) -> Option<String> {
+        let kinds = [
+            (self.zero, "0"),
+            (self.below, "below the shortest range"),
+            (self.beyond, "beyond the longest range"),
+        ];
+        let share = |count: usize| 100.0 * count as f64 / self.readings as f64;
+        let found: Vec<String> = kinds
+            .iter()
+            .filter(|(count, _)| *count > 0)
+            .map(|(count, what)| format!("{:.2} % of the readings ({count}) are {what}", share(*count)))
+            .collect();
+        (!found.is_empty()).then(|| format!("{}: they count as missing", found.join(", ")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_are_no_ranges_and_limits_are_ranges() {
+        let (low, high) = (f64::from(0.021_f32), 20.0);
+        let mut ranges = [0.0, low, 1.5, high, 20.5, 65.533, 0.01, f64::INFINITY];
+        let mut codes = Codes::default();
+        codes.replace(&mut ranges, Limits { low, high });
+        assert!(ranges[0].is_nan());
+        assert_eq!(ranges[1..4], [low, 1.5, high]);
+        assert_eq!(ranges[4..], [NO_RETURN, NO_RETURN, TOO_CLOSE, NO_RETURN]);
+        let words = codes.words().expect("four of them are no ranges");
+        assert!(words.contains("12.50 % of the readings (1) are 0") && words.contains("(2) are beyond"));
+        assert_eq!(Codes::default().words(), None);
+    }
+}
