@@ -7,6 +7,11 @@ use catoptric_model::frame::Pose;
 use nalgebra::Point3;
 use std::collections::BTreeMap;
 
+/// Maximum number of motion-capture messages waiting to form frames; stretches with fewer may have them in any order.
+///
+/// Tests use lower limits.
+pub(super) const MOST_WAITING: usize = 1 << if cfg!(test) { 10 } else { 15 };
+
 /// Messages received so far, by time in nanoseconds, and the frames they form.
 #[derive(Default)]
 pub(super) struct Capture {

@@ -47,6 +47,8 @@ mod schedule;
 mod source;
 #[cfg(feature = "recording")]
 mod survey;
+#[cfg(feature = "recording")]
+mod topics;
 
 #[cfg(feature = "scene")]
 pub mod diagnostic;

@@ -12,41 +12,18 @@
 use super::blocks::{Block, Place, Visit};
 use super::bodies::{Bodies, MARKERS_TOPIC};
 use super::codes::Codes;
-use super::definitions::{self, Definition};
 use super::error::IoError;
 use super::gathering::{Gathering, Keep, Known, Whole};
 use super::messages;
 use super::records;
 use super::source::{Entry, Position, Source, Start};
+use super::topics::{LABEL_TOPIC, Text, Topic};
 use catoptric_model::session::ScannerSheet;
 use catoptric_model::{PoseLabel, Session, Stop, Stretch};
 use mcap::records::op;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
-
-/// The content of a channel, in the order in which messages of equal times are taken.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Topic {
-    Label(Text),
-    Scan,
-    Echoes,
-    Pose(usize),
-    Markers,
-    Other,
-}
-
-/// How the text of a label is encoded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Text {
-    /// As a `std_msgs/String`.
-    Message,
-    /// As it is, without a schema.
-    Bare,
-}
-
-/// Topic of the labels.
-pub(super) const LABEL_TOPIC: &str = "/session/pose";
 
 /// What reading a recording makes of it.
 pub(super) struct Played<R: Keep> {
@@ -245,7 +222,7 @@ impl<'a, R: Keep> Playback<'a, R> {
                     .schemas
                     .get(&channel.schema)
                     .map_or("no schema", String::as_str);
-                let topic = self.topic(channel.topic, schema, channel.encoding)?;
+                let topic = Topic::of(channel.topic, schema, channel.encoding, &self.bodies)?;
                 self.names.insert(channel.topic.to_owned());
                 self.topics.insert(channel.id, topic);
             }
@@ -257,33 +234,6 @@ impl<'a, R: Keep> Playback<'a, R> {
 
     fn no_channel(&self, channel: u16) -> String {
         format!("a message on channel {channel}, which does not exist")
-    }
-
-    /// The meaning of a topic.
-    fn topic(&self, topic: &str, schema: &str, encoding: &str) -> Result<Topic, String> {
-        let expect = |definition: Definition, found: Topic| {
-            if schema == definition.name && encoding == "cdr" {
-                return Ok(found);
-            }
-            Err(format!(
-                "{topic} holds {schema} as {encoding:?}, {} as \"cdr\" is needed",
-                definition.name
-            ))
-        };
-        match topic {
-            "/scan" => expect(definitions::LASER_SCAN, Topic::Scan),
-            "/echoes" => expect(definitions::MULTI_ECHO_SCAN, Topic::Echoes),
-            LABEL_TOPIC if encoding == "json" => Ok(Topic::Label(Text::Bare)),
-            LABEL_TOPIC => expect(definitions::STRING, Topic::Label(Text::Message)),
-            _ => match topic.strip_prefix("/mocap/") {
-                Some(MARKERS_TOPIC) => expect(definitions::MARKERS, Topic::Markers),
-                Some(subject) => match self.bodies.position(subject) {
-                    Some(body) => expect(definitions::POSE_STAMPED, Topic::Pose(body)),
-                    None => Ok(Topic::Other),
-                },
-                None => Ok(Topic::Other),
-            },
-        }
     }
 
     /// Processes a message, given the index of its block and its index there.

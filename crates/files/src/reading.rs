@@ -6,9 +6,10 @@
 use super::blocks::Place;
 use super::error::IoError;
 use super::lost::{Habit, Sieve};
-use super::playback::{LABEL_TOPIC, Played, play};
+use super::playback::{Played, play};
 use super::source::Source;
 use super::survey::{Survey, Surveyed};
+use super::topics::LABEL_TOPIC;
 use catoptric_model::motion::LONGEST_GAP_S;
 use catoptric_model::place::nearest;
 use catoptric_model::{PoseKind, PoseRecord, Session, Stop};

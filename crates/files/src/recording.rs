@@ -21,6 +21,7 @@ use super::error::IoError;
 use super::messages::{self, FrameTransform, LASER_FRAME, LabeledMarker, ROOM_FRAME};
 pub use super::schedule::EPOCH_NS;
 use super::schedule::{Event, Simultaneous, schedule, simultaneous_frames};
+use super::topics::LABEL_TOPIC;
 use catoptric_model::dataset::{RIG_SUBJECT, nanoseconds};
 use catoptric_model::frame::Pose;
 use catoptric_model::session::ScannerSheet;
@@ -105,7 +106,7 @@ impl<W: Write> RecordingWriter<W> {
             .map(|b| add(&topic(&b.subject), definitions::POSE_STAMPED))
             .collect();
         let markers = add(&topic(MARKERS_TOPIC), definitions::MARKERS);
-        let label = add_channel(&mut container, "/session/pose", definitions::STRING);
+        let label = add_channel(&mut container, LABEL_TOPIC, definitions::STRING);
         let encoder = RecordingEncoder {
             path: path.to_owned(),
             scanner: session.scanner.clone(),

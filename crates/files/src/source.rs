@@ -2,13 +2,12 @@
 
 use super::blocks::{Block, Place, Records};
 use super::bodies::Bodies;
-use super::capture::Capture;
+use super::capture::{Capture, MOST_WAITING};
 use super::codes::{Codes, Limits};
 use super::error::IoError;
 use super::messages;
-use super::playback::Topic;
 use super::records;
-use super::survey::MOST_WAITING;
+use super::topics::Topic;
 use catoptric_model::session::ScannerSheet;
 use catoptric_model::{ScanSource, Scans, Stop, TrackedFrame, Unreadable};
 use mcap::records::op;

@@ -4,7 +4,7 @@
 //! frames have been counted.
 
 use super::bodies::Bodies;
-use super::capture::Capture;
+use super::capture::{Capture, MOST_WAITING};
 use super::error::IoError;
 use super::gathering::{Gathering, Keep, Known, followed};
 use super::lost::{Seen, Sieve};
@@ -16,11 +16,6 @@ use catoptric_model::{BeamStatistics, Gathered, ModelError, Motion, Pose, PoseKi
 use catoptric_model::{Readings, ScanSource, TrackedFrame, Unreadable, Watched};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// Maximum number of motion-capture messages waiting to form frames; stretches with fewer may have them in any order.
-///
-/// Tests use lower limits.
-pub(super) const MOST_WAITING: usize = 1 << if cfg!(test) { 10 } else { 15 };
 
 /// Maximum number of marker displacements held for their median; more than that take additional passes.
 const MOST_JUMPS: usize = 1 << if cfg!(test) { 12 } else { 20 };

@@ -1,8 +1,9 @@
 //! Counts of elements by outcome: solved, abstained, missed, false, open, and by status.
 
 use super::element::solved;
+use super::statistics::CHI_SQUARED_999;
 use super::statistics::mean;
-use super::{ApartScore, BeamCounts, CHI_SQUARED_999, ElementError, OpenCounts};
+use super::{ApartScore, BeamCounts, ElementError, OpenCounts};
 use catoptric_model::{BeamEstimate, Calibration, Dataset, Status};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;

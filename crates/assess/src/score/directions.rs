@@ -1,10 +1,13 @@
 //! Errors of directions and points, from estimated and true rays in one frame.
 
 use super::statistics::{best_rotation, largest, percentile, rms, rotation_angle};
-use super::{ElementError, POINT_RANGES_M, PointError, Spread};
+use super::{ElementError, PointError, Spread};
 use catoptric_model::frame::Pose;
 use catoptric_model::{Deflection, ScanGeometry, beam};
 use nalgebra::{Rotation3, Unit, Vector3};
+
+/// Distances behind the mirror at which point errors are computed, in meters.
+pub const POINT_RANGES_M: [f64; 3] = [1.0, 4.0, 10.0];
 
 /// Errors of directions and points.
 pub(super) struct Directions {

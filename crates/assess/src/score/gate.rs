@@ -1,11 +1,10 @@
-//! Gates: what a score has to meet, each with what was found and what is allowed, and the verdict that follows from all.
+//! Gates: what a score has to meet, each with what was found and what is allowed.
 //!
 //! A gate on a statistic states its false-alarm rate: the largest probability, over all dependences between elements,
 //! that a calibration with honest covariances does not meet it. The elements of one experiment share errors, in the worst
 //! case all of them one and the same; the mean of their normalized squares is then a single χ²/k with k degrees of
 //! freedom, and no dependence gives the mean a heavier upper tail. For the worst of n elements the bound is Bonferroni's.
 
-use super::Verdict;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -111,22 +110,6 @@ impl Gate {
     }
 }
 
-/// The verdict that follows from some gates.
-pub(super) fn verdict(gates: &[Gate], has_truth: bool) -> Verdict {
-    let any = |outcome| gates.iter().any(|g| g.outcome == outcome);
-    if any(Outcome::Invalid) {
-        Verdict::Invalid
-    } else if any(Outcome::Fail) {
-        Verdict::Fail
-    } else if any(Outcome::NotJudged) {
-        Verdict::NotJudged
-    } else if has_truth {
-        Verdict::Pass
-    } else {
-        Verdict::Blind
-    }
-}
-
 /// The value that the mean of normalized squared errors, each with mean 1 and `freedom` degrees of freedom, exceeds with
 /// probability [`SIGNIFICANCE`] if all of them are one and the same error.
 pub fn mean_limit(freedom: f64) -> f64 {
@@ -150,6 +133,15 @@ fn exceeded(freedom: f64, probability: f64) -> f64 {
     ChiSquared::new(freedom).map_or(f64::NAN, |d| d.inverse_cdf(1.0 - probability))
 }
 
+/// "1 element is", "2 elements are".
+pub(super) fn elements(count: usize, one: &str, many: &str) -> String {
+    if count == 1 {
+        format!("1 element {one}")
+    } else {
+        format!("{count} elements {many}")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -163,20 +155,5 @@ mod tests {
         // −2·ln(0.005/400).
         assert!((worst_limit(2.0, 400) - 22.580).abs() < 1e-2);
         assert!((median_limit() - 9.141).abs() < 1e-3);
-    }
-
-    #[test]
-    fn the_worst_outcome_decides() {
-        let gate = |outcome| Gate::without("a", outcome, "");
-        for (outcomes, expected) in [
-            (&[Outcome::Pass, Outcome::NotTested][..], Verdict::Pass),
-            (&[Outcome::Pass, Outcome::NotJudged], Verdict::NotJudged),
-            (&[Outcome::NotJudged, Outcome::Fail], Verdict::Fail),
-            (&[Outcome::Fail, Outcome::Invalid], Verdict::Invalid),
-        ] {
-            let gates: Vec<Gate> = outcomes.iter().map(|o| gate(*o)).collect();
-            assert_eq!(verdict(&gates, true), expected);
-        }
-        assert_eq!(verdict(&[gate(Outcome::Pass)], false), Verdict::Blind);
     }
 }

@@ -5,8 +5,8 @@
 
 use super::bound::bounds;
 use super::gate::{ENOUGH, mean_limit, worst_limit};
+use super::verdict::{DOUBTFUL, Honesty, OVER, UNDER};
 use super::{ElementError, Score};
-use serde::Serialize;
 
 /// Mean NEES above which a covariance is doubtful: −ln 0.05. An honest one exceeds it in at most one run of twenty.
 const DOUBTFUL_NEES: f64 = 2.995_732_273_553_991;
@@ -20,37 +20,6 @@ const BEYOND_LIMIT_NEES: f64 = 2.0;
 pub(super) const LEAST_CLAIM: f64 = 0.5;
 /// Error below which only rounding is to blame, in degrees.
 pub(super) const NEGLIGIBLE_DEG: f64 = 1e-6;
-
-/// First words of the warnings.
-pub(super) const OVER: &str = "over-confident";
-pub(super) const UNDER: &str = "under-confident";
-pub(super) const DOUBTFUL: &str = "doubtful";
-
-/// Whether errors are as large as the stated covariance.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Honesty {
-    /// They are, as far as one run can show.
-    Honest,
-    /// They are larger than an honest covariance has them in one run of twenty, but not large enough to be sure.
-    Doubtful,
-    /// They are larger.
-    OverConfident,
-    /// They are much smaller.
-    UnderConfident,
-}
-
-impl Honesty {
-    /// The words used in tables and on pages.
-    pub fn words(self) -> &'static str {
-        match self {
-            Self::Honest => "honest",
-            Self::Doubtful => DOUBTFUL,
-            Self::OverConfident => OVER,
-            Self::UnderConfident => UNDER,
-        }
-    }
-}
 
 /// Judges the honesty of a score; `None` unless nearly all that is scored states a covariance, or if the errors are only
 /// numerical.

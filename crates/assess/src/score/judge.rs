@@ -1,7 +1,8 @@
 //! The gates of a score: completeness, honesty, distances, mounting and, on blind data, boards and walls.
 
-use super::gate::{ENOUGH, Gate, MIN_SOLVED, Outcome, SIGNIFICANCE, mean_limit, median_limit, worst_limit};
-use super::words::elements;
+use super::gate::{
+    ENOUGH, Gate, MIN_SOLVED, Outcome, SIGNIFICANCE, elements, mean_limit, median_limit, worst_limit,
+};
 use super::{Score, honesty, wrap};
 use crate::validate::{Problem, Severity};
 use catoptric_model::{Calibration, Dataset, Status};

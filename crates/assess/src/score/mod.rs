@@ -29,11 +29,14 @@ mod figures;
 pub mod gate;
 mod honesty;
 mod judge;
+mod limits;
+mod mistake;
 mod mistakes;
 mod mounting;
 mod nulls;
 pub mod residual;
 mod statistics;
+mod verdict;
 pub mod words;
 
 use crate::validate::{Severity, validate_for};
@@ -53,26 +56,19 @@ pub(crate) use statistics::mahalanobis_squared;
 
 pub use bound::{Knowable, knowable};
 pub use bound::{bounds, true_directions};
+pub use directions::POINT_RANGES_M;
 pub use element::ElementError;
-pub use figures::{ApartScore, BeamCounts, DistanceError, OpenCounts, PointError, Score, Spread, Verdict};
+pub use figures::{ApartScore, BeamCounts, DistanceError, OpenCounts, PointError, Score, Spread};
 pub use gate::{Gate, MIN_SOLVED, Outcome};
-pub use honesty::Honesty;
-pub use mistakes::Mistake;
+pub use mistake::Mistake;
 pub use mounting::Mounting;
 pub use residual::SurfaceResidual;
 pub use statistics::percentile;
+pub use statistics::{CHI_SQUARED_95, CHI_SQUARED_999};
+pub use verdict::{Honesty, Verdict};
 
 /// Version of what `score --json` prints.
 pub const SCHEMA_VERSION: u32 = 1;
-
-/// 95 % quantile of χ² with two degrees of freedom: −2·ln 0.05.
-pub const CHI_SQUARED_95: f64 = 5.991_464_547_107_979;
-
-/// 99.9 % quantile of the same: −2·ln 0.001.
-pub const CHI_SQUARED_999: f64 = 13.815_510_557_964_274;
-
-/// Distances behind the mirror at which point errors are computed, in meters.
-pub const POINT_RANGES_M: [f64; 3] = [1.0, 4.0, 10.0];
 
 /// Scores a calibration against the truth, `&truth`; without one, `None`, against boards and walls only.
 ///

@@ -4,6 +4,12 @@ use nalgebra::{Matrix2, Matrix3, Rotation3, Unit, Vector2, Vector3};
 
 type Direction = Unit<Vector3<f64>>;
 
+/// 95 % quantile of χ² with two degrees of freedom: −2·ln 0.05.
+pub const CHI_SQUARED_95: f64 = 5.991_464_547_107_979;
+
+/// 99.9 % quantile of the same: −2·ln 0.001.
+pub const CHI_SQUARED_999: f64 = 13.815_510_557_964_274;
+
 /// Root mean square; NaN if there are no values.
 pub(super) fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     mean(values.into_iter().map(|v| v * v)).sqrt()

@@ -1,9 +1,10 @@
 //! The verdict of a score, with its reasons and warnings as text.
 
-use super::gate::{ENOUGH, Gate, Outcome};
-use super::honesty::{self, Honesty};
+use super::gate::{ENOUGH, Gate, Outcome, elements};
+use super::honesty;
 use super::mistakes;
 use super::nulls::nulls;
+use super::verdict::{DOUBTFUL, Honesty, UNDER};
 use super::{Score, judge};
 use catoptric_model::{Calibration, Dataset, Pose, Status};
 use catoptric_sim::Truth;
@@ -21,7 +22,7 @@ const UNSOLVED: &str = "elements were not solved";
 
 /// Whether a warning is about accuracy, covariance or abstentions, which a report covers anyway.
 pub fn is_covered_by_report(warning: &str) -> bool {
-    [honesty::DOUBTFUL, honesty::UNDER, COMMON, UNSOLVED]
+    [DOUBTFUL, UNDER, COMMON, UNSOLVED]
         .iter()
         .any(|words| warning.contains(words))
 }
@@ -174,13 +175,4 @@ fn without_numbers(text: &str) -> String {
         }
     });
     words.collect::<Vec<_>>().join(" ")
-}
-
-/// "1 element is", "2 elements are".
-pub fn elements(count: usize, one: &str, many: &str) -> String {
-    if count == 1 {
-        format!("1 element {one}")
-    } else {
-        format!("{count} elements {many}")
-    }
 }

@@ -1,8 +1,8 @@
 //! Validation of one element: a status consistent with the rest, plausible angles and distance, valid covariances.
 
 use super::problem::OfBeam;
+use super::sane::{ANGLE_SD_RAD, MIRROR_DISTANCE_M};
 use super::sane::{check_covariance, is_unit};
-use super::{ANGLE_SD_RAD, MIRROR_DISTANCE_M};
 use catoptric_model::{BeamEstimate, Status};
 use nalgebra::SVector;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};

@@ -11,16 +11,9 @@ use element::check_element;
 use problem::Problems;
 use shared::{check_bias, check_facet, check_mount};
 use std::collections::BTreeSet;
-use std::f64::consts::PI;
 
 pub use problem::{Problem, Severity};
-
-/// Maximum distance of a mirror from the scanner, in meters; larger values are probably millimeters.
-pub const MIRROR_DISTANCE_M: f64 = 10.0;
-
-/// Minimum and maximum plausible standard deviation of an angle, in radians: a millionth of the smallest ever measured,
-/// and half a turn, which is no information at all.
-pub const ANGLE_SD_RAD: [f64; 2] = [1e-10, PI];
+pub use sane::{ANGLE_SD_RAD, MIRROR_DISTANCE_M};
 
 /// Hexadecimal digits of a SHA-256.
 const SHA256_DIGITS: usize = 64;

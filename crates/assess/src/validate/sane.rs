@@ -1,7 +1,14 @@
 //! Plausibility checks of unit vectors, coordinates and covariances.
 
-use super::MIRROR_DISTANCE_M;
 use nalgebra::DMatrix;
+use std::f64::consts::PI;
+
+/// Maximum distance of a mirror from the scanner, in meters; larger values are probably millimeters.
+pub const MIRROR_DISTANCE_M: f64 = 10.0;
+
+/// Minimum and maximum plausible standard deviation of an angle, in radians: a millionth of the smallest ever measured,
+/// and half a turn, which is no information at all.
+pub const ANGLE_SD_RAD: [f64; 2] = [1e-10, PI];
 
 /// Tolerance of the length of a normal or a quaternion: well above the effect of rounding to nine digits.
 const UNIT_TOLERANCE: f64 = 1e-6;

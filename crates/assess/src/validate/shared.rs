@@ -1,7 +1,7 @@
 //! Validation of what elements share: facets, the mounting of the sensor, range biases.
 
-use super::MIRROR_DISTANCE_M;
 use super::problem::Problems;
+use super::sane::MIRROR_DISTANCE_M;
 use super::sane::{check_covariance, is_near, is_unit};
 use catoptric_model::RangeBias;
 use catoptric_model::calibration::{FacetEstimate, MountEstimate};

@@ -2,8 +2,8 @@
 //! recording are detected.
 
 use super::*;
+use crate::capture::MOST_WAITING;
 use crate::dataset::{OBSERVATIONS, parse_dataset};
-use crate::survey::MOST_WAITING;
 use catoptric_model::{Dataset, PoseRecord, Readings};
 use std::fs;
 

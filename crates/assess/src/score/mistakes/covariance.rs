@@ -1,6 +1,6 @@
 //! A covariance read in another way: another order, unit, or standard deviations in its place.
 
-use super::Mistake;
+use crate::score::mistake::Mistake;
 use crate::score::statistics::{mahalanobis_squared, mean};
 use crate::score::{ElementError, Honesty, Score, wrap};
 use catoptric_model::Calibration;

@@ -1,6 +1,6 @@
 //! Directions read in another way: angles, units, order, axes, frame, numbering of the beams, the mirror's normal.
 
-use super::{LEFT, Mistake};
+use crate::score::mistake::{LEFT, Mistake};
 use crate::score::{ElementError, Score};
 use catoptric_model::{Calibration, Dataset, Deflection, Pose, ScanGeometry, Status, beam, mirror};
 use catoptric_sim::Truth;

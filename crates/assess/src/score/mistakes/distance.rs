@@ -1,6 +1,6 @@
 //! Distances read in another way: another unit, reference or path, or a constant that all of them share.
 
-use super::{LEFT, Mistake};
+use crate::score::mistake::{LEFT, Mistake};
 use crate::score::{ElementError, Score};
 use catoptric_model::{Dataset, beam, mirror};
 use nalgebra::Vector3;

@@ -1,6 +1,6 @@
 //! A mounting read in another way: the inverse, another order of the quaternion, another unit.
 
-use super::{LEFT, Mistake};
+use crate::score::mistake::{LEFT, Mistake};
 use crate::score::{Mounting, gate};
 use catoptric_model::calibration::MountEstimate;
 use catoptric_model::{Pose, PoseData};
