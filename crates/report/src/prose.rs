@@ -1,7 +1,7 @@
 //! Plain-language summaries of an experiment and of a score, as paragraphs of the report.
 
 use super::page::{escape, number};
-use catoptric_assess::score::{Honesty, Score, words as score_words};
+use catoptric_assess::score::{Honesty, Score, gate, words as score_words};
 use catoptric_model::{Calibration, Dataset, PoseKind};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
@@ -229,7 +229,7 @@ fn plural(count: usize, noun: &str) -> String {
 }
 
 fn elements_are(count: usize) -> String {
-    score_words::elements(count, "is", "are")
+    gate::elements(count, "is", "are")
 }
 
 #[cfg(test)]

@@ -134,7 +134,7 @@ fn exceeded(freedom: f64, probability: f64) -> f64 {
 }
 
 /// "1 element is", "2 elements are".
-pub(super) fn elements(count: usize, one: &str, many: &str) -> String {
+pub fn elements(count: usize, one: &str, many: &str) -> String {
     if count == 1 {
         format!("1 element {one}")
     } else {

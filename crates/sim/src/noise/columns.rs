@@ -4,6 +4,7 @@
 
 use super::draws::{Draws, Purpose, WORDS_PER_COLUMN, box_muller, standard_uniform};
 use crate::lanes::{LANES, cosine, logarithm};
+use fearless_simd::{Level, dispatch};
 
 /// Bytes per column.
 const BLOCK: usize = 4 * WORDS_PER_COLUMN;
@@ -50,6 +51,12 @@ impl Columns {
 
     /// The result of [`Draws::normal`] in every column after `after` uniform draws.
     pub fn normals(&self, after: usize, out: &mut Vec<f64>) {
+        dispatch!(Level::new(), _simd => self.normals_in_lanes(after, out));
+    }
+
+    /// [`Columns::normals`] with the instructions of its caller: wider ones are faster, and the bits are the same.
+    #[inline(always)]
+    fn normals_in_lanes(&self, after: usize, out: &mut Vec<f64>) {
         out.clear();
         out.reserve(self.len());
         let mut groups = self.bytes.chunks_exact(BLOCK * LANES);
@@ -67,6 +74,7 @@ impl Columns {
 }
 
 /// A 64-bit word of a block.
+#[inline(always)]
 fn word(block: &[u8], index: usize) -> u64 {
     let mut bytes = [0; 8];
     bytes.copy_from_slice(&block[8 * index..8 * index + 8]);
@@ -74,6 +82,7 @@ fn word(block: &[u8], index: usize) -> u64 {
 }
 
 /// [`box_muller`] of several pairs.
+#[inline(always)]
 fn normal(first: &[f64; LANES], second: &[f64; LANES]) -> [f64; LANES] {
     let mut out = [0.0; LANES];
     let mut rare = false;

@@ -108,6 +108,7 @@ impl Draws {
 }
 
 /// A number in the open interval (0, 1) from 64 random bits.
+#[inline(always)]
 pub(super) fn standard_uniform(bits: u64) -> f64 {
     ((bits >> 11) as f64 + 0.5) * (1.0 / (1_u64 << 53) as f64)
 }
