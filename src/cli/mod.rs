@@ -88,8 +88,8 @@ enum Verb {
     Apply(apply::Arguments),
     /// Write an HTML page about calibrations and their scores
     Report(report::Arguments),
-    /// Print the JSON Schema of scenes
-    Schema,
+    /// Print the JSON Schema of scenes, or of another file, with the limits of its numbers
+    Schema(schema::Arguments),
     /// Print the completion script of a shell
     Completions(completions::Arguments),
     /// Print the manual page, or write all of them
@@ -160,7 +160,7 @@ fn dispatch(verb: &Verb, context: &Context) -> Result<(), CliError> {
         Verb::Report(arguments) => report::run(arguments, context),
         Verb::New(arguments) => new::run(arguments),
         Verb::Check(arguments) => check::run(arguments, context),
-        Verb::Schema => schema::run(),
+        Verb::Schema(arguments) => schema::run(arguments),
         Verb::Completions(arguments) => completions::run(arguments, Cli::command()),
         Verb::Man(arguments) => man::run(arguments, Cli::command()),
     }

@@ -8,7 +8,7 @@ use catoptric_cast::Ray;
 use catoptric_sim::trace::{Fate, Vertex};
 use nalgebra::{Point3, Unit, Vector3};
 use std::fs::File;
-use std::io::{BufReader, ErrorKind, Read};
+use std::io::{BufReader, Cursor, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 /// Columns of rays, in the order of an array.
@@ -63,12 +63,12 @@ pub struct RayReader {
 
 enum Source {
     Csv {
-        reader: Box<csv::Reader<File>>,
+        reader: Box<csv::Reader<Box<dyn Read>>>,
         /// Position in a row of each of the six columns.
         order: [usize; 6],
     },
     Npy {
-        reader: BufReader<File>,
+        reader: BufReader<Box<dyn Read>>,
         float: Float,
         left: usize,
     },
@@ -80,9 +80,21 @@ impl RayReader {
     /// # Errors
     /// [`IoError`] if it cannot be read or does not have the header of rays.
     pub fn open(path: &Path) -> Result<Self, IoError> {
-        let format = Format::of(path)?;
+        Format::of(path)?;
         let file = File::open(path).map_err(|e| IoError::read(path, e))?;
-        let source = match format {
+        Self::of(Box::new(file), path)
+    }
+
+    /// Reads the header of a file from its bytes; `path` determines the format and names the file in errors.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn parse(bytes: &[u8], path: &Path) -> Result<Self, IoError> {
+        Self::of(Box::new(Cursor::new(bytes.to_vec())), path)
+    }
+
+    fn of(file: Box<dyn Read>, path: &Path) -> Result<Self, IoError> {
+        let source = match Format::of(path)? {
             Format::Csv => {
                 let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
                 let header = reader.headers().map_err(|e| csv_error(path, e))?;

@@ -3,7 +3,8 @@
 //! A scene is read in steps, and all problems of the first step that finds any are reported: the format
 //! against the schema, then its semantics ([`catoptric_sim::check`]).
 
-use super::diagnostic::{Diagnostic, Diagnostics, Place, position};
+use super::diagnostic::{Diagnostic, Diagnostics, Lines, Place};
+use super::door::schema_of;
 use super::error::IoError;
 #[cfg(feature = "recording")]
 use super::file::sha256;
@@ -16,6 +17,7 @@ use catoptric_model::place::{Problem, nearest};
 use catoptric_sim::Scene;
 use catoptric_sim::build::pattern::{self, Expanded};
 use catoptric_sim::check;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -119,7 +121,7 @@ pub fn load_text(path: &Path, sets: &[String]) -> Result<(String, Scene), SceneE
         Err(error) => {
             let valid = error.utf8_error().valid_up_to();
             let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
-            let (line, column) = position(&text, valid);
+            let (line, column) = Lines::of(&text).position(valid);
             Err(invalid(
                 &name,
                 &text,
@@ -332,7 +334,7 @@ pub fn to_toml(scene: &Scene) -> Result<String, toml::ser::Error> {
 
 /// JSON Schema of a scene whose expressions have been evaluated.
 pub fn json_schema() -> serde_json::Value {
-    schemars::schema_for!(Scene).to_value()
+    schema_of::<Scene>()
 }
 
 /// JSON Schema of a scene file, for editors: numbers may be expressions.
@@ -347,17 +349,17 @@ fn departures(
     schema: &serde_json::Value,
     syntax: &[Diagnostic],
 ) -> Vec<format::Finding> {
-    let broken_lines: Vec<usize> = syntax
+    let lines = Lines::of(text);
+    let broken_lines: BTreeSet<usize> = syntax
         .iter()
         .filter_map(|d| match &d.place {
-            Place::Span(span) => Some(position(text, span.start).0),
+            Place::Span(span) => Some(lines.line(span.start).0),
             _ => None,
         })
         .collect();
     let explained = |finding: &format::Finding| match &finding.source {
         Source::File(span) => {
-            !broken_lines.is_empty()
-                && (finding.missing || broken_lines.contains(&position(text, span.start).0))
+            !broken_lines.is_empty() && (finding.missing || broken_lines.contains(&lines.line(span.start).0))
         }
         _ => false,
     };
