@@ -11,17 +11,21 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 /// Name of a reader, and what reads the bytes of a file.
-pub type Reader = (&'static str, fn(&[u8]));
+pub(super) type Reader = (&'static str, fn(&[u8]));
 
 /// All readers.
-pub const READERS: [Reader; 14] = [
+pub(super) const READERS: [Reader; 14] = [
     ("scene", scene_text),
     ("expression", expression),
     ("session", |bytes| done(parse_session(bytes, "session.toml"))),
     ("manifest", |bytes| done(parse_manifest(bytes, "manifest.json"))),
     ("truth", |bytes| done(parse_truth(bytes, "truth.json"))),
-    ("calibration", |bytes| done(parse_calibration(bytes, Path::new("calibration.json")))),
-    ("characterization", |bytes| done(parse_characterization(bytes, Path::new("characterization.json")))),
+    ("calibration", |bytes| {
+        done(parse_calibration(bytes, Path::new("calibration.json")))
+    }),
+    ("characterization", |bytes| {
+        done(parse_characterization(bytes, Path::new("characterization.json")))
+    }),
     ("rays", |bytes| all_rays(bytes, "rays.csv")),
     ("npy", |bytes| all_rays(bytes, "rays.npy")),
     ("stl", |bytes| done(mesh::parse_mesh(bytes, "mesh.stl"))),
@@ -40,14 +44,22 @@ fn done<T, E: std::fmt::Display>(read: Result<T, E>) {
 
 /// A scene as TOML, or as JSON if it begins with a brace.
 fn scene_text(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else { return };
-    let name = if text.starts_with('{') { "scene.json" } else { "scene.toml" };
+    let Ok(text) = std::str::from_utf8(bytes) else {
+        return;
+    };
+    let name = if text.starts_with('{') {
+        "scene.json"
+    } else {
+        "scene.toml"
+    };
     done(scene::parse(text, name, &[]));
 }
 
 /// An expression in the place of a number of a scene; its parameters are `a` to `d`.
 fn expression(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    let Ok(text) = std::str::from_utf8(bytes) else {
+        return;
+    };
     let text = text.escape_default();
     let scene = format!(
         "[parameters]\na = 1\nb = {{ value = 2.5, low = 1, high = 3 }}\nc = \"= a + b\"\nd = \"={text}\"\n[room]\nsize_m = [\"={text}\"]\n"
@@ -80,7 +92,11 @@ fn session() -> &'static Session {
 
 /// A recording, frame by frame and as a dataset.
 fn recording(bytes: &[u8]) {
-    done(playback::parse_recording(bytes, Path::new("observations.mcap"), session()));
+    done(playback::parse_recording(
+        bytes,
+        Path::new("observations.mcap"),
+        session(),
+    ));
     done(parse_dataset(session().clone(), bytes));
 }
 

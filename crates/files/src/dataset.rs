@@ -17,6 +17,7 @@ use super::file::{sha256, sha256_file};
 use super::folder::{Occupant, StagedFile, StagedFolder, list};
 use super::json::to_json;
 use super::manifest::{Manifest, Provenance};
+use super::paths::unread;
 use super::playback::read_recording;
 use super::reading::{Damage, Records, records};
 use super::recording::{Encoded, RecordingEncoder, RecordingWriter};
@@ -323,7 +324,10 @@ fn read_hashes(dataset: &Path) -> Result<Option<BTreeMap<String, String>>, IoErr
 /// The manifest, if there is one.
 pub(super) fn read_manifest(dataset: &Path) -> Result<Option<Manifest>, IoError> {
     // Reported before any missing file: the wrong folder was given.
-    if !dataset.join(SESSION).is_file() && dataset.exists() {
+    if let Err(missing) = fs::metadata(dataset) {
+        return Err(IoError::read(dataset, unread(dataset, missing)));
+    }
+    if !dataset.join(SESSION).is_file() {
         let reason = format!("it is no dataset: there is no {SESSION} in it");
         return Err(IoError::read(
             dataset,

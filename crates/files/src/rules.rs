@@ -8,7 +8,7 @@ use super::manifest::Manifest;
 use catoptric_model::place::{KeyPath, Problem};
 use catoptric_model::{Calibration, Characterization, PoseData, RangeBias, Session, covariance};
 use std::collections::BTreeMap;
-use std::fmt::Display;
+use std::fmt::{Debug, Display};
 
 /// Tolerance of the length of a quaternion or a normal that was written by hand with one decimal.
 const UNIT_TOLERANCE: f64 = 0.1;
@@ -28,11 +28,11 @@ impl Found {
     }
 
     /// Requires that names, or numbers that serve as names, occur once.
-    fn unique<T: Ord + Display>(&mut self, list: &KeyPath, key: &str, names: impl Iterator<Item = T>) {
+    fn unique<T: Ord + Debug>(&mut self, list: &KeyPath, key: &str, names: impl Iterator<Item = T>) {
         let mut seen = BTreeMap::new();
         for (i, name) in names.enumerate() {
             if let Some(first) = seen.get(&name) {
-                let message = format!("is {name}, as `{list}[{first}]` is; it may occur once");
+                let message = format!("is {name:?}, as in `{list}[{first}]`: it is listed more than once");
                 self.add(&list.index(i).key(key), message);
             } else {
                 seen.insert(name, i);
