@@ -17,6 +17,10 @@ words:
     tests/words
     typos
 
+# every reader fed with mutated files, SECONDS each
+fuzz SECONDS="280" *READERS:
+    fuzz/run {{ SECONDS }} {{ READERS }}
+
 # the whole story, and its report
 demo:
     cargo run --release --locked -- demo

@@ -4,7 +4,9 @@ use super::context::{Context, Reading};
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print};
+use super::validate::invalid;
 use catoptric::files::cloud::CloudFormat;
+use catoptric::validate::{Severity, validate_for};
 use catoptric::{CloudFrame, apply_into, read_calibration_for};
 use clap::Args;
 use std::path::PathBuf;
@@ -39,6 +41,10 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     CloudFormat::of_path(path).map_err(|e| CliError::invalid(e.to_string(), None))?;
     let dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
     let calibration = read_calibration_for(&arguments.calibration, &dataset.session)?;
+    let problems = validate_for(&calibration, &dataset.session);
+    if problems.iter().any(|p| p.severity == Severity::Error) {
+        return Err(invalid(&arguments.calibration, &problems));
+    }
     let cloud = apply_into(&dataset, &calibration, arguments.pose, arguments.frame, path)?;
     if cloud.mount_is_nominal {
         context.say("the calibration has no mounting: using the one of the drawing");

@@ -88,8 +88,8 @@ enum Verb {
     Apply(apply::Arguments),
     /// Write an HTML page about calibrations and their scores
     Report(report::Arguments),
-    /// Print the JSON Schema of scenes
-    Schema,
+    /// Print the JSON Schema of scenes, or of another file, with the limits of its numbers
+    Schema(schema::Arguments),
     /// Print the completion script of a shell
     Completions(completions::Arguments),
     /// Print the manual page, or write all of them
@@ -115,11 +115,16 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> u8 {
         given: arguments.into_iter().skip(1).collect(),
         global: cli.global,
     };
-    let ended = on_threads(context.global.threads, || {
+    let work = || {
         let ended = dispatch(&cli.verb, &context);
         context.reporter.finish();
         ended
-    });
+    };
+    let ended = match &cli.verb {
+        // These print what is known already.
+        Verb::New(_) | Verb::Schema(_) | Verb::Completions(_) | Verb::Man(_) => work(),
+        _ => on_threads(context.global.threads, work),
+    };
     match ended {
         Ok(()) => 0,
         // Whatever fails after that was stopped.
@@ -127,14 +132,15 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> u8 {
     }
 }
 
-/// Runs some work on a pool of the given number of threads; on all of the machine's by default.
+/// Runs some work on a pool of the given number of threads, all of the machine's by default. A pool that is made only when it
+/// is needed ends the program if the system has no threads left.
 fn on_threads(
     threads: Option<u16>,
     work: impl FnOnce() -> Result<(), CliError> + Send,
 ) -> Result<(), CliError> {
-    let Some(threads) = threads else { return work() };
+    // Zero stands for the number of the machine's.
     rayon::ThreadPoolBuilder::new()
-        .num_threads(threads.into())
+        .num_threads(threads.unwrap_or(0).into())
         .build()
         .map_err(|e| catoptric::Error::Threads(e.to_string()))?
         .install(work)
@@ -160,7 +166,7 @@ fn dispatch(verb: &Verb, context: &Context) -> Result<(), CliError> {
         Verb::Report(arguments) => report::run(arguments, context),
         Verb::New(arguments) => new::run(arguments),
         Verb::Check(arguments) => check::run(arguments, context),
-        Verb::Schema => schema::run(),
+        Verb::Schema(arguments) => schema::run(arguments),
         Verb::Completions(arguments) => completions::run(arguments, Cli::command()),
         Verb::Man(arguments) => man::run(arguments, Cli::command()),
     }

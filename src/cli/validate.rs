@@ -9,7 +9,7 @@ use catoptric::validate::{Problem, Severity};
 use catoptric::{Calibration, Error, Verdict, files, validate};
 use clap::Args;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Version of what `validate --json` prints.
 const SCHEMA_VERSION: u32 = 1;
@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
     let (path, junit) = (&arguments.calibration, arguments.junit.as_ref());
-    let calibration: Calibration = match files::read_json(path) {
+    let calibration: Calibration = match files::read_calibration(path) {
         Ok(calibration) => calibration,
         Err(error) => {
             let error = Error::from(error);
@@ -58,14 +58,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
         return conclude(verdict, &errors.map(ToString::to_string).collect::<Vec<_>>());
     }
     if errors > 0 {
-        let list: Vec<String> = problems.iter().map(|p| format!("  {p}")).collect();
-        let message = format!(
-            "{}: {}\n{}",
-            path.display(),
-            counted(errors, "error"),
-            list.join("\n")
-        );
-        return Err(CliError::invalid(message, None));
+        return Err(invalid(path, &problems));
     }
     let mut text = String::new();
     for problem in &problems {
@@ -74,6 +67,19 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
     text.push_str(&format!("ok: {}: {}\n", path.display(), summary(&calibration)));
     text.push_str(&format!("next: catoptric score DATASET {}\n", quoted(path)));
     print(&text)
+}
+
+/// The error about a calibration with problems.
+pub(super) fn invalid(path: &Path, problems: &[Problem]) -> CliError {
+    let errors = problems.iter().filter(|p| p.severity == Severity::Error).count();
+    let list: Vec<String> = problems.iter().map(|p| format!("  {p}")).collect();
+    let message = format!(
+        "{}: {}\n{}",
+        path.display(),
+        counted(errors, "error"),
+        list.join("\n")
+    );
+    CliError::invalid(message, None)
 }
 
 fn as_json(problem: &Problem) -> serde_json::Value {

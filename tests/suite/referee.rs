@@ -575,7 +575,7 @@ fn a_truth_that_is_not_the_dataset_s_is_refused() {
     };
     refused(
         &unlisted("version", "schema_version", &|v| v["schema_version"] = json!(99)),
-        "schema_version is 99",
+        "`schema_version` is 99",
     );
     refused(
         &unlisted("index", "beams", &|v| v["beams"][7]["beam"] = json!(1081)),
@@ -614,7 +614,7 @@ fn a_truth_that_is_not_the_dataset_s_is_refused() {
         )
         .unwrap();
     });
-    refused(&future, "schema_version is 99");
+    refused(&future, "`schema_version` is 99");
 }
 
 #[test]

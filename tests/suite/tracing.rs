@@ -456,12 +456,12 @@ fn invalid_rays_are_refused_with_their_location() {
     refuse(
         "a.csv",
         format!("{header}0,0,0,1,0,0\n0,nan,0,1,0,0\n").as_bytes(),
-        "a.csv:3:1: y_m is NaN",
+        "a.csv:3:3: y_m is NaN",
     );
     refuse(
         "a.csv",
         format!("{header}0,0,0,0,0,0\n").as_bytes(),
-        "a.csv:2:1: its direction is (0, 0, 0)",
+        "a.csv:2:7: its direction is (0, 0, 0)",
     );
     refuse(
         "a.csv",

@@ -12,8 +12,9 @@ pub struct Ray {
     pub direction: Unit<Vector3<f64>>,
 }
 
-/// Search limit for hits, in meters: beyond any scanner's range.
-pub(crate) const FARTHEST: f64 = 1e4;
+/// Search limit for hits, in meters: farther apart than any two places of a scene, whose coordinates are within 10 km, or 20
+/// km for a mesh that is itself placed that far away.
+pub(crate) const FARTHEST: f64 = 1e5;
 
 /// Transforms a ray into another frame.
 pub fn placed(ray: &Ray, other_from_ray: &Pose) -> Ray {

@@ -22,6 +22,9 @@ const LONGEST_RECORD: usize = 1 << 28;
 /// Messages outside of chunks are grouped up to this many bytes.
 const LONGEST_RUN: usize = 1 << 20;
 
+/// Maximum size of one read, in bytes: room is made as the bytes of a record arrive, not as it claims.
+const MOST_AT_ONCE: usize = 1 << 20;
+
 /// Opcode and length precede every record.
 const RECORD_HEAD: usize = 1 + 8;
 
@@ -136,7 +139,7 @@ impl Place {
             };
             match event {
                 LinearReadEvent::ReadRequest(need) => {
-                    let read = file.read(reader.insert(need));
+                    let read = file.read(reader.insert(need.min(MOST_AT_ONCE)));
                     let read = read.map_err(|e| IoError::read(self.path(), e))?;
                     reader.notify_read(read);
                     offset += read as u64;
@@ -260,7 +263,7 @@ impl Records {
         while let Some(event) = reader.next_event() {
             match event? {
                 LinearReadEvent::ReadRequest(need) => {
-                    let read = rest.read(reader.insert(need))?;
+                    let read = rest.read(reader.insert(need.min(MOST_AT_ONCE)))?;
                     reader.notify_read(read);
                 }
                 LinearReadEvent::Record { data, opcode } => {

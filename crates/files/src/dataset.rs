@@ -11,15 +11,16 @@
 //! Reading never opens `truth/`.
 
 use super::blocks::Place;
+use super::door;
 use super::error::IoError;
 use super::file::{sha256, sha256_file};
 use super::folder::{Occupant, StagedFile, StagedFolder, list};
-use super::json::{parse_json, to_json};
+use super::json::to_json;
 use super::manifest::{Manifest, Provenance};
+use super::paths::unread;
 use super::playback::read_recording;
 use super::reading::{Damage, Records, records};
 use super::recording::{Encoded, RecordingEncoder, RecordingWriter};
-use super::results::require_version;
 use catoptric_model::{Dataset, Session, Stop, Stretch, session};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -206,7 +207,10 @@ fn occupant(out: &Path, replace: bool) -> Result<Occupant, IoError> {
 /// [`IoError`] with line, column and key if `session.toml` is not a session.
 pub fn read_session(dataset: &Path) -> Result<Session, IoError> {
     let hashes = read_hashes(dataset)?;
-    parse_session(dataset, &read_checked(dataset, SESSION, hashes.as_ref())?)
+    parse_session(
+        &read_checked(dataset, SESSION, hashes.as_ref())?,
+        dataset.join(SESSION),
+    )
 }
 
 /// Reads the session and the observations, frame by frame; everything is held in memory.
@@ -267,7 +271,10 @@ fn read<T: Send>(
     observations: impl FnOnce(Place, &Session) -> Result<T, IoError> + Send,
 ) -> Result<(Session, T, String, bool), IoError> {
     let hashes = read_hashes(dataset)?;
-    let session = parse_session(dataset, &read_checked(dataset, SESSION, hashes.as_ref())?)?;
+    let session = parse_session(
+        &read_checked(dataset, SESSION, hashes.as_ref())?,
+        dataset.join(SESSION),
+    )?;
     let path = dataset.join(OBSERVATIONS);
     let (id, found) = rayon::join(
         || sha256_file(&path, stop),
@@ -317,7 +324,10 @@ fn read_hashes(dataset: &Path) -> Result<Option<BTreeMap<String, String>>, IoErr
 /// The manifest, if there is one.
 pub(super) fn read_manifest(dataset: &Path) -> Result<Option<Manifest>, IoError> {
     // Reported before any missing file: the wrong folder was given.
-    if !dataset.join(SESSION).is_file() && dataset.exists() {
+    if let Err(missing) = fs::metadata(dataset) {
+        return Err(IoError::read(dataset, unread(dataset, missing)));
+    }
+    if !dataset.join(SESSION).is_file() {
         let reason = format!("it is no dataset: there is no {SESSION} in it");
         return Err(IoError::read(
             dataset,
@@ -327,13 +337,20 @@ pub(super) fn read_manifest(dataset: &Path) -> Result<Option<Manifest>, IoError>
     let path = dataset.join(MANIFEST);
     match fs::read(&path) {
         Ok(bytes) => {
-            let manifest: Manifest = parse_json(&bytes, &path)?;
-            require_version(&path, manifest.schema_version, super::manifest::SCHEMA_VERSION)?;
+            let manifest = parse_manifest(&bytes, &path)?;
             Ok(Some(manifest))
         }
         Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(e) => Err(IoError::read(path, e)),
     }
+}
+
+/// Reads a manifest from the bytes of its file; `path` names it in errors.
+///
+/// # Errors
+/// [`IoError::Text`] with line and column if it is invalid, or has an unknown version.
+pub fn parse_manifest(bytes: &[u8], path: impl AsRef<Path>) -> Result<Manifest, IoError> {
+    door::from_json(bytes, path.as_ref())
 }
 
 /// The bytes of a file, which must match the manifest.
@@ -367,12 +384,12 @@ fn check(
     }
 }
 
-fn parse_session(dataset: &Path, bytes: &[u8]) -> Result<Session, IoError> {
-    let path = dataset.join(SESSION);
-    let text = std::str::from_utf8(bytes)
-        .map_err(|e| IoError::content(&path, format!("not UTF-8 from byte {}", e.valid_up_to())))?;
-    let session: Session = toml::from_str(text).map_err(|e| IoError::toml(&path, text, &e))?;
-    require_version(&path, session.schema_version, session::SCHEMA_VERSION)?;
+/// Reads a session from the bytes of its file; `path` names it in errors.
+///
+/// # Errors
+/// As [`read_session`].
+pub fn parse_session(bytes: &[u8], path: impl AsRef<Path>) -> Result<Session, IoError> {
+    let session: Session = door::from_toml(bytes, path.as_ref())?;
     // Entries missing in version 1 take their defaults here.
     Ok(Session {
         schema_version: session::SCHEMA_VERSION,

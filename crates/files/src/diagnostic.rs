@@ -17,6 +17,9 @@ pub enum Place {
     Key(String),
 }
 
+/// Maximum number of problems of a file that are shown; the rest is counted.
+pub(super) const MOST_SHOWN: usize = 50;
+
 /// One problem.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Diagnostic {
@@ -43,33 +46,35 @@ impl Diagnostics {
     /// Line and column, both from 1 and in characters, of a problem with a known position in the file.
     pub fn position(&self, diagnostic: &Diagnostic) -> Option<(usize, usize)> {
         match &diagnostic.place {
-            Place::Span(span) => Some(position(&self.text, span.start)),
+            Place::Span(span) => Some(Lines::of(&self.text).position(span.start)),
             Place::Position(line, column) => Some((*line, *column)),
             Place::Set(_) | Place::Key(_) => None,
         }
     }
 
-    /// Every problem with its excerpt, then a line with their number; with terminal colors if `styled`.
+    /// The first problems, each with its excerpt, then a line with the number of all; with terminal colors if `styled`.
     pub fn render(&self, styled: bool) -> String {
         let renderer = if styled {
             Renderer::styled()
         } else {
             Renderer::plain()
         };
+        let lines = Lines::of(&self.text);
         let mut out = String::new();
-        for diagnostic in &self.list {
-            out.push_str(&renderer.render(&[self.group(diagnostic)]));
+        for diagnostic in self.list.iter().take(MOST_SHOWN) {
+            out.push_str(&renderer.render(&[self.group(diagnostic, &lines)]));
             out.push_str("\n\n");
         }
         let count = match self.list.len() {
             1 => "1 problem".to_owned(),
+            n if n > MOST_SHOWN => format!("{n} problems, of which the first {MOST_SHOWN} are shown"),
             n => format!("{n} problems"),
         };
         out.push_str(&format!("{}: {count}", self.file));
         out
     }
 
-    fn group<'a>(&'a self, diagnostic: &'a Diagnostic) -> Group<'a> {
+    fn group<'a>(&'a self, diagnostic: &'a Diagnostic, lines: &Lines<'a>) -> Group<'a> {
         let message = match &diagnostic.place {
             Place::Set(argument) => format!("--set {argument}: {}", diagnostic.message),
             _ => diagnostic.message.clone(),
@@ -77,10 +82,15 @@ impl Diagnostics {
         let mut group = Group::with_title(Level::ERROR.primary_title(message));
         match &diagnostic.place {
             Place::Span(span) => {
+                // The line alone: an excerpt of a whole table would hide the problem.
+                let (number, line) = lines.line(span.start);
+                let start = span.start.clamp(line.start, line.end) - line.start;
+                let end = span.end.clamp(line.start + start, line.end) - line.start;
                 group = group.element(
-                    Snippet::source(self.text.as_str())
+                    Snippet::source(&self.text[line])
+                        .line_start(number)
                         .path(self.file.as_str())
-                        .annotation(AnnotationKind::Primary.span(first_line(&self.text, span))),
+                        .annotation(AnnotationKind::Primary.span(start..end)),
                 );
             }
             Place::Position(line, column) => {
@@ -104,29 +114,42 @@ impl fmt::Display for Diagnostics {
 
 impl std::error::Error for Diagnostics {}
 
-/// Line and column of a byte offset, both from 1 and in characters.
-pub(super) fn position(text: &str, byte: usize) -> (usize, usize) {
-    let mut byte = byte.min(text.len());
-    while !text.is_char_boundary(byte) {
-        byte -= 1;
-    }
-    let before = &text[..byte];
-    let line_start = before.rfind('\n').map_or(0, |n| n + 1);
-    (
-        before.matches('\n').count() + 1,
-        before[line_start..].chars().count() + 1,
-    )
+/// The lines of a text, to find many positions in it.
+pub(super) struct Lines<'a> {
+    text: &'a str,
+    /// Where each line begins, in bytes.
+    starts: Vec<usize>,
 }
 
-/// The first line of a span: an excerpt of a whole table would hide the problem.
-fn first_line(text: &str, span: &Range<usize>) -> Range<usize> {
-    let start = span.start.min(text.len());
-    let end = span.end.clamp(start, text.len());
-    let length = text
-        .get(start..end)
-        .and_then(|s| s.find('\n'))
-        .unwrap_or(end - start);
-    start..start + length
+impl<'a> Lines<'a> {
+    pub(super) fn of(text: &'a str) -> Self {
+        let after = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
+        let starts = std::iter::once(0).chain(after.map(|(at, _)| at + 1));
+        Self {
+            text,
+            starts: starts.collect(),
+        }
+    }
+
+    /// Number, from 1, and bytes of the line of a byte offset, without its end.
+    pub(super) fn line(&self, byte: usize) -> (usize, Range<usize>) {
+        let number = self
+            .starts
+            .partition_point(|start| *start <= byte.min(self.text.len()));
+        let start = self.starts[number - 1];
+        let end = self.starts.get(number).map_or(self.text.len(), |next| next - 1);
+        (number, start..end)
+    }
+
+    /// Line and column of a byte offset, both from 1 and in characters.
+    pub(super) fn position(&self, byte: usize) -> (usize, usize) {
+        let mut byte = byte.min(self.text.len());
+        while !self.text.is_char_boundary(byte) {
+            byte -= 1;
+        }
+        let (number, line) = self.line(byte);
+        (number, self.text[line.start..byte].chars().count() + 1)
+    }
 }
 
 #[cfg(test)]
@@ -136,8 +159,12 @@ mod tests {
     #[test]
     fn columns_count_characters_from_one() {
         let text = "a = 1\n\"é\" = x\n";
-        assert_eq!(position(text, 0), (1, 1));
-        assert_eq!(position(text, text.find('x').expect("it is there")), (2, 7));
-        assert_eq!(position(text, 999), (3, 1));
+        let lines = Lines::of(text);
+        assert_eq!(lines.position(0), (1, 1));
+        assert_eq!(lines.position(text.find('x').expect("it is there")), (2, 7));
+        assert_eq!(lines.position(text.find('é').expect("it is there") + 1), (2, 2));
+        assert_eq!(lines.position(999), (3, 1));
+        assert_eq!(lines.line(3), (1, 0..5));
+        assert_eq!(Lines::of("").position(0), (1, 1));
     }
 }

@@ -60,6 +60,16 @@ pub enum IoError {
         /// What is wrong, with the key.
         message: String,
     },
+    /// Text with several problems.
+    #[error("{}", listed(path, faults, *count))]
+    Faults {
+        /// The file.
+        path: PathBuf,
+        /// The first of them, in their order in the file.
+        faults: Vec<TextFault>,
+        /// Number of all.
+        count: usize,
+    },
     /// A recording that is cut off or corrupt, or holds unexpected messages.
     #[error("{}: {what} (by byte {offset})", path.display())]
     Recording {
@@ -110,6 +120,31 @@ pub enum IoError {
         /// The manifest.
         manifest: PathBuf,
     },
+}
+
+/// One of several problems of a text.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TextFault {
+    /// Line, from 1.
+    pub line: usize,
+    /// Column, from 1.
+    pub column: usize,
+    /// What is wrong, with the key.
+    pub message: String,
+}
+
+/// A line for each problem, and one for the rest.
+fn listed(path: &Path, faults: &[TextFault], count: usize) -> String {
+    let line = |f: &TextFault| format!("{}:{}:{}: {}", path.display(), f.line, f.column, f.message);
+    let mut lines: Vec<String> = faults.iter().map(line).collect();
+    if count > faults.len() {
+        lines.push(format!(
+            "{}: and {} more problems",
+            path.display(),
+            count - faults.len()
+        ));
+    }
+    lines.join("\n")
 }
 
 impl IoError {
@@ -169,6 +204,7 @@ impl IoError {
         match self {
             Self::Stopped(_) => 130,
             Self::Text { .. }
+            | Self::Faults { .. }
             | Self::Recording { .. }
             | Self::Damaged { .. }
             | Self::Content { .. }

@@ -1,6 +1,7 @@
 //! Reading and writing values as JSON.
 
 use super::error::IoError;
+use super::paths::unread;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fs;
@@ -22,8 +23,12 @@ pub fn to_json(path: impl AsRef<Path>, value: &impl Serialize) -> Result<Vec<u8>
 /// [`IoError::Read`] if the file cannot be read, [`IoError::Text`] with line and column if it is not valid.
 pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T, IoError> {
     let path = path.as_ref();
-    let bytes = fs::read(path).map_err(|e| IoError::read(path, e))?;
-    parse_json(&bytes, path)
+    parse_json(&bytes_of(path)?, path)
+}
+
+/// The bytes of a file.
+pub(super) fn bytes_of(path: &Path) -> Result<Vec<u8>, IoError> {
+    fs::read(path).map_err(|e| IoError::read(path, unread(path, e)))
 }
 
 /// Reads a value from the bytes of a JSON file, with or without a byte order mark; `path` names it in errors.
@@ -32,15 +37,31 @@ pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T, IoErr
 /// [`IoError::Text`] with line and column if they are not valid.
 pub fn parse_json<T: DeserializeOwned>(bytes: &[u8], path: impl AsRef<Path>) -> Result<T, IoError> {
     let bytes = bytes.strip_prefix(MARK).unwrap_or(bytes);
-    serde_json::from_slice(bytes).map_err(|e| match literal(bytes, &e) {
+    serde_json::from_slice(bytes).map_err(|e| match no_number(bytes, &e) {
         None => IoError::json(path, &e),
-        Some(literal) => IoError::Text {
+        Some(message) => IoError::Text {
             path: path.as_ref().to_owned(),
             line: e.line(),
             column: e.column(),
-            message: format!("{literal} is no number in JSON; what is not known is null, or left out"),
+            message,
         },
     })
+}
+
+/// The message about a literal that other languages write for numbers, if a JSON file went wrong at one.
+pub(super) fn no_number(bytes: &[u8], error: &serde_json::Error) -> Option<String> {
+    let literal = literal(bytes, error)?;
+    Some(format!(
+        "{literal} is no number in JSON; what is not known is null, or left out"
+    ))
+}
+
+/// Position of a part of a text in that text, in bytes.
+pub(super) fn position_of(text: &str, part: &str) -> usize {
+    part.as_ptr()
+        .addr()
+        .saturating_sub(text.as_ptr().addr())
+        .min(text.len())
 }
 
 /// Byte order mark of UTF-8, which some programs put before a text.

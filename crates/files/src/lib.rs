@@ -50,19 +50,18 @@ mod survey;
 #[cfg(feature = "recording")]
 mod topics;
 
-#[cfg(feature = "scene")]
 pub mod diagnostic;
+mod door;
 #[cfg(feature = "scene")]
 mod expression;
-#[cfg(feature = "scene")]
 mod format;
 #[cfg(feature = "scene")]
 mod parameters;
 #[cfg(feature = "scene")]
 pub mod parametric;
+mod rules;
 #[cfg(feature = "scene")]
 pub mod scene;
-#[cfg(feature = "scene")]
 mod tree;
 #[cfg(all(feature = "recording", feature = "scene"))]
 mod truth;
@@ -78,9 +77,14 @@ pub mod npy;
 #[cfg(all(feature = "recording", feature = "scene"))]
 pub mod rays;
 pub mod results;
+#[cfg(all(feature = "recording", feature = "scene"))]
+pub mod schema;
 
 #[cfg(feature = "recording")]
-pub use dataset::{DatasetWriter, read_dataset, read_dataset_with, read_session};
+pub use dataset::{
+    DatasetWriter, parse_dataset, parse_manifest, parse_session, read_dataset, read_dataset_with,
+    read_session,
+};
 pub use error::IoError;
 #[cfg(feature = "recording")]
 pub use file::{StagedOutput, write_file, write_json};
@@ -93,9 +97,10 @@ pub use playback::read_recording;
 pub use reading::Damage;
 #[cfg(feature = "recording")]
 pub use recording::RecordingWriter;
+pub use results::{parse_calibration, parse_characterization};
 pub use results::{read_calibration, read_calibration_for, read_characterization};
 #[cfg(all(feature = "recording", feature = "scene"))]
-pub use truth::{read_reference, read_truth};
+pub use truth::{parse_truth, read_reference, read_truth};
 
 #[cfg(all(test, feature = "recording", feature = "scene"))]
 mod tests;

@@ -1,5 +1,6 @@
 //! `manifest.json`: the provenance of a dataset, and the hashes of its files when it was written. It has no timestamps.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -21,10 +22,11 @@ pub struct Provenance {
 }
 
 /// `manifest.json`, written last: a folder without it is unfinished, or was recorded by a third party.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
     /// Version of this file's format.
+    #[schemars(range(min = 1, max = SCHEMA_VERSION))]
     pub schema_version: u32,
     /// Version of catoptric.
     pub version: String,

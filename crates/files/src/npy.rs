@@ -23,6 +23,8 @@ pub struct Header {
     pub rows: usize,
     /// Number of columns.
     pub columns: usize,
+    /// Size of the whole header, in bytes.
+    pub length: usize,
 }
 
 /// Size of a header written by [`header`]: fixed, so that it can be rewritten when the number of rows is known.
@@ -79,16 +81,16 @@ pub fn read_header(reader: &mut impl Read) -> io::Result<Header> {
     if start[..6] != *MAGIC {
         return Err(damaged("it does not begin as a NumPy array does"));
     }
-    let length = match start[6] {
+    let (size, length) = match start[6] {
         1 => {
             let mut length = [0; 2];
             exact(reader, &mut length)?;
-            usize::from(u16::from_le_bytes(length))
+            (START, usize::from(u16::from_le_bytes(length)))
         }
         2 => {
             let mut length = [0; 4];
             exact(reader, &mut length)?;
-            u32::from_le_bytes(length) as usize
+            (START + 2, u32::from_le_bytes(length) as usize)
         }
         other => return Err(damaged(format!("its version is {other}; 1 and 2 can be read"))),
     };
@@ -98,7 +100,11 @@ pub fn read_header(reader: &mut impl Read) -> io::Result<Header> {
     let mut text = vec![0; length];
     exact(reader, &mut text)?;
     let text = std::str::from_utf8(&text).map_err(|_| damaged("its header is no text"))?;
-    parse(text).map_err(damaged)
+    let parsed = parse(text).map_err(damaged)?;
+    Ok(Header {
+        length: size + length,
+        ..parsed
+    })
 }
 
 fn parse(text: &str) -> Result<Header, String> {
@@ -133,7 +139,12 @@ fn parse(text: &str) -> Result<Header, String> {
         .map(|s| s.parse().ok())
         .collect();
     match sizes.as_deref() {
-        Some(&[rows, columns]) => Ok(Header { float, rows, columns }),
+        Some(&[rows, columns]) => Ok(Header {
+            float,
+            rows,
+            columns,
+            length: 0,
+        }),
         _ => Err(format!("its shape is ({shape}); two dimensions are needed")),
     }
 }
@@ -173,7 +184,8 @@ mod tests {
                 Ok(Header {
                     float,
                     rows,
-                    columns: 3
+                    columns: 3,
+                    length: HEADER_LENGTH,
                 })
             );
         }
@@ -184,7 +196,8 @@ mod tests {
             Ok(Header {
                 float,
                 rows: 2,
-                columns: 6
+                columns: 6,
+                length: 12 + text.len(),
             })
         );
     }

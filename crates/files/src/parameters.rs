@@ -3,11 +3,18 @@
 //! Text that begins with `=` in place of a number is an expression over the names in `[parameters]`; parameters may
 //! depend on one another.
 
+use super::diagnostic::MOST_SHOWN;
 use super::expression::{Flaw, NoValue, evaluate, is_name};
 use super::tree::{Key, Node, Source, Value};
 use catoptric_model::place::nearest;
 use serde_json::Value as Json;
 use std::collections::{BTreeMap, BTreeSet};
+
+/// Maximum number of parameters that depend on one another in a row.
+const LONGEST_CHAIN: usize = 64;
+
+/// Maximum number of names listed in a message.
+const MOST_LISTED: usize = 20;
 
 /// An error in a parameter or an expression.
 #[derive(Debug)]
@@ -30,6 +37,8 @@ pub(super) fn resolve(root: &mut Node, text: &str, texts: &BTreeSet<String>) -> 
     let mut values = Values {
         definitions: &definitions,
         known: BTreeMap::new(),
+        open: 0,
+        unknown: 0,
     };
     walk(root, "", text, texts, &mut values, &mut faults);
     faults
@@ -75,6 +84,10 @@ struct Values<'a> {
     definitions: &'a BTreeMap<String, Value>,
     /// `None` while it is being evaluated.
     known: BTreeMap<String, Option<f64>>,
+    /// How many are being evaluated.
+    open: usize,
+    /// How many names were no parameter.
+    unknown: usize,
 }
 
 impl Values<'_> {
@@ -88,21 +101,39 @@ impl Values<'_> {
             None => {}
         }
         let Some(definition) = self.definitions.get(name) else {
+            let message = format!("names `{name}`, which is no parameter");
+            // Many unknown names among many parameters would take a minute to compare.
+            if self.unknown > MOST_SHOWN {
+                return none(message, None);
+            }
+            self.unknown += 1;
             let names = self.definitions.keys().map(String::as_str);
             let help = match (nearest(name, names.clone()), self.definitions.is_empty()) {
                 (Some(near), _) => format!("did you mean `{near}`?"),
                 (None, true) => "the scene has no [parameters]".to_owned(),
-                (None, false) => format!("parameters: {}", names.collect::<Vec<_>>().join(", ")),
+                (None, false) => {
+                    let more = if names.len() > MOST_LISTED { ", …" } else { "" };
+                    let first: Vec<&str> = names.take(MOST_LISTED).collect();
+                    format!("parameters: {}{more}", first.join(", "))
+                }
             };
-            return none(format!("names `{name}`, which is no parameter"), Some(help));
+            return none(message, Some(help));
         };
+        if self.open == LONGEST_CHAIN {
+            return none(
+                format!("depends on more than {LONGEST_CHAIN} parameters in a row"),
+                None,
+            );
+        }
         let value = match definition {
             Value::String(text) => {
                 let Some(expression) = expression(text) else {
                     return none(format!("names `{name}`, which has no value"), None);
                 };
                 self.known.insert(name.to_owned(), None);
+                self.open += 1;
                 let value = evaluate(expression, &mut |n| self.of(n));
+                self.open -= 1;
                 self.known.remove(name);
                 value.map_err(|flaw| NoValue {
                     message: format!("names `{name}`, which {}", flaw.message),

@@ -1,6 +1,8 @@
 //! Paths: the folder of a file, and quoting for the shell in printed or recorded commands.
 
-use std::path::Path;
+use catoptric_model::place::nearest;
+use std::io;
+use std::path::{Path, PathBuf};
 
 /// A path quoted for the shell.
 ///
@@ -24,5 +26,29 @@ pub(super) fn parent(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
+    }
+}
+
+/// Question about the file or folder next to a missing one that was probably meant.
+pub(super) fn similar(path: &Path, error: &io::Error) -> Option<String> {
+    if error.kind() != io::ErrorKind::NotFound {
+        return None;
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    let entries = std::fs::read_dir(folder.unwrap_or(Path::new("."))).ok()?;
+    let names: Vec<String> = entries
+        .filter_map(|e| e.ok()?.file_name().into_string().ok())
+        .collect();
+    let wanted = path.file_name()?.to_str()?;
+    let name = nearest(wanted, names.iter().map(String::as_str))?;
+    let name = folder.map_or(PathBuf::from(name), |f| f.join(name));
+    Some(format!("did you mean {}?", name.display()))
+}
+
+/// The error in reading a file that people name, with the one that was probably meant.
+pub(super) fn unread(path: &Path, error: io::Error) -> io::Error {
+    match similar(path, &error) {
+        Some(help) => io::Error::new(error.kind(), format!("{error}; {help}")),
+        None => error,
     }
 }

@@ -4,11 +4,14 @@ use super::error::IoError;
 use super::extension::{by_extension, listed};
 use super::file::StagedOutput;
 use super::npy::{self, Float};
+use super::paths::unread;
 use catoptric_cast::Ray;
+use catoptric_model::limits::FAR_M;
+use catoptric_model::place::nearest;
 use catoptric_sim::trace::{Fate, Vertex};
 use nalgebra::{Point3, Unit, Vector3};
 use std::fs::File;
-use std::io::{BufReader, ErrorKind, Read};
+use std::io::{BufReader, Cursor, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 /// Columns of rays, in the order of an array.
@@ -63,14 +66,16 @@ pub struct RayReader {
 
 enum Source {
     Csv {
-        reader: Box<csv::Reader<File>>,
+        reader: Box<csv::Reader<Box<dyn Read>>>,
         /// Position in a row of each of the six columns.
         order: [usize; 6],
     },
     Npy {
-        reader: BufReader<File>,
+        reader: BufReader<Box<dyn Read>>,
         float: Float,
         left: usize,
+        /// Offset of the next ray, in bytes.
+        at: u64,
     },
 }
 
@@ -80,11 +85,23 @@ impl RayReader {
     /// # Errors
     /// [`IoError`] if it cannot be read or does not have the header of rays.
     pub fn open(path: &Path) -> Result<Self, IoError> {
-        let format = Format::of(path)?;
-        let file = File::open(path).map_err(|e| IoError::read(path, e))?;
-        let source = match format {
+        Format::of(path)?;
+        let file = File::open(path).map_err(|e| IoError::read(path, unread(path, e)))?;
+        Self::of(Box::new(file), path)
+    }
+
+    /// Reads the header of a file from its bytes; `path` determines the format and names the file in errors.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn parse(bytes: &[u8], path: &Path) -> Result<Self, IoError> {
+        Self::of(Box::new(Cursor::new(bytes.to_vec())), path)
+    }
+
+    fn of(file: Box<dyn Read>, path: &Path) -> Result<Self, IoError> {
+        let source = match Format::of(path)? {
             Format::Csv => {
-                let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
+                let mut reader = csv::Reader::from_reader(file);
                 let header = reader.headers().map_err(|e| csv_error(path, e))?;
                 let order = columns(header).map_err(|message| IoError::Text {
                     path: path.to_owned(),
@@ -113,6 +130,7 @@ impl RayReader {
                     reader,
                     float: header.float,
                     left: header.rows,
+                    at: header.length as u64,
                 }
             }
         };
@@ -126,7 +144,7 @@ impl RayReader {
     /// The next N rays at most; empty at the end. Directions are normalized to unit length.
     ///
     /// # Errors
-    /// [`IoError`] if the file ends early, or for a ray with a number that is not finite or a zero direction.
+    /// [`IoError`] if the file ends early, or for a ray with a number that is not finite, a coordinate beyond 10 km or a zero direction.
     pub fn next_rays(&mut self, most: usize) -> Result<Vec<Ray>, IoError> {
         let mut rays = Vec::new();
         match &mut self.source {
@@ -138,23 +156,28 @@ impl RayReader {
                         .map_err(|e| csv_error(&self.path, e))?
                 {
                     let line = record.position().map_or(0, csv::Position::line);
-                    let fail = |message: String| IoError::Text {
+                    let fail = |field: usize, message: String| IoError::Text {
                         path: self.path.clone(),
                         line: usize::try_from(line).unwrap_or(usize::MAX),
-                        column: 1,
+                        column: column(&record, field),
                         message,
                     };
                     let mut numbers = [0.0; 6];
                     for ((number, &at), name) in numbers.iter_mut().zip(order.iter()).zip(COLUMNS) {
-                        let word = record.get(at).unwrap_or_default();
+                        let word = record.get(at).unwrap_or_default().trim();
                         *number = word
                             .parse()
-                            .map_err(|_| fail(format!("{name} is {word:?}; a number is needed")))?;
+                            .map_err(|_| fail(at, format!("{name} is {word:?}; a number is needed")))?;
                     }
-                    rays.push(ray(&numbers).map_err(fail)?);
+                    rays.push(ray(&numbers).map_err(|(which, message)| fail(order[which], message))?);
                 }
             }
-            Source::Npy { reader, float, left } => {
+            Source::Npy {
+                reader,
+                float,
+                left,
+                at,
+            } => {
                 let count = most.min(*left);
                 let row = COLUMNS.len() * float.size();
                 let mut bytes = Vec::new();
@@ -175,10 +198,15 @@ impl RayReader {
                     for (number, bytes) in numbers.iter_mut().zip(bytes.chunks_exact(float.size())) {
                         *number = float.decode(bytes).unwrap_or(f64::NAN);
                     }
-                    let fail = |m| IoError::content(&self.path, format!("ray {}: {m}", self.read + i));
+                    let fail = |(which, message): (usize, String)| IoError::Recording {
+                        path: self.path.clone(),
+                        what: format!("ray {}: {message}", self.read + i),
+                        offset: *at + (i * row + which * float.size()) as u64,
+                    };
                     rays.push(ray(&numbers).map_err(fail)?);
                 }
                 *left -= count;
+                *at += wanted;
             }
         }
         self.read += rays.len();
@@ -188,15 +216,17 @@ impl RayReader {
 
 /// Position of each column; all must exist, and no others.
 fn columns(header: &csv::StringRecord) -> Result<[usize; 6], String> {
+    let header: Vec<&str> = header.iter().map(str::trim).collect();
     if let Some(unknown) = header.iter().find(|h| !COLUMNS.contains(h)) {
+        let near = nearest(unknown, COLUMNS).map_or_else(String::new, |n| format!("; did you mean {n}?"));
         return Err(format!(
-            "there is no column {unknown:?} in rays; the columns are {}",
+            "there is no column {unknown:?} in rays; the columns are {}{near}",
             COLUMNS.join(",")
         ));
     }
     let mut order = [0; 6];
     for (at, name) in order.iter_mut().zip(COLUMNS) {
-        let mut places = header.iter().enumerate().filter(|(_, h)| *h == name);
+        let mut places = header.iter().enumerate().filter(|(_, h)| **h == name);
         *at = places
             .next()
             .ok_or_else(|| format!("column {name} is missing"))?
@@ -208,15 +238,31 @@ fn columns(header: &csv::StringRecord) -> Result<[usize; 6], String> {
     Ok(order)
 }
 
-fn ray(numbers: &[f64; 6]) -> Result<Ray, String> {
-    if let Some((name, value)) = COLUMNS.iter().zip(numbers).find(|(_, n)| !n.is_finite()) {
-        return Err(format!("{name} is {value}; a finite number is needed"));
+/// Column, from 1 and in characters, at which a field begins in a line without quotes.
+fn column(record: &csv::StringRecord, field: usize) -> usize {
+    let before: usize = record.iter().take(field).map(|f| f.chars().count() + 1).sum();
+    let blanks = record
+        .get(field)
+        .map_or(0, |f| f.chars().take_while(|c| c.is_whitespace()).count());
+    before + blanks + 1
+}
+
+/// A ray from its columns, or the column that is wrong and why.
+fn ray(numbers: &[f64; 6]) -> Result<Ray, (usize, String)> {
+    for (which, (name, value)) in COLUMNS.iter().zip(numbers).enumerate() {
+        if !value.is_finite() {
+            return Err((which, format!("{name} is {value}; a finite number is needed")));
+        }
+        if which < 3 && value.abs() > FAR_M {
+            let message = format!("{name} is {value} m; -{FAR_M} m to {FAR_M} m is allowed");
+            return Err((which, message));
+        }
     }
     let [x, y, z, dx, dy, dz] = *numbers;
     // Scaled first, so that squaring neither underflows nor overflows.
     let longest = dx.abs().max(dy.abs()).max(dz.abs());
     if longest == 0.0 {
-        return Err("its direction is (0, 0, 0)".to_owned());
+        return Err((3, "its direction is (0, 0, 0)".to_owned()));
     }
     Ok(Ray {
         origin: Point3::new(x, y, z),

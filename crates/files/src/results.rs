@@ -1,8 +1,9 @@
 //! Results as JSON: calibrations (our own or third-party), characterizations.
 
+use super::door;
 use super::error::IoError;
-use super::json::read_json;
-use catoptric_model::{Calibration, Characterization, Session, calibration, characterization};
+use super::json::bytes_of;
+use catoptric_model::{Calibration, Characterization, Session};
 use std::path::Path;
 
 /// Reads a calibration, our own or third-party.
@@ -10,9 +11,15 @@ use std::path::Path;
 /// # Errors
 /// [`IoError`] with line and column if it is invalid, or has an unknown version.
 pub fn read_calibration(path: &Path) -> Result<Calibration, IoError> {
-    let found: Calibration = read_json(path)?;
-    require_version(path, found.schema_version, calibration::SCHEMA_VERSION)?;
-    Ok(found)
+    parse_calibration(&bytes_of(path)?, path)
+}
+
+/// Reads a calibration from the bytes of its file; `path` names it in errors.
+///
+/// # Errors
+/// As [`read_calibration`].
+pub fn parse_calibration(bytes: &[u8], path: &Path) -> Result<Calibration, IoError> {
+    door::from_json(bytes, path)
 }
 
 /// Reads a calibration for use with a dataset of this session: it must be of the same scanner, if it states one.
@@ -35,20 +42,13 @@ pub fn read_calibration_for(path: &Path, session: &Session) -> Result<Calibratio
 /// # Errors
 /// [`IoError`] with line and column if it is invalid, or has an unknown version.
 pub fn read_characterization(path: &Path) -> Result<Characterization, IoError> {
-    let found: Characterization = read_json(path)?;
-    require_version(path, found.schema_version, characterization::SCHEMA_VERSION)?;
-    Ok(found)
+    parse_characterization(&bytes_of(path)?, path)
 }
 
-/// Checks that a file has the newest version of its format or an older one, all of which can be read.
-pub(super) fn require_version(path: &Path, found: u32, newest: u32) -> Result<(), IoError> {
-    if (1..=newest).contains(&found) {
-        return Ok(());
-    }
-    let known = match newest {
-        1 => "1".to_owned(),
-        newest => format!("1 to {newest}"),
-    };
-    let message = format!("schema_version is {found}, this program reads {known}");
-    Err(IoError::content(path, message))
+/// Reads a characterization from the bytes of its file; `path` names it in errors.
+///
+/// # Errors
+/// As [`read_characterization`].
+pub fn parse_characterization(bytes: &[u8], path: &Path) -> Result<Characterization, IoError> {
+    door::from_json(bytes, path)
 }

@@ -3,19 +3,22 @@
 //! A scene is read in steps, and all problems of the first step that finds any are reported: the format
 //! against the schema, then its semantics ([`catoptric_sim::check`]).
 
-use super::diagnostic::{Diagnostic, Diagnostics, Place, position};
+use super::diagnostic::{Diagnostic, Diagnostics, Lines, Place};
+use super::door::schema_of;
 use super::error::IoError;
 #[cfg(feature = "recording")]
 use super::file::sha256;
 use super::format;
 use super::mesh;
 use super::parameters;
-use super::paths::parent;
+use super::paths::{parent, similar};
 use super::tree::{self, Node, Source};
-use catoptric_model::place::{Problem, nearest};
+use catoptric_model::limits::FAR_M;
+use catoptric_model::place::Problem;
 use catoptric_sim::Scene;
 use catoptric_sim::build::pattern::{self, Expanded};
 use catoptric_sim::check;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -106,7 +109,7 @@ pub fn load(path: &Path, sets: &[String]) -> Result<Scene, SceneErrors> {
 /// As [`load`].
 pub fn load_text(path: &Path, sets: &[String]) -> Result<(String, Scene), SceneErrors> {
     let bytes = std::fs::read(path).map_err(|source| SceneErrors::Read {
-        help: similar_file(path, &source),
+        help: similar(path, &source),
         path: path.to_owned(),
         source,
     })?;
@@ -119,7 +122,7 @@ pub fn load_text(path: &Path, sets: &[String]) -> Result<(String, Scene), SceneE
         Err(error) => {
             let valid = error.utf8_error().valid_up_to();
             let text = String::from_utf8_lossy(error.as_bytes()).into_owned();
-            let (line, column) = position(&text, valid);
+            let (line, column) = Lines::of(&text).position(valid);
             Err(invalid(
                 &name,
                 &text,
@@ -157,9 +160,6 @@ pub fn parse_in(text: &str, file_name: &str, folder: &Path, sets: &[String]) -> 
     }
 }
 
-/// Largest coordinate of a vertex, in meters: as far as rays are cast.
-const LARGEST_COORDINATE_M: f64 = 1e4;
-
 /// Reads the meshes named by a scene; relative names start at a folder.
 ///
 /// # Errors
@@ -178,10 +178,7 @@ pub fn read_meshes(scene: &mut Scene, folder: &Path) -> Result<(), SceneErrors> 
         }
         let unit = shape.units.in_meters();
         let vertices = meshes.0[&shape.file].vertices();
-        if let Some(vertex) = vertices
-            .iter()
-            .position(|v| v.coords.amax() * unit > LARGEST_COORDINATE_M)
-        {
+        if let Some(vertex) = vertices.iter().position(|v| v.coords.amax() * unit > FAR_M) {
             let coordinate = vertices[vertex].coords.amax() * unit;
             return Err(refused(IoError::content(
                 &path,
@@ -305,7 +302,7 @@ pub fn parse(text: &str, file_name: &str, sets: &[String]) -> Result<Scene, Scen
     };
     let diagnostics = problems
         .into_iter()
-        .map(|p| locate_copy(p, &made, &root, sets, of_file.as_deref()))
+        .map(|p| locate_copy(p, &made, &root, sets, of_file.as_ref()))
         .collect();
     Err(invalid(file_name, text, diagnostics))
 }
@@ -332,7 +329,7 @@ pub fn to_toml(scene: &Scene) -> Result<String, toml::ser::Error> {
 
 /// JSON Schema of a scene whose expressions have been evaluated.
 pub fn json_schema() -> serde_json::Value {
-    schemars::schema_for!(Scene).to_value()
+    schema_of::<Scene>()
 }
 
 /// JSON Schema of a scene file, for editors: numbers may be expressions.
@@ -347,17 +344,17 @@ fn departures(
     schema: &serde_json::Value,
     syntax: &[Diagnostic],
 ) -> Vec<format::Finding> {
-    let broken_lines: Vec<usize> = syntax
+    let lines = Lines::of(text);
+    let broken_lines: BTreeSet<usize> = syntax
         .iter()
         .filter_map(|d| match &d.place {
-            Place::Span(span) => Some(position(text, span.start).0),
+            Place::Span(span) => Some(lines.line(span.start).0),
             _ => None,
         })
         .collect();
     let explained = |finding: &format::Finding| match &finding.source {
         Source::File(span) => {
-            !broken_lines.is_empty()
-                && (finding.missing || broken_lines.contains(&position(text, span.start).0))
+            !broken_lines.is_empty() && (finding.missing || broken_lines.contains(&lines.line(span.start).0))
         }
         _ => false,
     };
@@ -365,13 +362,13 @@ fn departures(
     findings.into_iter().filter(|f| !explained(f)).collect()
 }
 
-/// Problems of the file without any `--set`; `None` if it cannot be interpreted on its own.
+/// Messages about the file without any `--set`, each of which names its key; `None` if it cannot be interpreted on its own.
 fn problems_without_sets(
     file: &Node,
     text: &str,
     sets: &[String],
     schema: &serde_json::Value,
-) -> Option<Vec<Problem>> {
+) -> Option<BTreeSet<String>> {
     if sets.is_empty() {
         return None;
     }
@@ -380,7 +377,12 @@ fn problems_without_sets(
         return None;
     }
     let made = expanded(&file).ok()?.ok()?;
-    Some(check::problems(&made.scene))
+    Some(
+        check::problems(&made.scene)
+            .into_iter()
+            .map(|p| p.message)
+            .collect(),
+    )
 }
 
 /// The location of a problem; problems with a copy are reported at the pattern that made it.
@@ -389,7 +391,7 @@ fn locate_copy(
     made: &Expanded,
     root: &Node,
     sets: &[String],
-    of_file: Option<&[Problem]>,
+    of_file: Option<&BTreeSet<String>>,
 ) -> Diagnostic {
     let Some((path, name)) = made.origin(&problem.path) else {
         return locate(problem, root, sets, of_file);
@@ -404,9 +406,9 @@ fn locate_copy(
 }
 
 /// The location of a problem: the `--set` that caused it, otherwise the position of the value.
-fn locate(problem: Problem, root: &Node, sets: &[String], of_file: Option<&[Problem]>) -> Diagnostic {
+fn locate(problem: Problem, root: &Node, sets: &[String], of_file: Option<&BTreeSet<String>>) -> Diagnostic {
     let node = root.nearest(&problem.path);
-    let in_file = of_file.is_some_and(|list| list.contains(&problem));
+    let in_file = of_file.is_some_and(|messages| messages.contains(&problem.message));
     let set = match (node.set_within(), sets) {
         _ if in_file => None,
         (Some(number), _) => Some(number),
@@ -442,20 +444,4 @@ fn invalid(file: &str, text: &str, mut list: Vec<Diagnostic>) -> SceneErrors {
         text: text.to_owned(),
         list,
     }))
-}
-
-/// The file next to a missing one that was probably meant.
-fn similar_file(path: &Path, error: &std::io::Error) -> Option<String> {
-    if error.kind() != std::io::ErrorKind::NotFound {
-        return None;
-    }
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
-    let entries = std::fs::read_dir(folder.unwrap_or(Path::new("."))).ok()?;
-    let names: Vec<String> = entries
-        .filter_map(|e| e.ok()?.file_name().into_string().ok())
-        .collect();
-    let wanted = path.file_name()?.to_str()?;
-    let name = nearest(wanted, names.iter().map(String::as_str))?;
-    let name = folder.map_or(PathBuf::from(name), |f| f.join(name));
-    Some(format!("did you mean {}?", name.display()))
 }

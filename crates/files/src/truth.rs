@@ -2,11 +2,10 @@
 //! agrees with it.
 
 use super::dataset::{MANIFEST, TRUTH, read_checked, read_manifest, read_session};
+use super::door;
 use super::error::IoError;
-use super::results::require_version;
 use catoptric_model::Session;
 use catoptric_sim::Truth;
-use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Reads the truth of a dataset; `None` if the dataset has none.
@@ -28,8 +27,7 @@ pub fn read_truth(dataset: &Path) -> Result<Option<Truth>, IoError> {
         return Err(IoError::content(path, message));
     }
     let bytes = read_checked(dataset, TRUTH, manifest.as_ref().map(|m| &m.files))?;
-    let found: Truth = serde_json::from_slice(&bytes).map_err(|e| IoError::json(&path, &e))?;
-    require_version(&path, found.schema_version, catoptric_sim::truth::SCHEMA_VERSION)?;
+    let found = parse_truth(&bytes, &path)?;
     let session = read_session(dataset)?;
     let mut checked = check(&found, &session);
     if manifest.is_none() {
@@ -37,6 +35,14 @@ pub fn read_truth(dataset: &Path) -> Result<Option<Truth>, IoError> {
     }
     checked.map_err(|message| IoError::content(&path, message))?;
     Ok(Some(found))
+}
+
+/// Reads a truth from the bytes of its file; `path` names it in errors.
+///
+/// # Errors
+/// [`IoError::Text`] with line and column if it is invalid, or has an unknown version.
+pub fn parse_truth(bytes: &[u8], path: impl AsRef<Path>) -> Result<Truth, IoError> {
+    door::from_json(bytes, path.as_ref())
 }
 
 /// Reads the truth to judge a calibration by; `None` if the manifest states that there is none, or if `blind`.
@@ -61,34 +67,17 @@ pub fn read_reference(dataset: &Path, blind: bool) -> Result<Option<Truth>, IoEr
     })
 }
 
-/// Checks that a truth agrees with itself and with the scanner of its dataset.
+/// Checks that the beams of a truth are among those of the scanner of its dataset.
 fn check(truth: &Truth, session: &Session) -> Result<(), String> {
     let beams = session.scanner.scan.beams();
-    let facets: BTreeSet<&str> = truth.facets.iter().map(|f| f.name.as_str()).collect();
-    let mut seen = BTreeSet::new();
-    for (place, b) in truth.beams.iter().enumerate() {
-        if b.beam >= beams {
-            return Err(format!(
-                "beams[{place}].beam is {}, but the session's scanner has the beams 0…{}",
-                b.beam,
-                beams.saturating_sub(1)
-            ));
-        }
-        if !seen.insert(b.beam) {
-            return Err(format!(
-                "beams[{place}].beam: beam {} is listed more than once",
-                b.beam
-            ));
-        }
-        if let Some(name) = b.facets.iter().find(|name| !facets.contains(name.as_str())) {
-            return Err(format!("beams[{place}].facets: there is no facet {name:?}"));
-        }
-        let angles = [b.azimuth_rad, b.elevation_rad, b.distance_m];
-        if angles.into_iter().flatten().any(|x| !x.is_finite()) {
-            return Err(format!("beams[{place}] has a number that is not finite"));
-        }
+    match truth.beams.iter().enumerate().find(|(_, b)| b.beam >= beams) {
+        None => Ok(()),
+        Some((place, b)) => Err(format!(
+            "beams[{place}].beam is {}, but the session's scanner has the beams 0…{}",
+            b.beam,
+            beams.saturating_sub(1)
+        )),
     }
-    Ok(())
 }
 
 /// Checks that a truth may be that of a session that no manifest ties it to.

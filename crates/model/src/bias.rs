@@ -2,7 +2,9 @@
 //!
 //! A bias is *measured − true* and is subtracted to correct.
 
+use crate::limits;
 use crate::range::{CorrectedRange, RawRange};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -29,7 +31,7 @@ impl BiasTerms {
 }
 
 /// Everything that Eq. (3) subtracts: a table over distance, a cosine law, and a line for each color.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RangeBias {
     /// E_r.
@@ -63,24 +65,28 @@ impl ColoredBias<'_> {
 }
 
 /// E_r as a table over distance, linearly interpolated and constant outside (Cooper, Table 2).
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DistanceBias {
     /// Distances in meters, strictly increasing.
+    #[schemars(inner(range(min = 0.0, max = limits::FAR_M)))]
     pub range_m: Vec<f64>,
     /// Errors at those distances, in millimeters.
+    #[schemars(inner(range(min = -limits::ERROR_MM, max = limits::ERROR_MM)))]
     pub error_mm: Vec<f64>,
 }
 
 /// E_a = A_a·cos θ_N + B_a — Cooper, Eq. (4) — plus a table where that law does not fit the measured errors.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AngleBias {
     /// A_a, in millimeters.
     #[doc(alias = "A_a")]
+    #[schemars(range(min = -limits::ERROR_MM, max = limits::ERROR_MM))]
     pub gain_mm: f64,
     /// B_a, in millimeters.
     #[doc(alias = "B_a")]
+    #[schemars(range(min = -limits::ERROR_MM, max = limits::ERROR_MM))]
     pub offset_mm: f64,
     /// Table added to the law; with A_a = B_a = 0 it replaces the law.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -88,24 +94,28 @@ pub struct AngleBias {
 }
 
 /// Range errors over incidence, linearly interpolated in θ_N and constant outside.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AngleTable {
     /// Incidences θ_N in degrees, strictly increasing.
+    #[schemars(length(min = 1), inner(range(min = 0.0, max = 90.0)))]
     pub incidence_deg: Vec<f64>,
     /// Errors at those incidences, in millimeters.
+    #[schemars(inner(range(min = -limits::ERROR_MM, max = limits::ERROR_MM)))]
     pub error_mm: Vec<f64>,
 }
 
 /// E_c = A_c·R + B_c — Cooper, Eq. (5).
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ColorBias {
     /// A_c, in millimeters per meter.
     #[doc(alias = "A_c")]
+    #[schemars(range(min = -limits::ERROR_MM, max = limits::ERROR_MM))]
     pub slope_mm_per_m: f64,
     /// B_c, in millimeters.
     #[doc(alias = "B_c")]
+    #[schemars(range(min = -limits::ERROR_MM, max = limits::ERROR_MM))]
     pub offset_mm: f64,
 }
 

@@ -5,9 +5,11 @@ use crate::beam::Deflection;
 use crate::bias::RangeBias;
 use crate::dataset::Dataset;
 use crate::error::ModelError;
+use crate::limits;
 pub use crate::mount::MountEstimate;
 use crate::scan::ScanAngles;
 use crate::session::Session;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Version of `calibration.json`. Version 1 had neither `scanner` nor `dataset`.
@@ -15,7 +17,7 @@ pub const SCHEMA_VERSION: u32 = 2;
 
 crate::closed_set! {
     /// Outcome for an element.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
     #[serde(rename_all = "snake_case")]
     pub enum Status {
         /// θ_a and φ were estimated.
@@ -48,10 +50,11 @@ impl Status {
 }
 
 /// The result for one element. An unobservable angle is absent, never a number.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BeamEstimate {
     /// Index of the beam, from 0.
+    #[schemars(range(max = limits::LAST_BEAM))]
     pub beam: usize,
     /// Its status.
     pub status: Status,
@@ -63,58 +66,73 @@ pub struct BeamEstimate {
     pub facet: Option<String>,
     /// θ_a, in radians.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -limits::TURN_DEG, max = limits::TURN_DEG))]
     pub azimuth_rad: Option<f64>,
     /// φ, in radians.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -limits::TURN_DEG, max = limits::TURN_DEG))]
     pub elevation_rad: Option<f64>,
     /// d, in meters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -limits::FAR_M, max = limits::FAR_M))]
     pub distance_m: Option<f64>,
     /// Standard deviation of d under all assumed errors, in meters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = limits::FAR_M))]
     pub distance_sd_m: Option<f64>,
     /// Covariance of (θ_a, φ) under all assumed errors, in square radians.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(inner(range(min = -limits::ANY, max = limits::ANY))))]
     pub covariance_rad2: Option<[[f64; 2]; 2]>,
     /// The paper's covariance, σ²(HᵀH)⁻¹ with range noise alone, in square radians.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(inner(range(min = -limits::ANY, max = limits::ANY))))]
     pub noise_covariance_rad2: Option<[[f64; 2]; 2]>,
     /// Direction in (θ_a, φ) that the boards do not determine.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = -limits::ANY, max = limits::ANY)))]
     pub null_direction: Option<[f64; 2]>,
     /// Number of boards used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(max = limits::COUNT))]
     pub poses: Option<usize>,
     /// Number of readings used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(max = limits::COUNT))]
     pub readings: Option<usize>,
     /// Number of iterations.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(max = limits::COUNT))]
     pub iterations: Option<usize>,
     /// Root mean square of the residuals over the boards, in meters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -limits::FAR_M, max = limits::FAR_M))]
     pub rms_residual_m: Option<f64>,
 }
 
 /// The result for one facet: the plane m·x = h in the sensor frame.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FacetEstimate {
     /// Name.
     pub facet: String,
     /// Unit normal m.
+    #[schemars(inner(range(min = -limits::ANY, max = limits::ANY)))]
     pub normal: [f64; 3],
     /// h, in meters.
+    #[schemars(range(min = -limits::FAR_M, max = limits::FAR_M))]
     pub offset_m: f64,
     /// Covariance of (two tilts in radians, offset in meters).
+    #[schemars(inner(inner(range(min = -limits::ANY, max = limits::ANY))))]
     pub covariance: [[f64; 3]; 3],
 }
 
 /// A calibration: one entry for each element that was analyzed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
     /// Version of this file's format.
+    #[schemars(range(min = 1, max = SCHEMA_VERSION))]
     pub schema_version: u32,
     /// Name of the method.
     pub method: String,

@@ -4,17 +4,20 @@
 
 use crate::bias::RangeBias;
 use crate::label::{SpotNote, TestKind};
+use crate::limits;
 use crate::mount::MountEstimate;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Version of `characterization.json`.
 pub const SCHEMA_VERSION: u32 = 1;
 
 /// A characterized sensor.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Characterization {
     /// Version of this file's format.
+    #[schemars(range(min = 1, max = SCHEMA_VERSION))]
     pub schema_version: u32,
     /// Name of the experiment.
     pub name: String,
@@ -30,6 +33,7 @@ pub struct Characterization {
     /// The fitted parameters.
     pub parameters: Vec<Parameter>,
     /// Their covariance, in the units of the parameters, in row-major order.
+    #[schemars(inner(inner(range(min = -limits::ANY, max = limits::ANY))))]
     pub covariance: Vec<Vec<f64>>,
     /// Parameters that the boards do not determine.
     #[serde(default)]
@@ -55,66 +59,81 @@ pub struct Characterization {
 }
 
 /// The spot of neighboring beams on a board.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SpotRow {
     /// Number of the pose.
+    #[schemars(range(max = limits::COUNT))]
     pub pose: usize,
     /// Distance to the board, in meters.
+    #[schemars(range(min = 0.0, max = limits::FAR_M))]
     pub distance_m: f64,
     /// The spot.
     pub spot: SpotNote,
 }
 
 /// Lines fitted to the extents of the spot: extent = offset + slope·distance.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SpotLaw {
     /// Growth of the width, in millimeters per meter (full angle in milliradians).
+    #[schemars(range(min = -limits::ERROR_MM, max = limits::ERROR_MM))]
     pub width_slope_mrad: f64,
     /// Width at distance 0, in millimeters.
+    #[schemars(range(min = -limits::ERROR_MM, max = limits::ERROR_MM))]
     pub width_offset_mm: f64,
     /// Growth of the height, in millimeters per meter.
+    #[schemars(range(min = -limits::ERROR_MM, max = limits::ERROR_MM))]
     pub height_slope_mrad: f64,
     /// Height at distance 0, in millimeters.
+    #[schemars(range(min = -limits::ERROR_MM, max = limits::ERROR_MM))]
     pub height_offset_mm: f64,
 }
 
 /// Readings of one board by one beam, the one nearest to the board's center.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StretchRow {
     /// Number of the pose.
+    #[schemars(range(max = limits::COUNT))]
     pub pose: usize,
     /// What was tested; absent for a board that was set up to determine the mounting.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub test: Option<TestKind>,
     /// Number of the setting.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(max = limits::COUNT))]
     pub setting: Option<usize>,
     /// Number of the trial.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(max = limits::COUNT))]
     pub trial: Option<usize>,
     /// The board.
     pub board: String,
     /// Its color.
     pub color: String,
     /// The beam.
+    #[schemars(range(max = limits::LAST_BEAM))]
     pub beam: usize,
     /// Distance along the beam to the board as tracked, in meters.
+    #[schemars(range(min = 0.0, max = limits::FAR_M))]
     pub distance_m: f64,
     /// Angle between the board's normal and the beam, in degrees; negative if the normal points to smaller azimuths.
+    #[schemars(range(min = -180.0, max = 180.0))]
     pub incidence_deg: f64,
     /// Number of readings that are ranges.
+    #[schemars(range(max = limits::COUNT))]
     pub readings: usize,
     /// Their mean minus the distance, in millimeters.
+    #[schemars(range(min = -limits::FAR_MM, max = limits::FAR_MM))]
     pub mean_error_mm: f64,
     /// Their standard deviation, in millimeters.
+    #[schemars(range(min = 0.0, max = limits::FAR_MM))]
     pub sd_mm: f64,
 }
 
 /// A parameter of Eqs. (3)–(5).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Parameter {
     /// Its symbol: `E_r`, `A_a`, `B_a`, `A_c` or `B_c`.
@@ -124,17 +143,20 @@ pub struct Parameter {
     pub color: Option<String>,
     /// The distance it belongs to, in meters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = limits::FAR_M))]
     pub distance_m: Option<f64>,
     /// `mm` or `mm/m`.
     pub unit: String,
     /// Its value.
+    #[schemars(range(min = -limits::ERROR_MM, max = limits::ERROR_MM))]
     pub value: f64,
     /// Its standard deviation.
+    #[schemars(range(min = 0.0, max = limits::ERROR_MM))]
     pub sd: f64,
 }
 
 /// A parameter that the boards do not determine.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NotObserved {
     /// Its symbol, as in [`Parameter`].
@@ -147,66 +169,81 @@ pub struct NotObserved {
 }
 
 /// A line with its uncertainty: value = slope·distance + offset.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Law {
     /// A_c, in millimeters per meter.
+    #[schemars(range(min = -limits::ERROR_MM, max = limits::ERROR_MM))]
     pub slope_mm_per_m: f64,
     /// B_c, in millimeters.
+    #[schemars(range(min = -limits::ERROR_MM, max = limits::ERROR_MM))]
     pub offset_mm: f64,
     /// Covariance of slope and offset.
+    #[schemars(inner(inner(range(min = -limits::ANY, max = limits::ANY))))]
     pub covariance: [[f64; 2]; 2],
     /// How well the line fits.
     pub fit: Fit,
 }
 
 /// A sum of squared residuals in units of their standard deviations, with its degrees of freedom.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fit {
     /// χ².
+    #[schemars(range(min = 0.0, max = limits::ANY))]
     pub chi_squared: f64,
     /// Its degrees of freedom.
+    #[schemars(range(max = limits::COUNT))]
     pub degrees_of_freedom: usize,
 }
 
 /// Residual of the cosine law at one incidence.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MisfitRow {
     /// Incidence θ_N, in degrees, regardless of the direction in which the board was turned.
+    #[schemars(range(min = 0.0, max = 180.0))]
     pub incidence_deg: f64,
     /// Number of stretches.
+    #[schemars(range(max = limits::COUNT))]
     pub stretches: usize,
     /// E_a by the law, in millimeters.
+    #[schemars(range(min = -limits::FAR_MM, max = limits::FAR_MM))]
     pub law_mm: f64,
     /// Measured E_a minus the law, in millimeters.
+    #[schemars(range(min = -limits::FAR_MM, max = limits::FAR_MM))]
     pub misfit_mm: f64,
     /// Standard deviation of the misfit, in millimeters.
+    #[schemars(range(min = 0.0, max = limits::FAR_MM))]
     pub sd_mm: f64,
 }
 
 /// White noise for one color and distance.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseRow {
     /// Color.
     pub color: String,
     /// Distance, in meters.
+    #[schemars(range(min = 0.0, max = limits::FAR_M))]
     pub distance_m: f64,
     /// Standard deviation of one reading, in millimeters.
+    #[schemars(range(min = 0.0, max = limits::FAR_MM))]
     pub sd_mm: f64,
     /// Number of readings minus number of means.
+    #[schemars(range(max = limits::COUNT))]
     pub degrees_of_freedom: usize,
 }
 
 /// Scatter of repeated means.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scatter {
     /// Standard deviation, in millimeters.
+    #[schemars(range(min = 0.0, max = limits::FAR_MM))]
     pub sd_mm: f64,
     /// Number of repetitions minus number of settings.
+    #[schemars(range(max = limits::COUNT))]
     pub degrees_of_freedom: usize,
 }
 

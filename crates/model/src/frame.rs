@@ -2,19 +2,23 @@
 //!
 //! `room_from_sensor * sensor_from_board` is `room_from_board`: the inner names cancel.
 
+use crate::limits;
 use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A rigid transform named `a_from_b`: it takes coordinates in frame b to coordinates in frame a.
 pub type Pose = Isometry3<f64>;
 
 /// A pose as stored in files: meters and a unit quaternion, scalar last (the order of ROS messages).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PoseData {
     /// Origin of b in frame a, in meters.
+    #[schemars(inner(range(min = -limits::FAR_M, max = limits::FAR_M)))]
     pub translation_m: [f64; 3],
     /// Rotation from b to a as a unit quaternion (x, y, z, w).
+    #[schemars(inner(range(min = -limits::UNIT, max = limits::UNIT)))]
     pub rotation_xyzw: [f64; 4],
 }
 

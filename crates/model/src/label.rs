@@ -1,9 +1,11 @@
 //! The experimenter's notes on a stretch of scans: its purpose, and what was set up or tested.
 
+use crate::limits;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The purpose of a stretch of scans.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PoseKind {
     /// Step 3: the structure before its mirrors were attached.
@@ -19,7 +21,7 @@ pub enum PoseKind {
 }
 
 /// The test of the bare sensor (step 1).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum TestKind {
     /// Spot size over distance: Figures 2 and 3, Table 1.
@@ -48,14 +50,17 @@ pub struct TestNote {
 }
 
 /// A spot on a board as seen through an infrared camera.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SpotNote {
     /// Number of neighboring beams that form it.
+    #[schemars(range(max = limits::COUNT))]
     pub beams: usize,
     /// Extent along the scan, in millimeters.
+    #[schemars(range(min = 0.0, max = limits::FAR_MM))]
     pub width_mm: f64,
     /// Extent across the scan, in millimeters.
+    #[schemars(range(min = 0.0, max = limits::FAR_MM))]
     pub height_mm: f64,
 }
 

@@ -37,12 +37,16 @@ pub struct Problem {
 /// ```
 pub fn nearest<'a>(found: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let found = found.to_lowercase();
+    let letters = found.chars().count();
     let distance = |name: &str| strsim::damerau_levenshtein(&found, &name.to_lowercase());
+    // Up to a third of the letters wrong is a typo; more is a different word.
+    let wrong = |name: &str| (name.chars().count().max(letters) / 3).max(1);
     names
         .into_iter()
+        // As many letters as one has more than the other are wrong for sure: a name of a million is not compared.
+        .filter(|name| name.chars().count().abs_diff(letters) <= wrong(name))
         .map(|name| (distance(name), name))
-        // Up to a third of the letters wrong is a typo; more is a different word.
-        .filter(|(d, name)| *d <= (name.chars().count().max(found.chars().count()) / 3).max(1))
+        .filter(|(d, name)| *d <= wrong(name))
         .min_by_key(|(d, _)| *d)
         .map(|(_, name)| name)
 }

@@ -8,6 +8,8 @@
 //! If the beams cover the full circle, beams·step = 360° to within half a step, the scan closes: its first and last
 //! beams are neighbors, and a run of beams may cross the seam, `[first, last]` with first > last.
 
+use crate::limits;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -18,7 +20,7 @@ pub const MOST_BEAMS: usize = 1 << 16;
 const SAME_PART_OF_STEP: f64 = 1e-3;
 
 /// The direction of rotation of a scan, seen from above.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum ScanDirection {
     /// Counter-clockwise: azimuths increase from beam to beam.
@@ -29,14 +31,17 @@ pub enum ScanDirection {
 }
 
 /// The azimuths of a scan's beams, to which a calibration is bound.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ScanAngles {
     /// Azimuth of beam 0, counter-clockwise from the x axis of the sensor frame, in degrees.
+    #[schemars(range(min = -limits::TURN_DEG, max = limits::TURN_DEG))]
     pub first_deg: f64,
     /// Angle between neighboring beams, in degrees.
+    #[schemars(range(min = limits::STEP_DEG, max = limits::TURN_DEG))]
     pub step_deg: f64,
     /// Number of beams in a scan.
+    #[schemars(range(min = 1, max = MOST_BEAMS))]
     pub beams: usize,
     /// The direction of rotation.
     #[serde(default)]

@@ -7,18 +7,21 @@ use crate::bias::{DistanceBias, RangeBias};
 use crate::board::{BoardPlane, Rectangle};
 use crate::characterization::Characterization;
 use crate::frame::PoseData;
+use crate::limits;
 use crate::scan::{ScanAngles, ScanDirection, ScanError, ScanGeometry};
 use nalgebra::{Point3, Unit, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Version of `session.toml`.
 pub const SCHEMA_VERSION: u32 = 2;
 
 /// Everything known before the first reading is analyzed.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Session {
     /// Version of this file's format.
+    #[schemars(range(min = 1, max = SCHEMA_VERSION))]
     pub schema_version: u32,
     /// Name of the experiment.
     pub name: String,
@@ -46,7 +49,7 @@ pub struct Session {
 }
 
 /// The scanner's data sheet.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "FlatSheet", into = "FlatSheet")]
 pub struct ScannerSheet {
     /// Name of the preset.
@@ -63,67 +66,96 @@ pub struct ScannerSheet {
 
 /// The same as stored in `session.toml`. Entries missing in version 1 default to what all scanners had then: beams
 /// placed symmetrically about the x axis, counter-clockwise, spread evenly over the turn.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct FlatSheet {
+    /// Name of the preset.
     preset: String,
+    /// Number of beams of a scan.
+    #[schemars(range(min = 1, max = crate::scan::MOST_BEAMS))]
     beams: usize,
+    /// Angle between neighboring beams, in degrees.
+    #[schemars(range(min = limits::STEP_DEG, max = limits::TURN_DEG))]
     step_deg: f64,
+    /// Azimuth of beam 0, in degrees.
     #[serde(default)]
+    #[schemars(range(min = -limits::TURN_DEG, max = limits::TURN_DEG))]
     first_deg: Option<f64>,
+    /// The direction of rotation.
     #[serde(default)]
     direction: ScanDirection,
+    /// Scans per second.
+    #[schemars(range(min = limits::SLOWEST_HZ, max = limits::FASTEST_HZ))]
     scan_rate_hz: f64,
+    /// Time from one beam to the next, in microseconds.
     #[serde(default)]
+    #[schemars(range(min = limits::BEAM_TIME_US[0], max = limits::BEAM_TIME_US[1]))]
     beam_time_us: Option<f64>,
+    /// Shortest range, in meters.
+    #[schemars(range(min = 0.0, max = limits::FAR_M))]
     range_min_m: f64,
+    /// Longest range, in meters.
+    #[schemars(range(min = 0.0, max = limits::FAR_M))]
     range_max_m: f64,
+    /// Full 1/e² divergence of a beam along the longer axis of its spot, in milliradians.
+    #[schemars(range(min = 0.0, max = limits::DIVERGENCE_MRAD))]
     divergence_full_mrad: f64,
 }
 
 /// Tolerance of the optical frame's nominal pose, 1σ for each axis; 0 if the pose in the rig is known
 /// exactly.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MountTolerance {
     /// Rotation about x, y and z, in degrees.
+    #[schemars(inner(range(min = 0.0, max = limits::TURN_DEG)))]
     pub rotation_sd_deg: [f64; 3],
     /// Shift along x, y and z, in millimeters.
+    #[schemars(inner(range(min = 0.0, max = limits::ERROR_MM)))]
     pub translation_sd_mm: [f64; 3],
 }
 
 /// A box-shaped room, in the room frame.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RoomSurvey {
     /// Corner with the smallest coordinates, in meters.
+    #[schemars(inner(range(min = -limits::FAR_M, max = limits::FAR_M)))]
     pub min_m: [f64; 3],
     /// Corner with the largest coordinates, in meters.
+    #[schemars(inner(range(min = -limits::FAR_M, max = limits::FAR_M)))]
     pub max_m: [f64; 3],
     /// Color of walls, floor and ceiling.
     pub color: String,
 }
 
 /// The assumed errors, from step 1 and from data sheets. Standard deviations are 1σ.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Beliefs {
     /// White noise of one reading, in millimeters.
+    #[schemars(range(min = 0.0, max = limits::ERROR_MM))]
     pub range_noise_sd_mm: f64,
     /// Drift, constant over one pose, in millimeters.
+    #[schemars(range(min = 0.0, max = limits::ERROR_MM))]
     pub drift_sd_mm: f64,
     /// Error of one beam, constant over one pose, in millimeters: not reduced by averaging readings.
     #[serde(default, skip_serializing_if = "is_zero")]
+    #[schemars(range(min = 0.0, max = limits::ERROR_MM))]
     pub element_sd_mm: f64,
     /// Error of one marker coordinate, constant over time, in millimeters.
+    #[schemars(range(min = 0.0, max = limits::ERROR_MM))]
     pub marker_sd_mm: f64,
     /// The biases as characterized in step 1.
     pub bias: RangeBias,
     /// Uncertainty of E_r at each node of its table, in millimeters.
+    #[schemars(range(min = 0.0, max = limits::ERROR_MM))]
     pub distance_bias_sd_mm: f64,
     /// Uncertainty of A_a, in millimeters, with B_a + A_a (the error at normal incidence) held fixed.
+    #[schemars(range(min = 0.0, max = limits::ERROR_MM))]
     pub angle_gain_sd_mm: f64,
     /// Uncertainty of E_c, in millimeters.
+    #[schemars(range(min = 0.0, max = limits::ERROR_MM))]
     pub color_bias_sd_mm: f64,
 }
 
@@ -172,54 +204,63 @@ impl Beliefs {
 }
 
 /// Step 3: ranges to the structure before the mirrors were attached.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BareStructure {
     /// Thickness of the mirrors along their normals, in millimeters.
+    #[schemars(range(min = 0.0, max = limits::THICKNESS_MM))]
     pub mirror_thickness_mm: f64,
     /// Uncertainty of a bare distance, in millimeters.
+    #[schemars(range(min = 0.0, max = limits::ERROR_MM))]
     pub distance_sd_mm: f64,
     /// Whether the scanner itself measured them, in one recording: then they share its drift there and the uncertainty
     /// of the assumed biases that correct them. Both are part of the uncertainty.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub scanned: bool,
     /// First beam of `distance_m`.
+    #[schemars(range(max = limits::LAST_BEAM))]
     pub first_beam: usize,
     /// Mean bias-corrected range of each beam to the bare structure, in meters; 0 if there is none.
+    #[schemars(inner(range(min = 0.0, max = limits::FAR_M)))]
     pub distance_m: Vec<f64>,
 }
 
 /// A labeled marker.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Marker {
     /// Label.
     pub name: String,
     /// Position in its body's frame, in millimeters.
+    #[schemars(inner(range(min = -limits::FAR_MM, max = limits::FAR_MM)))]
     pub position_mm: [f64; 3],
 }
 
 /// A mirror as drawn.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NominalFacet {
     /// Name.
     pub name: String,
     /// Corners in the nominal sensor frame, in millimeters, counter-clockwise seen from the reflecting side.
+    #[schemars(length(min = 3), inner(inner(range(min = -limits::FAR_MM, max = limits::FAR_MM))))]
     pub corners_mm: Vec<[f64; 3]>,
     /// First and last beam that hit this facet, according to the drawing.
+    #[schemars(inner(range(max = limits::LAST_BEAM)))]
     pub beams: [usize; 2],
 }
 
 /// A target board.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BoardSheet {
     /// Name, which is also the motion-capture subject.
     pub name: String,
     /// Extent along the board's x axis, in millimeters.
+    #[schemars(extend("exclusiveMinimum" = 0.0), range(min = 0.0, max = limits::FAR_MM))]
     pub width_mm: f64,
     /// Extent along the board's y axis, in millimeters.
+    #[schemars(extend("exclusiveMinimum" = 0.0), range(min = 0.0, max = limits::FAR_MM))]
     pub height_mm: f64,
     /// Color.
     pub color: String,

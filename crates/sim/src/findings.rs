@@ -3,6 +3,9 @@
 use catoptric_model::place::{KeyPath, Problem, nearest};
 use std::fmt;
 
+/// Maximum number of names that are compared and listed: more would make many problems slow to report.
+const MOST_LISTED: usize = 100;
+
 /// The problems found so far.
 pub(crate) struct Findings(pub(crate) Vec<Problem>);
 
@@ -23,18 +26,13 @@ impl Findings {
 }
 
 /// Asks "did you mean …?" for a close name, or lists the known ones.
-pub(crate) fn suggestion<'a>(
-    found: &str,
-    what: &str,
-    names: impl IntoIterator<Item = &'a str> + Clone,
-) -> String {
-    if let Some(name) = nearest(found, names.clone()) {
-        return format!("did you mean `{name}`?");
-    }
-    let names: Vec<&str> = names.into_iter().collect();
-    if names.is_empty() {
-        format!("the scene has no {what}")
-    } else {
-        format!("known: {}", names.join(", "))
+pub(crate) fn suggestion<'a>(found: &str, what: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+    let mut names = names.into_iter();
+    let first: Vec<&str> = names.by_ref().take(MOST_LISTED).collect();
+    let is_more = names.next().is_some();
+    match nearest(found, first.iter().copied()) {
+        Some(name) => format!("did you mean `{name}`?"),
+        None if first.is_empty() => format!("the scene has no {what}"),
+        None => format!("known: {}{}", first.join(", "), if is_more { ", …" } else { "" }),
     }
 }

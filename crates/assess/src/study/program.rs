@@ -65,7 +65,7 @@ impl Program {
             return Err("it wrote no calibration".to_owned());
         }
         let calibration: Calibration =
-            catoptric_files::read_json(&out).map_err(|e| format!("what it wrote cannot be read: {e}"))?;
+            catoptric_files::read_calibration(&out).map_err(|e| format!("what it wrote cannot be read: {e}"))?;
         let problems = validate(&calibration);
         match problems.iter().find(|p| p.severity == Severity::Error) {
             Some(problem) => Err(format!("what it wrote is not valid: {problem}")),

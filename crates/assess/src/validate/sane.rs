@@ -1,6 +1,6 @@
 //! Plausibility checks of unit vectors, coordinates and covariances.
 
-use nalgebra::DMatrix;
+use catoptric_model::covariance;
 use std::f64::consts::PI;
 
 /// Maximum distance of a mirror from the scanner, in meters; larger values are probably millimeters.
@@ -12,9 +12,6 @@ pub const ANGLE_SD_RAD: [f64; 2] = [1e-10, PI];
 
 /// Tolerance of the length of a normal or a quaternion: well above the effect of rounding to nine digits.
 const UNIT_TOLERANCE: f64 = 1e-6;
-
-/// Negative eigenvalue, relative to the largest one, that rounding can explain.
-const DEFINITE_TOLERANCE: f64 = 1e-9;
 
 /// Whether a length is 1 up to rounding; false for NaN.
 pub(super) fn is_unit(length: f64) -> bool {
@@ -28,21 +25,5 @@ pub(super) fn is_near(meters: f64) -> bool {
 
 /// Whether a matrix can be a covariance: finite, symmetric, positive semi-definite.
 pub(super) fn check_covariance<const N: usize>(rows: &[[f64; N]; N]) -> Result<(), String> {
-    let c = DMatrix::from_fn(N, N, |i, j| rows[i][j]);
-    if !c.iter().all(|x| x.is_finite()) {
-        return Err("contains a value that is not a number".to_owned());
-    }
-    if (&c - c.transpose()).amax() > DEFINITE_TOLERANCE * c.amax() {
-        return Err("is not symmetric".to_owned());
-    }
-    if let Some(negative) = c.diagonal().iter().find(|&&x| x < 0.0) {
-        return Err(format!("has the negative variance {negative:e}"));
-    }
-    // Angles and shifts have different magnitudes: scaled to correlations, one tolerance suits both.
-    let scale = c.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 1.0 });
-    let correlation = DMatrix::from_fn(N, N, |i, j| c[(i, j)] * scale[i] * scale[j]);
-    if correlation.symmetric_eigenvalues().min() < -DEFINITE_TOLERANCE {
-        return Err("is not positive semi-definite".to_owned());
-    }
-    Ok(())
+    covariance::check(N, |i, j| rows[i][j])
 }

@@ -52,7 +52,7 @@ impl Walk<'_> {
         );
         let help = match split_unit(key) {
             Some((_, "deg")) => Some("angles are in degrees".to_owned()),
-            _ if key == "schema_version" => Some("this program reads version 1".to_owned()),
+            _ if key == "schema_version" => Some("it is of another version of this program".to_owned()),
             _ => None,
         };
         self.add(&node.source, path, message, help);

@@ -15,6 +15,7 @@ pub use ply::to_ply;
 
 use super::error::IoError;
 use super::extension::{by_extension, listed};
+use super::paths::unread;
 use catoptric_sim::Mesh;
 use row::{Fault, Row};
 use std::fs;
@@ -55,7 +56,7 @@ impl MeshFormat {
 /// or [`IoError::Content`] if it is not a valid mesh.
 pub fn read_mesh(path: impl AsRef<Path>) -> Result<Mesh, IoError> {
     let path = path.as_ref();
-    let bytes = fs::read(path).map_err(|e| IoError::read(path, e))?;
+    let bytes = fs::read(path).map_err(|e| IoError::read(path, unread(path, e)))?;
     parse_mesh(&bytes, path)
 }
 

@@ -43,6 +43,7 @@ fn session(beams: usize) -> Session {
             .map(|(n, x, y)| marker(n, [x * 280.0, y * 180.0, 0.0]))
             .into(),
     };
+    let first = 2.min(beams - 1);
     Session {
         schema_version: SCHEMA_VERSION,
         name: "round trip".to_owned(),
@@ -80,8 +81,8 @@ fn session(beams: usize) -> Session {
             mirror_thickness_mm: 3.0,
             distance_sd_mm: 1.0,
             scanned: false,
-            first_beam: 2,
-            distance_m: vec![0.1, 0.0, 0.12],
+            first_beam: first,
+            distance_m: [0.1, 0.0, 0.12].into_iter().take(beams - first).collect(),
         },
         rig_markers: vec![
             marker("top", [0.0, 0.0, 120.0]),

@@ -1,6 +1,7 @@
 //! A file as a tree of values with their positions, before conversion to a typed value.
 
 mod json;
+#[cfg(feature = "scene")]
 mod set;
 mod toml;
 
@@ -8,6 +9,7 @@ use catoptric_model::place::{KeyPath, Segment};
 use std::ops::Range;
 
 pub(super) use self::json::from_json;
+#[cfg(feature = "scene")]
 pub(super) use self::set::apply_set;
 pub(super) use self::toml::from_toml;
 

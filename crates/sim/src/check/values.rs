@@ -5,6 +5,7 @@ use crate::findings::{Findings, suggestion};
 use crate::scene::{Detector, EchoChoice, MocapProfile, NoiseTable, Preset, Principle, Scene};
 use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::place::KeyPath;
+use std::collections::BTreeMap;
 
 pub(super) fn check(scene: &Scene, found: &mut Findings) {
     names(scene, found);
@@ -25,19 +26,19 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
 
 /// Checks that names are not empty and not used twice, which would be ambiguous.
 pub(super) fn distinct<'a>(list: &KeyPath, names: impl Iterator<Item = &'a str>, found: &mut Findings) {
-    let mut seen: Vec<&str> = Vec::new();
+    let mut seen: BTreeMap<&str, usize> = BTreeMap::new();
     for (i, name) in names.enumerate() {
         let path = list.index(i).key("name");
         if name.trim().is_empty() {
             found.add(&path, "is empty; a name needs at least one letter", None);
-        } else if let Some(first) = seen.iter().position(|s| *s == name) {
+        } else if let Some(first) = seen.get(name) {
             found.add(
                 &path,
                 format_args!("is {name:?}, already the name of `{list}[{first}]`"),
                 "names must be unique".to_owned(),
             );
         }
-        seen.push(name);
+        seen.entry(name).or_insert(i);
     }
 }
 

@@ -4,18 +4,21 @@ pub use crate::receive::reading::BeamClass;
 
 use crate::scene::Mishap;
 use catoptric_model::beam::{self, Deflection};
+use catoptric_model::limits;
 use catoptric_model::{PoseData, PoseKind, RangeBias};
 use nalgebra::{Unit, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Version of `truth.json`.
 pub const SCHEMA_VERSION: u32 = 1;
 
 /// Everything that a score is computed from on the side of the truth.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Truth {
     /// Version of this file's format.
+    #[schemars(range(min = 1, max = SCHEMA_VERSION))]
     pub schema_version: u32,
     /// Name of the scene.
     pub name: String,
@@ -36,49 +39,59 @@ pub struct Truth {
 }
 
 /// A mirror as built, in the true sensor frame.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TrueFacet {
     /// Name.
     pub name: String,
     /// Unit normal m of its plane, on the reflecting side.
+    #[schemars(inner(range(min = -limits::UNIT, max = limits::UNIT)))]
     pub normal: [f64; 3],
     /// h of the plane m·x = h, in meters.
+    #[schemars(range(min = -limits::FAR_M, max = limits::FAR_M))]
     pub offset_m: f64,
     /// Corners, in meters.
+    #[schemars(inner(inner(range(min = -limits::FAR_M, max = limits::FAR_M))))]
     pub corners_m: Vec<[f64; 3]>,
 }
 
 /// What the structure does to the light of a beam. Angles are those of the chief ray.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TrueBeam {
     /// Index of the beam.
+    #[schemars(range(max = limits::LAST_BEAM))]
     pub beam: usize,
     /// Class of the beam.
     pub status: BeamClass,
     /// Facets that the chief ray hits, in order.
     pub facets: Vec<String>,
     /// Where it hits them, in the sensor frame, in meters.
+    #[schemars(inner(inner(range(min = -limits::FAR_M, max = limits::FAR_M))))]
     pub points_m: Vec<[f64; 3]>,
     /// θ_a, in radians; absent if the chief ray does not leave.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -limits::TURN_RAD, max = limits::TURN_RAD))]
     pub azimuth_rad: Option<f64>,
     /// φ, in radians.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -limits::TURN_RAD, max = limits::TURN_RAD))]
     pub elevation_rad: Option<f64>,
     /// d: distance to the first facet, in meters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = limits::FAR_M))]
     pub distance_m: Option<f64>,
     /// Share of the beam's energy that takes the same path as the chief ray.
+    #[schemars(range(min = 0.0, max = limits::WHOLE))]
     pub chief_energy: f64,
 }
 
 /// True values of a stretch.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TruePose {
     /// Number of the pose.
+    #[schemars(range(max = limits::COUNT))]
     pub pose: usize,
     /// Kind of the stretch.
     pub kind: PoseKind,
@@ -95,9 +108,11 @@ pub struct TruePose {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub room_from_sensor: Vec<PoseData>,
     /// Drift of all its readings, in meters.
+    #[schemars(range(min = -limits::FAR_M, max = limits::FAR_M))]
     pub drift_m: f64,
     /// Warm-up error of the scanner at its first and its last scan, in meters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = -limits::FAR_M, max = limits::FAR_M)))]
     pub warm_up_m: Option<[f64; 2]>,
 }
 

@@ -28,13 +28,10 @@ pub struct Errors {
     /// Which errors are simulated.
     pub model: ErrorModel,
     /// E_r; Table 2 by default.
-    #[schemars(with = "DistanceBiasSchema")]
     pub distance: DistanceBias,
     /// E_a; by default the slope of Table 3 with no error at normal incidence, which E_r already contains.
-    #[schemars(with = "AngleBiasSchema")]
     pub angle: AngleBias,
     /// E_c per color; none by default.
-    #[schemars(with = "BTreeMap<String, ColorBiasSchema>")]
     pub color: BTreeMap<String, ColorBias>,
     /// White noise of a reading; Table 2 by default.
     pub noise: NoiseTable,
@@ -166,66 +163,6 @@ impl Default for Characterization {
             color_sd_mm: 0.0,
         }
     }
-}
-
-// The model crate has no schemas; these describe how its types appear in a scene.
-
-/// E_r as a table over distance, interpolated linearly and constant outside (Table 2).
-#[derive(JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(rename = "DistanceBias")]
-#[allow(dead_code)] // Read by the schema generator alone.
-struct DistanceBiasSchema {
-    /// Distances in meters, strictly increasing.
-    #[schemars(inner(range(min = 0.0, max = 10000.0)))]
-    range_m: Vec<f64>,
-    /// Errors in millimeters at those distances.
-    #[schemars(inner(range(min = -100000.0, max = 100000.0)))]
-    error_mm: Vec<f64>,
-}
-
-/// E_a = A_a·cos θ_N + B_a, Eq. (4).
-#[derive(JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(rename = "AngleBias")]
-#[allow(dead_code)]
-struct AngleBiasSchema {
-    /// A_a, in millimeters.
-    #[schemars(range(min = -100000.0, max = 100000.0))]
-    gain_mm: f64,
-    /// B_a, in millimeters.
-    #[schemars(range(min = -100000.0, max = 100000.0))]
-    offset_mm: f64,
-    /// A table that is added to the law.
-    table: Option<AngleTableSchema>,
-}
-
-/// Schema of [`AngleTable`](catoptric_model::AngleTable).
-#[derive(JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(rename = "AngleTable")]
-#[allow(dead_code)]
-struct AngleTableSchema {
-    /// Incidences in degrees, strictly increasing.
-    #[schemars(length(min = 1), inner(range(min = 0.0, max = 90.0)))]
-    incidence_deg: Vec<f64>,
-    /// Errors in millimeters at those incidences.
-    #[schemars(inner(range(min = -100000.0, max = 100000.0)))]
-    error_mm: Vec<f64>,
-}
-
-/// E_c = A_c·R + B_c, Eq. (5).
-#[derive(JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(rename = "ColorBias")]
-#[allow(dead_code)]
-struct ColorBiasSchema {
-    /// A_c, in millimeters per meter.
-    #[schemars(range(min = -100000.0, max = 100000.0))]
-    slope_mm_per_m: f64,
-    /// B_c, in millimeters.
-    #[schemars(range(min = -100000.0, max = 100000.0))]
-    offset_mm: f64,
 }
 
 impl NoiseTable {

@@ -24,7 +24,6 @@ pub struct Limits {
     #[schemars(range(min = 1, max = 36000))]
     pub beams: u32,
     /// The sense in which it turns, seen from above.
-    #[schemars(with = "ScanDirectionSchema")]
     pub direction: ScanDirection,
     /// Scans per second.
     #[schemars(range(min = 0.1, max = 1000.0))]
@@ -43,18 +42,6 @@ impl Limits {
     pub fn scan_period_s(&self) -> f64 {
         1.0 / self.scan_rate_hz
     }
-}
-
-/// The sense in which a scan turns, seen from above.
-#[derive(JsonSchema)]
-#[serde(rename_all = "lowercase")]
-#[schemars(rename = "ScanDirection")]
-#[allow(dead_code)] // Read by the schema generator alone: the model crate knows no schemas.
-enum ScanDirectionSchema {
-    /// Counter-clockwise: azimuths grow from beam to beam.
-    Ccw,
-    /// Clockwise: azimuths fall from beam to beam.
-    Cw,
 }
 
 /// Shape of one beam: an ellipse whose long axis is horizontal at azimuth 0.

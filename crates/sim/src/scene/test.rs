@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct SensorTest {
     /// Purpose of the test.
-    #[schemars(with = "TestKindSchema")]
     pub kind: TestKind,
     /// The boards, one after another.
     #[schemars(length(min = 1))]
@@ -42,20 +41,4 @@ fn face_on() -> Vec<f64> {
 
 fn once() -> u32 {
     1
-}
-
-/// What is tested on the bare sensor.
-#[derive(JsonSchema)]
-#[serde(rename_all = "snake_case")]
-#[schemars(rename = "TestKind")]
-#[allow(dead_code)] // Read by the schema generator alone: the model crate has no schemas.
-enum TestKindSchema {
-    /// Size of the spot as a function of distance: Figures 2 and 3, Table 1.
-    Spot,
-    /// Mean error and spread as a function of distance: Table 2.
-    Distance,
-    /// Error as a function of incidence: Figure 4, Table 3.
-    Angle,
-    /// Error and spread as a function of color and distance: Table 4.
-    Color,
 }

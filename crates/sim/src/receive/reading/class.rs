@@ -3,10 +3,11 @@
 use super::sensor::Sensor;
 use crate::light::footprint::SubRay;
 use crate::light::optics::{End, RayPath, Setting};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What the structure does to a beam.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BeamClass {
     /// All of it passes by.
