@@ -1,10 +1,13 @@
 //! Why a verb can fail, the message it prints and the exit code the shell receives.
 
+use super::output::quoted;
 use catoptric::Error;
 use catoptric::files::IoError;
 use catoptric::files::scene::SceneErrors;
+use catoptric::model::place::nearest;
 use catoptric::sim::SimError;
-use std::io::{IsTerminal, Write};
+use std::io::{ErrorKind, IsTerminal, Write};
+use std::path::{Path, PathBuf};
 
 /// Why a verb did not succeed.
 #[derive(Debug, thiserror::Error)]
@@ -99,7 +102,25 @@ fn help(error: &Error) -> Option<String> {
             Some("--partial uses what can be read of it nevertheless".to_owned())
         }
         Error::File(IoError::NoTruth { .. }) => Some("--blind judges by boards and walls alone".to_owned()),
+        Error::File(IoError::Read { path, source }) if source.kind() == ErrorKind::NotFound => probably_meant(path),
         Error::File(IoError::Exists { .. }) => Some("use --replace or another --out".to_owned()),
         other => other.help(),
     }
+}
+
+/// Names in a folder that are looked through for the one that was meant.
+const LOOKED_THROUGH: usize = 10_000;
+
+/// The file or folder that was probably meant by one that does not exist.
+fn probably_meant(path: &Path) -> Option<String> {
+    // The outermost folder that is missing, and where it would be.
+    let missing = path.ancestors().filter(|p| !p.as_os_str().is_empty() && !p.exists()).last()?;
+    let parent = missing.parent().filter(|p| !p.as_os_str().is_empty());
+    let entries = std::fs::read_dir(parent.unwrap_or(Path::new("."))).ok()?;
+    let names = entries.take(LOOKED_THROUGH).filter_map(|e| e.ok()?.file_name().into_string().ok());
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    let near = nearest(missing.file_name()?.to_str()?, names.iter().map(String::as_str))?;
+    let meant = parent.map_or_else(|| PathBuf::from(near), |p| p.join(near));
+    Some(format!("did you mean {}?", quoted(&meant)))
 }

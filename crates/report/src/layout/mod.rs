@@ -16,6 +16,13 @@ use super::page::{escape, figure as block, legend, page, table};
 use sides::SIDES;
 use views::LOST;
 
+/// Two layouts before and after: their structures in perspective side by side, and a table of what changed.
+pub(super) fn before_and_after(layouts: &[Drawn; 2]) -> String {
+    let (headings, rows) = tables::key_figures(layouts);
+    let headings: Vec<&str> = headings.iter().map(String::as_str).collect();
+    chapter(layouts, structure) + &table(&headings, &rows)
+}
+
 /// Returns the page, as HTML.
 pub fn layout(layouts: &[Drawn]) -> String {
     let names: Vec<&str> = layouts.iter().map(|l| l.analysis.name.as_str()).collect();
@@ -31,6 +38,13 @@ pub fn layout(layouts: &[Drawn]) -> String {
     );
     for drawn in layouts {
         html += &format!("<p>{}</p>\n", escape(&tables::summary(&drawn.analysis)));
+    }
+    if let [one] = layouts {
+        let picture = perspective::perspective(one).svg();
+        html += &format!(
+            "<div class=\"opening\">\n{picture}\n{}</div>\n",
+            legend(&perspective::legend(one))
+        );
     }
     html += "<h2>In numbers</h2>\n";
     let (headings, rows) = tables::key_figures(layouts);
