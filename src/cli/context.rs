@@ -66,7 +66,7 @@ impl Context {
         Ok(dataset)
     }
 
-    /// Says what of a scene is probably not meant.
+    /// Prints what of a scene is probably not meant.
     pub(super) fn warn_of(&self, scene: &catoptric::Scene) {
         for warning in scene.warnings() {
             self.say(&format!("warning: {}: {warning}", scene.name()));

@@ -102,7 +102,9 @@ fn help(error: &Error) -> Option<String> {
             Some("--partial uses what can be read of it nevertheless".to_owned())
         }
         Error::File(IoError::NoTruth { .. }) => Some("--blind judges by boards and walls alone".to_owned()),
-        Error::File(IoError::Read { path, source }) if source.kind() == ErrorKind::NotFound => probably_meant(path),
+        Error::File(IoError::Read { path, source }) if source.kind() == ErrorKind::NotFound => {
+            probably_meant(path)
+        }
         Error::File(IoError::Exists { .. }) => Some("use --replace or another --out".to_owned()),
         other => other.help(),
     }
@@ -114,10 +116,15 @@ const LOOKED_THROUGH: usize = 10_000;
 /// The file or folder that was probably meant by one that does not exist.
 fn probably_meant(path: &Path) -> Option<String> {
     // The outermost folder that is missing, and where it would be.
-    let missing = path.ancestors().filter(|p| !p.as_os_str().is_empty() && !p.exists()).last()?;
+    let missing = path
+        .ancestors()
+        .filter(|p| !p.as_os_str().is_empty() && !p.exists())
+        .last()?;
     let parent = missing.parent().filter(|p| !p.as_os_str().is_empty());
     let entries = std::fs::read_dir(parent.unwrap_or(Path::new("."))).ok()?;
-    let names = entries.take(LOOKED_THROUGH).filter_map(|e| e.ok()?.file_name().into_string().ok());
+    let names = entries
+        .take(LOOKED_THROUGH)
+        .filter_map(|e| e.ok()?.file_name().into_string().ok());
     let mut names: Vec<String> = names.collect();
     names.sort();
     let near = nearest(missing.file_name()?.to_str()?, names.iter().map(String::as_str))?;

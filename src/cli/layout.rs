@@ -3,10 +3,10 @@
 use super::context::Context;
 use super::error::CliError;
 use super::judging::{Limits, write_junit};
+use super::optimize::REQUIRE;
 use super::output::{print, quoted};
 use catoptric::junit::{Case, Ended, Suite};
 use catoptric::layout::{Analysis, Class, FacetView, Requirement, RequirementError};
-use super::optimize::REQUIRE;
 use catoptric::{LAYOUT_PAGE, LayoutOptions, Scene, distinct_names, layout, layout_json, write_layouts};
 use clap::Args;
 use std::path::PathBuf;
@@ -77,7 +77,11 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     } else {
         let pairs: Vec<(&Scene, &Analysis)> = scenes.iter().zip(&analyses).collect();
         let names = distinct_names(&pairs);
-        let mut text: Vec<String> = analyses.iter().zip(&names).map(|(a, name)| text(a, name)).collect();
+        let mut text: Vec<String> = analyses
+            .iter()
+            .zip(&names)
+            .map(|(a, name)| text(a, name))
+            .collect();
         if context.global.verbose > 0 {
             for (text, (scene, analysis)) in text.iter_mut().zip(scenes.iter().zip(&analyses)) {
                 text.push_str(&corners(&layout::Drawing::new(scene.resolved(), analysis.seed)?));

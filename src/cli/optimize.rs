@@ -127,8 +127,17 @@ const EXAMPLE: &str = "field_of_regard>=0.004";
 
 /// Why no layout is left: what keeps each requirement from being met, and why scenes were refused.
 fn why_none(found: &Optimum, coarse: bool) -> String {
-    let valid = found.evaluations - found.refused.iter().map(|r| r.layouts).sum::<usize>().min(found.evaluations);
-    let mut text = format!("none of {} meets every requirement", counted(found.evaluations, "layout"));
+    let valid = found.evaluations
+        - found
+            .refused
+            .iter()
+            .map(|r| r.layouts)
+            .sum::<usize>()
+            .min(found.evaluations);
+    let mut text = format!(
+        "none of {} meets every requirement",
+        counted(found.evaluations, "layout")
+    );
     for hold in found.holds.iter().filter(|hold| hold.unmet > 0) {
         let reached = hold
             .reached
@@ -141,11 +150,20 @@ fn why_none(found: &Optimum, coarse: bool) -> String {
     for refusal in &found.refused {
         text += &format!(
             "\n  {} refused, for example: {}",
-            if refusal.layouts == 1 { "1 is".to_owned() } else { format!("{} are", refusal.layouts) },
+            if refusal.layouts == 1 {
+                "1 is".to_owned()
+            } else {
+                format!("{} are", refusal.layouts)
+            },
             refusal.reason
         );
     }
-    if coarse && found.holds.iter().any(|h| h.unmet > 0 && h.requirement.contains("margin_mm")) {
+    if coarse
+        && found
+            .holds
+            .iter()
+            .any(|h| h.unmet > 0 && h.requirement.contains("margin_mm"))
+    {
         text += "\n  with --coarse no beam counts as split, and margins are those of beams that an edge may cut: leave it out";
     }
     text
@@ -166,9 +184,9 @@ fn refused(error: OptimizeError) -> CliError {
         OptimizeError::Goal(GoalError::Directions) => {
             Some("--goal directions --direction 90,-60,4 --direction -90,60,4".to_owned())
         }
-        OptimizeError::Goal(GoalError::Direction { .. }) | OptimizeError::NoGoal | OptimizeError::NothingChanges => {
-            None
-        }
+        OptimizeError::Goal(GoalError::Direction { .. })
+        | OptimizeError::NoGoal
+        | OptimizeError::NothingChanges => None,
         OptimizeError::Requirement(RequirementError::Form { .. } | RequirementError::Limit { .. }) => {
             Some(format!("--require '{EXAMPLE}'"))
         }

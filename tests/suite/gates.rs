@@ -70,8 +70,14 @@ fn a_failed_property_is_shown_in_a_few_lines() {
     let tree = scenes().new_tree(&mut runner(1)).unwrap();
     let scene = tree.current();
     for shown in [format!("{scene:?}"), format!("{scene:#?}")] {
-        assert!(shown.lines().count() <= 1 + scene.superstructure.facet.len(), "{shown}");
-        assert!(shown.contains(&format!("seed {}", scene.seed)) && shown.contains("left-1: Wedge(Wedge {"), "{shown}");
+        assert!(
+            shown.lines().count() <= 1 + scene.superstructure.facet.len(),
+            "{shown}"
+        );
+        assert!(
+            shown.contains(&format!("seed {}", scene.seed)) && shown.contains("left-1: Wedge(Wedge {"),
+            "{shown}"
+        );
     }
 }
 

@@ -163,7 +163,12 @@ impl Requirement {
         let found = self.check(figures, examples)?;
         let unmet = found.iter().filter(|c| !c.met);
         let describe = |c: &Checked| match c.value {
-            Some(value) => Unmet(format!("{name}: {} is {}, required {}", c.key, self.shown(value), self.text)),
+            Some(value) => Unmet(format!(
+                "{name}: {} is {}, required {}",
+                c.key,
+                self.shown(value),
+                self.text
+            )),
             None => Unmet(format!("{name}: {} has no value, required {}", c.key, self.text)),
         };
         Ok(unmet.map(describe).collect())

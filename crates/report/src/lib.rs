@@ -6,6 +6,7 @@
 
 mod angles;
 mod characterization;
+mod contrast;
 mod figure;
 #[cfg(feature = "design")]
 mod layout;

@@ -35,7 +35,13 @@ pub(super) fn methods(results: &[(Calibration, Score)]) -> String {
         .map(|(heading, of)| (*heading, results.iter().map(|(c, s)| of(c, s)).collect()))
         .filter(|(_, cells): &(&str, Vec<String>)| cells.iter().any(|c| c != "–"))
         .collect();
-    let class = |heading: &str| if heading == "Covariance" { " class=\"words\"" } else { "" };
+    let class = |heading: &str| {
+        if heading == "Covariance" {
+            " class=\"words\""
+        } else {
+            ""
+        }
+    };
     let mut html = "<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">Method</th>\
                     <th scope=\"col\" class=\"words\">Verdict</th>"
         .to_owned();
@@ -62,7 +68,9 @@ pub(super) fn methods(results: &[(Calibration, Score)]) -> String {
 pub(super) fn next(dataset: &Dataset, has_truth: bool, results: &[(Calibration, Score)]) -> String {
     let mut steps: Vec<String> = Vec::new();
     let Some((first, score)) = results.first() else {
-        steps.push("Calibrate it: <code>catoptric calibrate DATASET --out calibration.json</code>.".to_owned());
+        steps.push(
+            "Calibrate it: <code>catoptric calibrate DATASET --out calibration.json</code>.".to_owned(),
+        );
         return list(&steps);
     };
     let method = escape(&first.method);
@@ -82,9 +90,10 @@ pub(super) fn next(dataset: &Dataset, has_truth: bool, results: &[(Calibration, 
              <code>catoptric score DATASET calibration.json</code> names the usual mistakes."
         )),
     }
-    let open = first.beams.iter().filter(|b| {
-        matches!(b.status, Status::TooFewPoses | Status::Unobservable)
-    });
+    let open = first
+        .beams
+        .iter()
+        .filter(|b| matches!(b.status, Status::TooFewPoses | Status::Unobservable));
     let open = open.count();
     if open > 0 {
         steps.push(format!(
@@ -95,7 +104,12 @@ pub(super) fn next(dataset: &Dataset, has_truth: bool, results: &[(Calibration, 
     if !first.warnings.is_empty() {
         steps.push(format!(
             "Look at what the recording itself shows first: {}",
-            first.warnings.iter().map(|w| escape(w)).collect::<Vec<_>>().join("; ")
+            first
+                .warnings
+                .iter()
+                .map(|w| escape(w))
+                .collect::<Vec<_>>()
+                .join("; ")
         ));
     }
     if has_truth {

@@ -103,7 +103,15 @@ fn held_back(found: &Optimum) -> String {
             .collect();
         html += "<h2>What holds it back</h2>\n<p>A requirement is binding if a layout that fails only this one is better than \
                  the best in some goal and worse in none.</p>\n";
-        html += &table(&["requirement", "layouts that fail it", "best value reached", "binding"], &rows);
+        html += &table(
+            &[
+                "requirement",
+                "layouts that fail it",
+                "best value reached",
+                "binding",
+            ],
+            &rows,
+        );
     }
     if !found.refused.is_empty() {
         let rows: Vec<Vec<String>> = found

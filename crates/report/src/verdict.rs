@@ -41,7 +41,10 @@ pub(super) fn verdicts(scan: &ScanGeometry, results: &[(Calibration, Score)]) ->
 
 /// A verdict as a colored word.
 pub(super) fn badge(verdict: Verdict) -> String {
-    format!("<span class=\"badge\">{}</span>", verdict.word().replace('_', " ").to_uppercase())
+    format!(
+        "<span class=\"badge\">{}</span>",
+        verdict.word().replace('_', " ").to_uppercase()
+    )
 }
 
 /// The gates of a score: what was found, what is allowed, and how often an honest calibration does not meet it.

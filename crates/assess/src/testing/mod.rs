@@ -45,7 +45,7 @@ pub use closure::{assert_closure, assert_closure_of, closure, closure_of};
 pub use determinism::{assert_deterministic, deterministic, same_result};
 pub use failure::Failure;
 pub use gate::{Anees, Coverage, Efficiency};
-pub use significance::Significance;
 pub use random_scene::RandomScene;
+pub use significance::Significance;
 pub use strategies::{board_designs, layouts, rooms, scanners, scenes, without_errors};
 pub use trial::{Drawn, Trial, trials};

@@ -112,7 +112,11 @@ pub fn write_layouts(
     };
     let drawn: Vec<Drawn> = layouts.iter().map(draw).collect::<Result<_, Error>>()?;
     let names = distinct_names(layouts);
-    let drawn: Vec<Drawn> = drawn.into_iter().zip(&names).map(|(d, name)| d.named(name)).collect();
+    let drawn: Vec<Drawn> = drawn
+        .into_iter()
+        .zip(&names)
+        .map(|(d, name)| d.named(name))
+        .collect();
     control.check()?;
     let analyses: Vec<Analysis> = layouts.iter().map(|(_, analysis)| (*analysis).clone()).collect();
     let json = layout_json(&analyses)?;

@@ -37,7 +37,7 @@ pub struct LayoutCandidate {
     /// Violation of the requirements, as a fraction of their limits.
     #[serde(skip)]
     pub(super) shortfall: f64,
-    /// What became of every requirement, in their order; empty for a scene that is refused.
+    /// What became of every requirement, in order; empty for a scene that is refused.
     #[serde(skip)]
     pub(super) reached: Vec<Reached>,
 }
@@ -248,7 +248,11 @@ pub(super) fn makeable(open: &OpenParameter, value: f64) -> f64 {
 /// Of two values of a requirement's figures, the one that is farther from being allowed; none is farthest.
 fn farther(requirement: &Requirement, a: Option<f64>, b: Option<f64>) -> Option<f64> {
     let (a, b) = (a?, b?);
-    Some(if requirement.at_least().is_some() { a.min(b) } else { a.max(b) })
+    Some(if requirement.at_least().is_some() {
+        a.min(b)
+    } else {
+        a.max(b)
+    })
 }
 
 #[cfg(test)]

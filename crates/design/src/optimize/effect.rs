@@ -37,7 +37,11 @@ pub(super) fn undone(judge: &Judge<'_>, best: &LayoutCandidate) -> Option<Layout
     let mut found = None;
     let mut now = best.clone();
     for open in judge.parameters() {
-        if now.parameters.get(&open.name).is_none_or(|value| *value == open.start) {
+        if now
+            .parameters
+            .get(&open.name)
+            .is_none_or(|value| *value == open.start)
+        {
             continue;
         }
         let numbers = judge.parameters().iter().map(|p| {

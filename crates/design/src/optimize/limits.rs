@@ -30,7 +30,7 @@ pub struct Refusal {
     pub layouts: usize,
 }
 
-/// What all layouts reach of each requirement, in their order.
+/// What all layouts reach of each requirement, in order.
 pub(super) fn holds(
     requirements: &[Requirement],
     all: &[LayoutCandidate],
@@ -39,7 +39,11 @@ pub(super) fn holds(
     let hold = |(number, requirement): (usize, &Requirement)| {
         let reached = || all.iter().filter_map(|c| c.reached.get(number));
         let better = |a: f64, b: f64| {
-            if requirement.at_least().is_some() { a.max(b) } else { a.min(b) }
+            if requirement.at_least().is_some() {
+                a.max(b)
+            } else {
+                a.min(b)
+            }
         };
         let fails_only_this = |c: &&LayoutCandidate| {
             let others = || c.reached.iter().enumerate().filter(|(n, _)| *n != number);
@@ -47,7 +51,9 @@ pub(super) fn holds(
         };
         let binding = best.is_some_and(|best| {
             let rivals = all.iter().filter(fails_only_this);
-            rivals.filter(|c| c.costs.len() == best.costs.len()).any(|c| dominates(c, best))
+            rivals
+                .filter(|c| c.costs.len() == best.costs.len())
+                .any(|c| dominates(c, best))
         });
         Hold {
             requirement: requirement.to_string(),

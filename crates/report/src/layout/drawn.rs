@@ -30,7 +30,7 @@ impl Drawn {
 }
 
 impl Drawn {
-    /// The same layout under another name, to tell it from the one beside it.
+    /// The same layout under another name, to distinguish it from the one beside it.
     #[must_use]
     pub fn named(mut self, name: &str) -> Self {
         name.clone_into(&mut self.analysis.name);

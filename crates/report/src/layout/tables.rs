@@ -130,9 +130,14 @@ const SEPARATORS: [&str; 3] = [" … ", " × ", ", "];
 
 /// The second minus the first, of numbers as they are printed, so that the reader's own subtraction agrees.
 fn difference(first: &str, second: &str) -> String {
-    let separator = SEPARATORS.into_iter().find(|s| first.contains(s) && second.contains(s));
+    let separator = SEPARATORS
+        .into_iter()
+        .find(|s| first.contains(s) && second.contains(s));
     let parts = |text: &str| -> Vec<String> {
-        separator.map_or_else(|| vec![text.to_owned()], |s| text.split(s).map(str::to_owned).collect())
+        separator.map_or_else(
+            || vec![text.to_owned()],
+            |s| text.split(s).map(str::to_owned).collect(),
+        )
     };
     let one = |(a, b): (&String, &String)| {
         let read = |text: &String| text.replace('−', "-").parse::<f64>().ok();

@@ -60,7 +60,12 @@ const VIEWS: [View; 4] = [
 const AT_A_GLANCE: &View = &VIEWS[3];
 
 fn draw(dataset: &Dataset, calibration: &Calibration, solved: &[Solved], view: &View) -> String {
-    let View { title, reach, axes: [i, j], labels: [x, y] } = *view;
+    let View {
+        title,
+        reach,
+        axes: [i, j],
+        labels: [x, y],
+    } = *view;
     // Seen from behind, left is on the left.
     let mirrored = if i == 1 { -1.0 } else { 1.0 };
     let flat = |p: &Point3<f64>| (mirrored * p[i], p[j]);

@@ -129,8 +129,8 @@ impl Scene {
         nothing_around && self.board.is_empty() && self.flight.is_empty() && !self.room.has_walls()
     }
 
-    /// Whether the scene has mirrors or posts, and nothing to record them with: it can be looked at, as by `layout`, traced
-    /// and exported. Whoever gives markers and walls, but no board, wants a recording.
+    /// Whether the scene has mirrors or posts, and nothing to record them with: it can be analyzed by `layout`,
+    /// traced and exported. Whoever gives markers and walls, but no board, wants a recording.
     pub fn only_shows_mirrors(&self) -> bool {
         let experiment = &self.experiment;
         let nothing_set_up = self.board.is_empty()
