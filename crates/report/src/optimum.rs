@@ -1,13 +1,17 @@
 //! The page on a layout search: the trade-off between the goals, the best layout, and why it is better.
 
-use super::figure::{self, Axes, GRID, Mark, Stroke, color, css};
+use super::figure::{self, Axes, Mark, Stroke, color, css};
 use super::layout::{Drawn, before_and_after};
 use super::page::{escape, figure as block, page, table};
 use catoptric_design::optimize::{Better, LayoutCandidate, Optimum, Stated};
+use plotters::style::RGBColor;
 use std::ops::Range;
 
 /// Size of the plot, in pixels.
 const SIZE: (u32, u32) = (640, 480);
+
+/// Color of layouts that are neither on the front nor the drawing.
+const EVALUATED: RGBColor = RGBColor(0x8C, 0x8C, 0x8C);
 
 /// Palette indices of the front, the drawing and the best layout.
 const FRONT: usize = 0;
@@ -60,7 +64,7 @@ pub fn optimum(found: &Optimum, layouts: Option<&[Drawn; 2]>) -> String {
     );
     rows.extend(found.front.iter().map(|c| row(format!("no. {}", c.number), c)));
     let legend = [
-        (GRID, "evaluated"),
+        (EVALUATED, "evaluated"),
         (color(FRONT), "front"),
         (color(START), "as drawn"),
         (color(BEST), "best"),
@@ -263,7 +267,7 @@ fn picture(found: &Optimum) -> Option<String> {
         .tried
         .iter()
         .filter_map(|goals| Some((*goals.first()?, *goals.get(1)?)));
-    let mut marks: Vec<Mark> = tried.map(|place| mark(place, GRID, false)).collect();
+    let mut marks: Vec<Mark> = tried.map(|place| mark(place, EVALUATED, false)).collect();
     let front: Vec<(f64, f64)> = found.front.iter().filter_map(at).collect();
     marks.extend(front.iter().map(|place| mark(*place, color(FRONT), false)));
     let ends = [(Some(&found.start), START), (found.best.as_ref(), BEST)];
@@ -277,7 +281,7 @@ fn picture(found: &Optimum) -> Option<String> {
         return None;
     }
     // Layouts far worse than the drawing would squeeze the front into a corner.
-    let shown = || marks.iter().filter(|m| m.color != GRID);
+    let shown = || marks.iter().filter(|m| m.color != EVALUATED);
     let axes = Axes {
         x: reach(shown().map(|m| m.x)),
         y: reach(shown().map(|m| m.y)),

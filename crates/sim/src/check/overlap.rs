@@ -46,7 +46,7 @@ pub(super) fn check(scene: &Scene, obstacles: &Obstacles, found: &mut Findings) 
     }
 }
 
-/// The windows of a housing: what lies between a box below the scan plane and one above it.
+/// The windows of a housing: what lies between a box below the scan plane and one above it, as wide as the wider of them.
 fn windows(housing: &[HousingBox]) -> Vec<HousingBox> {
     let edge =
         |part: &HousingBox, axis: usize, sign: f64| part.center_mm[axis] + sign * 0.5 * part.size_mm[axis];
@@ -63,8 +63,8 @@ fn windows(housing: &[HousingBox]) -> Vec<HousingBox> {
                     (edge(low, 2, 1.0), edge(high, 2, -1.0))
                 } else {
                     (
-                        edge(low, axis, -1.0).max(edge(high, axis, -1.0)),
-                        edge(low, axis, 1.0).min(edge(high, axis, 1.0)),
+                        edge(low, axis, -1.0).min(edge(high, axis, -1.0)),
+                        edge(low, axis, 1.0).max(edge(high, axis, 1.0)),
                     )
                 };
                 window.center_mm[axis] = 0.5 * (from + to);
