@@ -22,11 +22,21 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let scene = Scene::load_with(&arguments.scene, &arguments.set)?;
+    context.warn_of(&scene);
     let scene = scene.resolved();
     if scene.has_no_laboratory() {
         return open_stage(arguments, scene);
     }
     let outline = outline(scene);
+    if scene.only_shows_mirrors() {
+        return print(&format!(
+            "ok: {}: {}{}, no laboratory\nnext: catoptric layout {} --out layout\n",
+            scene.name,
+            counted(outline.facets.len(), "facet"),
+            served(&outline),
+            quoted(&arguments.scene),
+        ));
+    }
     // Setting up the experiment finds problems that no single value shows, such as a board that fits nowhere.
     let laboratory = Laboratory::new(scene, scene.seed)?;
     let flights = match scene.flight.len() {

@@ -66,6 +66,13 @@ impl Context {
         Ok(dataset)
     }
 
+    /// Prints what of a scene is probably not meant.
+    pub(super) fn warn_of(&self, scene: &catoptric::Scene) {
+        for warning in scene.warnings() {
+            self.say(&format!("warning: {}: {warning}", scene.name()));
+        }
+    }
+
     /// Returns an error once Ctrl-C has been pressed.
     pub(super) fn check(&self) -> Result<(), CliError> {
         Ok(self.stop.check().map_err(catoptric::Error::from)?)

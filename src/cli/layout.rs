@@ -3,16 +3,18 @@
 use super::context::Context;
 use super::error::CliError;
 use super::judging::{Limits, write_junit};
+use super::optimize::REQUIRE;
 use super::output::{print, quoted};
 use catoptric::junit::{Case, Ended, Suite};
 use catoptric::layout::{Analysis, Class, FacetView, Requirement, RequirementError};
-use catoptric::{LAYOUT_PAGE, LayoutOptions, Scene, layout, layout_json, write_layouts};
+use catoptric::{LAYOUT_PAGE, LayoutOptions, Scene, distinct_names, layout, layout_json, write_layouts};
 use clap::Args;
 use std::path::PathBuf;
 use std::time::Instant;
 
 /// Arguments of `layout`.
 #[derive(Debug, Args)]
+#[command(mut_arg("require", |option| option.help(REQUIRE)))]
 pub(crate) struct Arguments {
     /// The scene, TOML or JSON; several are compared side by side.
     #[arg(required = true, value_name = "SCENE")]
@@ -46,7 +48,9 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let requirements = arguments.limits.requirements(EXAMPLE)?;
     let mut scenes = Vec::new();
     for path in &arguments.scenes {
-        scenes.push(Scene::load_with(path, &arguments.set)?);
+        let scene = Scene::load_with(path, &arguments.set)?;
+        context.warn_of(&scene);
+        scenes.push(scene);
     }
     let options = LayoutOptions {
         as_built: arguments.as_built,
@@ -71,7 +75,13 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     if arguments.json {
         print(&layout_json(&analyses)?)?;
     } else {
-        let mut text: Vec<String> = analyses.iter().map(text).collect();
+        let pairs: Vec<(&Scene, &Analysis)> = scenes.iter().zip(&analyses).collect();
+        let names = distinct_names(&pairs);
+        let mut text: Vec<String> = analyses
+            .iter()
+            .zip(&names)
+            .map(|(a, name)| text(a, name))
+            .collect();
         if context.global.verbose > 0 {
             for (text, (scene, analysis)) in text.iter_mut().zip(scenes.iter().zip(&analyses)) {
                 text.push_str(&corners(&layout::Drawing::new(scene.resolved(), analysis.seed)?));
@@ -132,7 +142,7 @@ fn next(arguments: &Arguments) -> String {
 }
 
 /// An analysis as text.
-fn text(analysis: &Analysis) -> String {
+fn text(analysis: &Analysis, name: &str) -> String {
     let counts: Vec<String> = Class::ALL
         .iter()
         .filter_map(|class| {
@@ -150,7 +160,7 @@ fn text(analysis: &Analysis) -> String {
     let mut text = format!(
         "{}{built}: {}\n  largest gap {:.2}° of the scan; field of regard {:.3} % of all directions ({:.4} sr), {:.1} % within \
          5° of a beam; {elevation}, {:.0} of 360° of azimuth\n",
-        analysis.name,
+        name,
         counts.join(", "),
         analysis.largest_gap_deg,
         100.0 * analysis.field_of_regard,

@@ -17,6 +17,7 @@ use std::time::Instant;
 
 /// Arguments of `optimize`.
 #[derive(Debug, Args)]
+#[command(mut_arg("require", |option| option.help(REQUIRE)))]
 pub(crate) struct Arguments {
     /// The scene, TOML or JSON, with parameters that have `low` and `high`.
     scene: PathBuf,
@@ -83,10 +84,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     }
     context.check()?;
     if found.best.is_none() {
-        let nearest = found.start.unmet.join("\n");
-        return Err(CliError::Verdict(format!(
-            "no evaluated layout meets every requirement; as drawn:\n{nearest}"
-        )));
+        return Err(CliError::Verdict(why_none(&found, arguments.coarse)));
     }
     Ok(())
 }
@@ -125,7 +123,55 @@ fn options(arguments: &Arguments) -> Result<SearchOptions, CliError> {
 }
 
 /// An example of a requirement.
-const EXAMPLE: &str = "facets.*.margin_mm>=0.3";
+const EXAMPLE: &str = "field_of_regard>=0.004";
+
+/// Why no layout is left: what keeps each requirement from being met, and why scenes were refused.
+fn why_none(found: &Optimum, coarse: bool) -> String {
+    let valid = found.evaluations
+        - found
+            .refused
+            .iter()
+            .map(|r| r.layouts)
+            .sum::<usize>()
+            .min(found.evaluations);
+    let mut text = format!(
+        "none of {} meets every requirement",
+        counted(found.evaluations, "layout")
+    );
+    for hold in found.holds.iter().filter(|hold| hold.unmet > 0) {
+        let reached = hold
+            .reached
+            .map_or_else(|| "no value".to_owned(), report::goal_value);
+        text += &format!(
+            "\n  {}: not met by {} of {valid}; best value reached: {reached}",
+            hold.requirement, hold.unmet
+        );
+    }
+    for refusal in &found.refused {
+        text += &format!(
+            "\n  {} refused, for example: {}",
+            if refusal.layouts == 1 {
+                "1 is".to_owned()
+            } else {
+                format!("{} are", refusal.layouts)
+            },
+            refusal.reason
+        );
+    }
+    if coarse
+        && found
+            .holds
+            .iter()
+            .any(|h| h.unmet > 0 && h.requirement.contains("margin_mm"))
+    {
+        text += "\n  with --coarse no beam counts as split, and margins are those of beams that an edge may cut: leave it out";
+    }
+    text
+}
+
+/// The help of `--require`, whose example is a figure of layouts.
+pub(super) const REQUIRE: &str = "Fail (exit code 1) unless a figure meets a limit, in quotes: 'field_of_regard>=0.004'. May be \
+                                  given more than once";
 
 fn refused(error: OptimizeError) -> CliError {
     let help = match &error {
@@ -138,7 +184,9 @@ fn refused(error: OptimizeError) -> CliError {
         OptimizeError::Goal(GoalError::Directions) => {
             Some("--goal directions --direction 90,-60,4 --direction -90,60,4".to_owned())
         }
-        OptimizeError::Goal(GoalError::Direction { .. }) | OptimizeError::NoGoal => None,
+        OptimizeError::Goal(GoalError::Direction { .. })
+        | OptimizeError::NoGoal
+        | OptimizeError::NothingChanges => None,
         OptimizeError::Requirement(RequirementError::Form { .. } | RequirementError::Limit { .. }) => {
             Some(format!("--require '{EXAMPLE}'"))
         }
@@ -214,6 +262,17 @@ fn text(found: &Optimum) -> String {
                 text += &format!("  {:16} {} → {value}\n", open.name, open.start);
             }
         }
+    }
+    if !found.without_effect.is_empty() {
+        text += &format!(
+            "  left as drawn, since they change nothing that is asked for: {}\n",
+            found.without_effect.join(", ")
+        );
+    }
+    let binding = found.holds.iter().filter(|hold| hold.binding);
+    let binding: Vec<&str> = binding.map(|hold| hold.requirement.as_str()).collect();
+    if !binding.is_empty() {
+        text += &format!("  held back by: {}\n", binding.join(", "));
     }
     if let Some(why) = &found.why {
         let classes = why.elements.iter().filter(|(_, [a, b])| a != b);

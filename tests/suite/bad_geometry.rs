@@ -3,6 +3,9 @@
 //! Each is refused as in `bad_input`, whose helpers corrupt one valid scene.
 
 use crate::bad_input::expect_one;
+use crate::common::VALID;
+use catoptric::files::scene;
+use catoptric::sim::check;
 
 #[test]
 fn facets_must_be_mirrors() {
@@ -73,33 +76,64 @@ fn facets_must_be_mirrors() {
 }
 
 #[test]
-fn light_must_reach_every_facet() {
-    let header = "[[superstructure.facet]]\nname = \"rectangle\"";
-    expect_one(
+fn a_facet_that_no_light_reaches_is_a_warning() {
+    let warns = |from: &str, to: &str, words: &str| {
+        let text = VALID.replacen(from, to, 1);
+        assert_ne!(text, VALID);
+        let scene = scene::parse(&text, "scene.toml", &[]).unwrap_or_else(|e| panic!("{e}"));
+        let found = check::warnings(&scene);
+        assert!(
+            found.len() == 1
+                && found[0].message.contains("superstructure.facet[2]")
+                && found[0].message.contains(words),
+            "{found:?}"
+        );
+    };
+    let valid = scene::parse(VALID, "scene.toml", &[]).unwrap();
+    assert_eq!(check::warnings(&valid), []);
+    warns(
         "[0.0, -80.0, 0.0]",
         "[0.0, -80.0, 30.0]",
-        header,
-        &["lies between z = 22.929 mm"],
+        "lies between z = 22.929 mm",
     );
     // Behind the scan: azimuth 180°.
-    expect_one(
+    warns(
         "center_mm = [0.0, -80.0, 0.0], normal = [0.0, 1.0, 1.0]",
         "center_mm = [-80.0, 0.0, 0.0], normal = [1.0, 0.0, 1.0]",
-        header,
-        &["the scan reaches from -135° to 135°"],
+        "the scan reaches from -135° to 135°",
     );
     // Behind the pillar.
-    expect_one(
+    warns(
         "center_mm = [-60.0, 0.0, 0.0]\nsize_mm = [10.0, 20.0, 30.0]",
         "center_mm = [0.0, -60.0, 0.0]\nsize_mm = [60.0, 5.0, 30.0]",
-        header,
-        &["post \"pillar\""],
+        "post \"pillar\"",
     );
     expect_one(
         "[-60.0, 0.0, 0.0]",
         "[1.0, 1.0, 1.0]",
         "[1.0, 1.0, 1.0]",
         &["over the origin"],
+    );
+}
+
+#[test]
+fn mirrors_may_not_pass_through_each_other_or_the_scanner() {
+    let header = "[[superstructure.facet]]\nname = \"rectangle\"";
+    // Into the polygon, which lies in the plane of y = 70 mm + (z + 10 mm)/2.
+    expect_one(
+        "center_mm = [0.0, -80.0, 0.0], normal = [0.0, 1.0, 1.0]",
+        "center_mm = [-30.0, 75.0, 0.0], normal = [0.0, -1.0, 1.0]",
+        header,
+        &[
+            "(\"rectangle\") passes through facet \"polygon\" at (",
+            "mm in the sensor frame",
+        ],
+    );
+    expect_one(
+        "[0.0, -80.0, 0.0]",
+        "[0.0, -22.0, 0.0]",
+        header,
+        &["passes through the scanner's housing at ("],
     );
 }
 

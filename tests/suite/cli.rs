@@ -7,7 +7,7 @@ use std::process::Stdio;
 #[test]
 fn new_writes_a_scene_that_check_accepts() {
     let folder = tempfile::tempdir().unwrap();
-    for layout in ["prototype", "two-mirror", "pyramid", "altimeter"] {
+    for layout in ["prototype", "two-mirror", "pyramid", "altimeter", "blank"] {
         let name = format!("{layout}.toml");
         let output = run(folder.path(), &["new", &name, "--layout", layout]);
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
@@ -23,6 +23,92 @@ fn new_writes_a_scene_that_check_accepts() {
         let output = run(folder.path(), &["check", &name]);
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     }
+}
+
+#[test]
+fn a_scene_of_mirrors_alone_can_be_looked_at() {
+    let folder = tempfile::tempdir().unwrap();
+    let go = |arguments: &[&str]| run(folder.path(), arguments);
+    assert_eq!(
+        go(&["new", "mine.toml", "--layout", "blank"]).status.code(),
+        Some(0)
+    );
+    std::fs::write(
+        folder.path().join("rays.csv"),
+        "x_m,y_m,z_m,dx,dy,dz\n0,0,0,1,0,0\n",
+    )
+    .unwrap();
+    for arguments in [
+        &["check", "mine.toml"][..],
+        &["layout", "mine.toml", "--out", "layout"],
+        &["trace", "mine.toml", "--rays", "rays.csv", "--out", "paths.csv"],
+        &["export", "mine.toml", "--format", "csv", "--out", "corners.csv"],
+        &["tolerance", "mine.toml", "--draws", "3"],
+    ] {
+        let output = go(arguments);
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{arguments:?}: {}",
+            stderr(&output)
+        );
+    }
+    for verb in [
+        &["simulate", "mine.toml", "--out", "data"][..],
+        &["characterize", "mine.toml", "--out", "c.json"],
+        &["study", "mine.toml", "--seeds", "2", "--out", "study"],
+        &["plan", "mine.toml"],
+    ] {
+        let output = go(verb);
+        assert_eq!(output.status.code(), Some(2), "{verb:?}");
+        assert!(
+            stderr(&output).contains("the scene has no laboratory"),
+            "{verb:?}: {}",
+            stderr(&output)
+        );
+    }
+    // A mirror out of the scan is no obstacle, but a warning.
+    let text = std::fs::read_to_string(folder.path().join("mine.toml")).unwrap();
+    let high = text.replace("shape.plate = {", "shape.rectangle = { center_mm = [60, 0, 40], normal = [-1, 0, 1], width_mm = 20, height_mm = 20 }\n#");
+    std::fs::write(folder.path().join("high.toml"), high).unwrap();
+    for verb in ["check", "layout"] {
+        let output = go(&[verb, "high.toml"]);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        assert!(
+            stderr(&output).contains("warning: high.toml: `superstructure.facet[0]` is not reached"),
+            "{}",
+            stderr(&output)
+        );
+    }
+}
+
+#[test]
+fn what_is_missing_is_named_with_what_was_meant() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir_all(folder.path().join("dataset-1")).unwrap();
+    std::fs::write(folder.path().join("dataset-1/joint.json"), "{}").unwrap();
+    for (arguments, meant) in [
+        (
+            &["calibrate", "datset-1", "--out", "c.json"][..],
+            "did you mean dataset-1?",
+        ),
+        (
+            &["score", "datset-1", "dataset-1/joint.json"],
+            "did you mean dataset-1?",
+        ),
+        (
+            &["validate", "dataset-1/joit.json"],
+            "did you mean dataset-1/joint.json?",
+        ),
+    ] {
+        let output = run(folder.path(), arguments);
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(3), "{said}");
+        assert!(said.contains(meant), "{arguments:?}: {said}");
+    }
+    let output = run(folder.path(), &["calibrat", "dataset-1"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("'calibrate'"), "{}", stderr(&output));
 }
 
 #[test]

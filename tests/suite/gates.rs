@@ -66,6 +66,22 @@ fn every_scene_passes_check_and_can_be_set_up() {
 }
 
 #[test]
+fn a_failed_property_is_shown_in_a_few_lines() {
+    let tree = scenes().new_tree(&mut runner(1)).unwrap();
+    let scene = tree.current();
+    for shown in [format!("{scene:?}"), format!("{scene:#?}")] {
+        assert!(
+            shown.lines().count() <= 1 + scene.superstructure.facet.len(),
+            "{shown}"
+        );
+        assert!(
+            shown.contains(&format!("seed {}", scene.seed)) && shown.contains("left-1: Wedge(Wedge {"),
+            "{shown}"
+        );
+    }
+}
+
+#[test]
 fn scenes_shrink_to_the_simplest() {
     let mut runner = runner(1);
     for _ in 0..3 {

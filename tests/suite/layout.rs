@@ -50,7 +50,7 @@ fn recordable() -> Vec<(PathBuf, Scene)> {
             }
         }
     }
-    found.retain(|(_, scene)| !scene.has_no_laboratory());
+    found.retain(|(_, scene)| !scene.has_no_laboratory() && !scene.only_shows_mirrors());
     found
 }
 
@@ -87,6 +87,9 @@ fn classes_equal_those_of_the_truth_in_every_scene() {
     let scenes = recordable();
     assert!(scenes.len() > 30, "{}", scenes.len());
     for layout in scenes::Template::ALL {
+        if layout == scenes::Template::Blank {
+            continue;
+        }
         let drawn = scenes::parse(layout.text(), "template.toml", &[]).unwrap();
         assert!(
             scenes.iter().any(|(_, scene)| *scene == drawn),

@@ -215,6 +215,138 @@ fn the_hand_made_prototype_is_beaten_in_both_goals() {
 }
 
 #[test]
+fn values_can_be_made_and_what_changes_nothing_stays_as_drawn() {
+    // Where the facet looks changes nothing of its size, nor does a parameter that no expression uses.
+    let text = BLANK.replace("[scanner]", "[parameters]\nreach_mm = { value = 90, low = 60, high = 120.04 }\n\
+        aside_deg = { value = 1, low = -2, high = 2 }\nunused_mm = { value = 1, low = 0, high = 2 }\n[scanner]")
+        .replace("distance_mm = 60", "distance_mm = \"= reach_mm\"")
+        .replace("exit_azimuth_deg = 0", "exit_azimuth_deg = \"= aside_deg\"");
+    let found = search(
+        &text,
+        &options(&["share_within_5_deg:up"], &["size.diameter_mm<=220"], 80),
+    );
+    assert_eq!(found.without_effect, ["unused_mm"]);
+    let best = found.best.clone().unwrap();
+    assert_eq!(best.parameters["unused_mm"], 1.0);
+    for (name, steps) in [("reach_mm", 10.0), ("aside_deg", 100.0)] {
+        for layout in found.front.iter().chain(&found.best) {
+            let value = layout.parameters[name];
+            assert_eq!(value, (value * steps).round() / steps, "{name}");
+        }
+    }
+    // The reported figures are those of these values.
+    let scene = template(&text).with(&best.choice()).unwrap();
+    let analysis = layout::analyze(&scene, None, Detail::Coarse).unwrap();
+    assert_eq!(best.goals["share_within_5_deg"], analysis.share_within_5_deg);
+    let nothing = options(&["size"], &[], 40);
+    let idle = text
+        .replace("\"= reach_mm\"", "60")
+        .replace("\"= aside_deg\"", "0");
+    let refused = optimize(&template(&idle), &nothing, &mut |_| true).unwrap_err();
+    assert!(
+        refused
+            .to_string()
+            .contains("none of the scene's parameters changes"),
+        "{refused}"
+    );
+}
+
+const BLANK: &str = include_str!("../../scenes/blank.toml");
+
+#[test]
+fn a_binding_requirement_is_named() {
+    // A farther mirror is larger, and only the limit keeps it from being nearer to its largest distance.
+    let text = BLANK
+        .replace(
+            "[scanner]",
+            "[parameters]\nreach_mm = { value = 70, low = 60, high = 120 }\n[scanner]",
+        )
+        .replace("distance_mm = 60", "distance_mm = \"= reach_mm\"");
+    let requirements = ["size.diameter_mm<=180", "field_of_regard>=0.0001"];
+    let found = search(&text, &options(&["size.diameter_mm:up"], &requirements, 60));
+    let best = found.best.clone().unwrap();
+    assert!(
+        best.goals["size.diameter_mm"] <= 180.0 && best.goals["size.diameter_mm"] > 179.0,
+        "{best:?}"
+    );
+    let binding: Vec<(&str, bool)> = found
+        .holds
+        .iter()
+        .map(|h| (h.requirement.as_str(), h.binding))
+        .collect();
+    assert_eq!(binding, [(requirements[0], true), (requirements[1], false)]);
+    let limit = &found.holds[0];
+    assert!(limit.unmet > 0 && limit.reached.unwrap() < 180.0, "{limit:?}");
+    assert_eq!(found.holds[1].unmet, 0);
+}
+
+#[test]
+fn the_example_of_the_help_works() {
+    let (folder, _) = folder_with(PARAMETRIC);
+    let help = stdout(&run(folder.path(), &["optimize", "--help"]))
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ");
+    let quoted = |after: &str| {
+        help.split(after)
+            .nth(1)
+            .unwrap()
+            .split(['\'', ' '])
+            .find(|w| w.contains("="))
+            .unwrap()
+            .to_owned()
+    };
+    let requirement = quoted("in quotes:");
+    for goal in [
+        &["share_within_5_deg:up"][..],
+        &["directions", "--direction", "90,-60,4"],
+    ] {
+        assert!(
+            help.contains(goal[0]) && help.contains(goal.last().unwrap()),
+            "{help}"
+        );
+        let mut arguments = vec![
+            "optimize",
+            "scene.toml",
+            "--coarse",
+            "--evaluations",
+            "40",
+            "--require",
+            &requirement,
+        ];
+        arguments.push("--goal");
+        arguments.extend(goal);
+        let output = run(folder.path(), &arguments);
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{requirement}: {}",
+            stderr(&output)
+        );
+    }
+    // One that cannot be met with one ray a beam says so.
+    let margin = [
+        "optimize",
+        "scene.toml",
+        "--coarse",
+        "--evaluations",
+        "40",
+        "--goal",
+        "size",
+        "--require",
+        "facets.*.margin_mm>=0.3",
+    ];
+    let output = run(folder.path(), &margin);
+    let said = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(
+        said.contains("facets.*.margin_mm>=0.3: not met by") && said.contains("best value reached: -0."),
+        "{said}"
+    );
+    assert!(said.contains("with --coarse no beam counts as split"), "{said}");
+}
+
+#[test]
 fn invalid_searches_are_explained() {
     let (folder, _) = folder_with(PARAMETRIC);
     let refuse = |arguments: &[&str], code: i32, words: &[&str]| {
@@ -257,7 +389,11 @@ fn invalid_searches_are_explained() {
     refuse(
         &["--goal", "size", "--require", "size.diameter_mm<=10"],
         1,
-        &["meets every requirement", "diameter_mm is"],
+        &[
+            "none of",
+            "size.diameter_mm<=10: not met by",
+            "best value reached: 1",
+        ],
     );
     let output = run(folder.path(), &["optimize", "scene.toml"]);
     assert_eq!(output.status.code(), Some(2));

@@ -163,7 +163,12 @@ impl Requirement {
         let found = self.check(figures, examples)?;
         let unmet = found.iter().filter(|c| !c.met);
         let describe = |c: &Checked| match c.value {
-            Some(value) => Unmet(format!("{name}: {} is {value}, required {}", c.key, self.text)),
+            Some(value) => Unmet(format!(
+                "{name}: {} is {}, required {}",
+                c.key,
+                self.shown(value),
+                self.text
+            )),
             None => Unmet(format!("{name}: {} has no value, required {}", c.key, self.text)),
         };
         Ok(unmet.map(describe).collect())
@@ -233,6 +238,13 @@ impl Requirement {
                 None => 1.0,
             })
             .sum()
+    }
+
+    /// A value in six digits, or in as many as show that it is not met.
+    fn shown(&self, value: f64) -> String {
+        let digits = |count: usize| format!("{value:.*e}", count - 1).parse().unwrap_or(value);
+        let short = (6..=17).map(digits).find(|short: &f64| !self.holds(*short));
+        short.unwrap_or(value).to_string()
     }
 
     fn holds(&self, value: f64) -> bool {

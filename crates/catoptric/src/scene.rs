@@ -125,6 +125,12 @@ impl Scene {
         &self.resolved
     }
 
+    /// What is probably not meant, and hinders nothing, such as a mirror that no beam reaches.
+    pub fn warnings(&self) -> Vec<String> {
+        let found = catoptric_sim::check::warnings(&self.resolved);
+        found.into_iter().map(|problem| problem.message).collect()
+    }
+
     /// The text it was read from.
     pub fn text(&self) -> &str {
         &self.text

@@ -29,20 +29,29 @@ pub(super) fn parent(path: &Path) -> &Path {
     }
 }
 
-/// Question about the file or folder next to a missing one that was probably meant.
+/// Names in a folder that are looked through for the one that was meant.
+const LOOKED_THROUGH: usize = 10_000;
+
+/// Question about the file or folder that was probably meant by a missing one: if folders of its path are missing too, the
+/// outermost.
 pub(super) fn similar(path: &Path, error: &io::Error) -> Option<String> {
     if error.kind() != io::ErrorKind::NotFound {
         return None;
     }
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    let missing = path
+        .ancestors()
+        .filter(|p| !p.as_os_str().is_empty() && !p.exists())
+        .last()?;
+    let folder = missing.parent().filter(|p| !p.as_os_str().is_empty());
     let entries = std::fs::read_dir(folder.unwrap_or(Path::new("."))).ok()?;
-    let names: Vec<String> = entries
-        .filter_map(|e| e.ok()?.file_name().into_string().ok())
-        .collect();
-    let wanted = path.file_name()?.to_str()?;
-    let name = nearest(wanted, names.iter().map(String::as_str))?;
-    let name = folder.map_or(PathBuf::from(name), |f| f.join(name));
-    Some(format!("did you mean {}?", name.display()))
+    let names = entries
+        .take(LOOKED_THROUGH)
+        .filter_map(|e| e.ok()?.file_name().into_string().ok());
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    let near = nearest(missing.file_name()?.to_str()?, names.iter().map(String::as_str))?;
+    let meant = folder.map_or_else(|| PathBuf::from(near), |f| f.join(near));
+    Some(format!("did you mean {}?", quoted(&meant)))
 }
 
 /// The error in reading a file that people name, with the one that was probably meant.

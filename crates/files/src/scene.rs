@@ -49,7 +49,7 @@ pub enum SceneErrors {
 }
 
 catoptric_model::closed_set! {
-    /// Built-in scenes to start from, each with a published mirror layout.
+    /// Built-in scenes to start from: published mirror layouts with their laboratory, and one mirror without any.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     pub enum Template {
         /// Eight facets around the scanner, after Cooper's Figure 5.
@@ -60,6 +60,8 @@ catoptric_model::closed_set! {
         Pyramid,
         /// A small mirror that folds eleven beams straight down.
         Altimeter,
+        /// A scanner and one mirror, without a laboratory.
+        Blank,
     }
 }
 
@@ -71,6 +73,7 @@ impl Template {
             Self::TwoMirror => "two-mirror",
             Self::Pyramid => "pyramid",
             Self::Altimeter => "altimeter",
+            Self::Blank => "blank",
         }
     }
 
@@ -81,6 +84,7 @@ impl Template {
             Self::TwoMirror => "Two mirrors on either side of a 270° scanner",
             Self::Pyramid => "Half a hexagonal pyramid in front of the scanner",
             Self::Altimeter => "A small mirror that folds eleven beams straight down",
+            Self::Blank => "A scanner and one mirror to look at, without a laboratory",
         }
     }
 
@@ -91,6 +95,7 @@ impl Template {
             Self::TwoMirror => include_str!("../../../scenes/two-mirror.toml"),
             Self::Pyramid => include_str!("../../../scenes/gallery/pyramid.toml"),
             Self::Altimeter => include_str!("../../../scenes/gallery/altimeter.toml"),
+            Self::Blank => include_str!("../../../scenes/blank.toml"),
         }
     }
 }

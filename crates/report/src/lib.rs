@@ -6,9 +6,11 @@
 
 mod angles;
 mod characterization;
+mod contrast;
 mod figure;
 #[cfg(feature = "design")]
 mod layout;
+mod opening;
 #[cfg(feature = "design")]
 mod optimum;
 mod page;
@@ -58,12 +60,16 @@ pub fn report(
         escape(name)
     );
     html += &format!("<p>{}</p>\n", escape(&prose::experiment(dataset, truth)));
-    html += &verdict::verdicts(&dataset.session.scanner.scan, results);
-    if results.is_empty() {
+    if let Some((first, _)) = results.first() {
+        html += &opening::methods(results);
+        html += &plots::fan(dataset, first);
+        html += &format!(
+            "<h2>The verdicts</h2>\n{}<h2>Scores</h2>\n{}",
+            verdict::verdicts(&dataset.session.scanner.scan, results),
+            scores(results)
+        );
+    } else {
         html += "<p>This report includes no calibration.</p>\n";
-    }
-    if !results.is_empty() {
-        html += &format!("<h2>Scores</h2>\n{}", scores(results));
     }
     if let Some((calibration, _)) = results.first() {
         html += &format!(
@@ -91,6 +97,7 @@ pub fn report(
             plots::cloud(dataset, calibration, cloud)
         );
     }
+    html += &opening::next(dataset, truth.is_some(), results);
     html += "<footer>Angles are in degrees per axis: the root mean square of the two components of a direction's error, \
              cos φ·δθ across and δφ up, in the sensor frame unless marked “room”. φ is elevation, θ azimuth, d the \
              distance from the scanner to the mirror.</footer>\n";

@@ -1,12 +1,17 @@
 //! The page on a layout search: the trade-off between the goals, the best layout, and why it is better.
 
-use super::figure::{self, Axes, GRID, Mark, Stroke, color, css};
+use super::figure::{self, Axes, Mark, Stroke, color, css};
+use super::layout::{Drawn, before_and_after};
 use super::page::{escape, figure as block, page, table};
 use catoptric_design::optimize::{Better, LayoutCandidate, Optimum, Stated};
+use plotters::style::RGBColor;
 use std::ops::Range;
 
 /// Size of the plot, in pixels.
 const SIZE: (u32, u32) = (640, 480);
+
+/// Color of layouts that are neither on the front nor the drawing.
+const EVALUATED: RGBColor = RGBColor(0x8C, 0x8C, 0x8C);
 
 /// Palette indices of the front, the drawing and the best layout.
 const FRONT: usize = 0;
@@ -31,13 +36,17 @@ pub fn front_picture(found: &Optimum) -> Option<String> {
     picture(found).map(|svg| figure::standalone(&svg))
 }
 
-/// Returns the page, as HTML.
-pub fn optimum(found: &Optimum) -> String {
+/// Returns the page, as HTML. `layouts` are the layout as drawn and the best, if there is one.
+pub fn optimum(found: &Optimum, layouts: Option<&[Drawn; 2]>) -> String {
     let mut html = format!(
         "<header>\n<h1>{}</h1>\n<p class=\"subtitle\">A search for better layouts</p>\n</header>\n<p>{}</p>\n",
         escape(&found.name),
         escape(&summary(found))
     );
+    html += &layouts.map_or_else(String::new, |pair| {
+        format!("<h2>Before and after</h2>\n{}", before_and_after(pair))
+    });
+    html += &held_back(found);
     html += "<h2>Trade-off between the goals</h2>\n";
     let mut headings = vec!["layout"];
     let names: Vec<String> = found.goals.iter().map(heading).collect();
@@ -55,7 +64,7 @@ pub fn optimum(found: &Optimum) -> String {
     );
     rows.extend(found.front.iter().map(|c| row(format!("no. {}", c.number), c)));
     let legend = [
-        (GRID, "evaluated"),
+        (EVALUATED, "evaluated"),
         (color(FRONT), "front"),
         (color(START), "as drawn"),
         (color(BEST), "best"),
@@ -73,10 +82,69 @@ pub fn optimum(found: &Optimum) -> String {
         None => table(&headings, &rows),
     };
     html += &best(found);
+    html += &next(found);
     html += "<footer>Found by particle swarms, each along one direction of the front, with one random number generator: \
              the same seed gives the same layouts on any number of threads. The best layouts are stored next to this \
              page as scenes.</footer>\n";
     page(&format!("{} – catoptric optimize", found.name), &html)
+}
+
+/// What holds the search back: requirements, refused scenes, and parameters that change nothing.
+fn held_back(found: &Optimum) -> String {
+    let mut html = String::new();
+    if !found.holds.is_empty() {
+        let rows: Vec<Vec<String>> = found
+            .holds
+            .iter()
+            .map(|hold| {
+                vec![
+                    hold.requirement.clone(),
+                    hold.unmet.to_string(),
+                    hold.reached.map_or_else(|| "–".to_owned(), goal_value),
+                    if hold.binding { "binding" } else { "" }.to_owned(),
+                ]
+            })
+            .collect();
+        html += "<h2>What holds it back</h2>\n<p>A requirement is binding if a layout that fails only this one is better than \
+                 the best in some goal and worse in none.</p>\n";
+        html += &table(
+            &[
+                "requirement",
+                "layouts that fail it",
+                "best value reached",
+                "binding",
+            ],
+            &rows,
+        );
+    }
+    if !found.refused.is_empty() {
+        let rows: Vec<Vec<String>> = found
+            .refused
+            .iter()
+            .map(|refusal| vec![refusal.reason.clone(), refusal.layouts.to_string()])
+            .collect();
+        html += "<p>Layouts that are no valid scene, with their first problem:</p>\n";
+        html += &table(&["for example", "layouts"], &rows);
+    }
+    if !found.without_effect.is_empty() {
+        html += &format!(
+            "<p>Left as drawn, since they alone change neither a goal nor a requirement: {}.</p>\n",
+            escape(&found.without_effect.join(", "))
+        );
+    }
+    html
+}
+
+/// What to do with the result.
+fn next(found: &Optimum) -> String {
+    let steps = match &found.best {
+        None => "<li>Loosen the requirement that fewest layouts meet, or give the parameters wider limits.</li>\n".to_owned(),
+        Some(_) => "<li>Look at it: <code>catoptric layout SCENE best.toml --out side-by-side</code>.</li>\n\
+                    <li>Ask what the workshop will make of it: <code>catoptric tolerance best.toml</code>.</li>\n\
+                    <li>Build it: <code>catoptric export best.toml --format stl --out mirrors.stl</code>.</li>\n"
+            .to_owned(),
+    };
+    format!("<h2>What to do next</h2>\n<ul>\n{steps}</ul>\n")
 }
 
 fn summary(found: &Optimum) -> String {
@@ -116,12 +184,14 @@ fn best(found: &Optimum) -> String {
         .iter()
         .map(|open| {
             let value = best.parameters.get(&open.name).copied().unwrap_or(open.start);
-            vec![
-                open.name.clone(),
-                goal_value(open.start),
-                goal_value(value),
-                format!("{} to {}", open.low, open.high),
-            ]
+            // As it is written to the scene: in steps that can be made.
+            let value = if value == open.start {
+                "as drawn".to_owned()
+            } else {
+                value.to_string()
+            };
+            let limits = format!("{} to {}", open.low, open.high);
+            vec![open.name.clone(), open.start.to_string(), value, limits]
         })
         .collect();
     html += &table(&["parameter", "as drawn", "best", "limits"], &rows);
@@ -151,8 +221,8 @@ fn best(found: &Optimum) -> String {
         .map(|left| {
             let mut row = vec![
                 left.parameter.clone(),
-                goal_value(left.start),
-                goal_value(left.best),
+                left.start.to_string(),
+                left.best.to_string(),
             ];
             let goals = found.goals.iter().map(|g| left.goals.get(&g.name));
             row.extend(goals.map(|v| v.map_or_else(|| "–".to_owned(), |v| goal_value(*v))));
@@ -197,7 +267,7 @@ fn picture(found: &Optimum) -> Option<String> {
         .tried
         .iter()
         .filter_map(|goals| Some((*goals.first()?, *goals.get(1)?)));
-    let mut marks: Vec<Mark> = tried.map(|place| mark(place, GRID, false)).collect();
+    let mut marks: Vec<Mark> = tried.map(|place| mark(place, EVALUATED, false)).collect();
     let front: Vec<(f64, f64)> = found.front.iter().filter_map(at).collect();
     marks.extend(front.iter().map(|place| mark(*place, color(FRONT), false)));
     let ends = [(Some(&found.start), START), (found.best.as_ref(), BEST)];
@@ -211,7 +281,7 @@ fn picture(found: &Optimum) -> Option<String> {
         return None;
     }
     // Layouts far worse than the drawing would squeeze the front into a corner.
-    let shown = || marks.iter().filter(|m| m.color != GRID);
+    let shown = || marks.iter().filter(|m| m.color != EVALUATED);
     let axes = Axes {
         x: reach(shown().map(|m| m.x)),
         y: reach(shown().map(|m| m.y)),

@@ -1,5 +1,6 @@
 //! Building blocks of an HTML page: escaping, tables, figures, numbers, the style sheet.
 
+use super::contrast::style;
 use catoptric_assess::tables::fixed;
 
 /// Escapes text for HTML.
@@ -30,7 +31,9 @@ pub(super) fn count(value: Option<usize>) -> String {
 
 /// Returns a table; columns of text are aligned left, columns of numbers right.
 pub(super) fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
-    let is_word = |cell: &String| cell.starts_with(char::is_alphabetic);
+    // A number may have a unit, or "of" between two: words have three letters.
+    let word = |text: &str| text.chars().filter(|c| c.is_alphabetic()).count() >= 3;
+    let is_word = |cell: &String| cell.starts_with(char::is_alphabetic) || cell.split(' ').any(word);
     let class = |column: usize| {
         let has_words = rows.iter().filter_map(|row| row.get(column)).any(is_word);
         if has_words { " class=\"words\"" } else { "" }
@@ -45,7 +48,7 @@ pub(super) fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
         for (i, cell) in row.iter().enumerate() {
             let cell = escape(cell);
             html += &if i == 0 {
-                format!("<th scope=\"row\">{cell}</th>")
+                format!("<th scope=\"row\"{}>{cell}</th>", class(0))
             } else {
                 format!("<td{}>{cell}</td>", class(i))
             };
@@ -102,8 +105,9 @@ pub(super) fn page(title: &str, content: &str) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{}</title>\n\
-         <style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n{content}</main>\n</body>\n</html>\n",
-        escape(title)
+         <style>\n{STYLE}{}</style>\n</head>\n<body>\n<main>\n{content}</main>\n</body>\n</html>\n",
+        escape(title),
+        style()
     )
 }
 

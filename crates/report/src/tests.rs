@@ -71,6 +71,36 @@ fn the_verdict_is_written_out() {
 }
 
 #[test]
+fn text_and_marks_have_contrast_in_light_and_dark() {
+    for with_truth in [true, false] {
+        crate::contrast::tests::assert_contrast(&html(with_truth));
+    }
+}
+
+#[test]
+fn a_report_begins_with_all_methods_and_ends_with_what_to_do() {
+    for with_truth in [true, false] {
+        let html = html(with_truth);
+        let place = |text: &str| html.find(text).unwrap_or_else(|| panic!("no {text}"));
+        let opening = &html[..place("<h2>The verdicts</h2>")];
+        assert_eq!(
+            (
+                opening.matches("<table>").count(),
+                opening.matches("<svg").count()
+            ),
+            (1, 1)
+        );
+        assert_eq!(
+            opening.matches("class=\"badge\"").count(),
+            2,
+            "one row for each method"
+        );
+        assert!(place("What to do next") > place("The room as seen through the mirrors"));
+        assert!(!opening.contains("Missed") || with_truth);
+    }
+}
+
+#[test]
 fn the_same_input_gives_the_same_bytes() {
     assert_eq!(html(true), html(true));
 }

@@ -29,14 +29,22 @@ pub(super) fn verdicts(scan: &ScanGeometry, results: &[(Calibration, Score)]) ->
             continue;
         }
         let gates = gates(score);
-        let class = score.verdict.word();
-        let badge = class.to_uppercase();
         html += &format!(
-            "<section class=\"verdict {class}\">\n<h3><span class=\"badge\">{badge}</span> – method “{method}”</h3>\n{text}{gates}</section>\n"
+            "<section class=\"verdict {}\">\n<h3>{} – method “{method}”</h3>\n{text}{gates}</section>\n",
+            score.verdict.word(),
+            badge(score.verdict)
         );
         above = Some((calibration, score.verdict, text));
     }
     html
+}
+
+/// A verdict as a colored word.
+pub(super) fn badge(verdict: Verdict) -> String {
+    format!(
+        "<span class=\"badge\">{}</span>",
+        verdict.word().replace('_', " ").to_uppercase()
+    )
 }
 
 /// The gates of a score: what was found, what is allowed, and how often an honest calibration does not meet it.

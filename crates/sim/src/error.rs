@@ -82,10 +82,10 @@ pub enum SimError {
     /// A scanner that cannot scan as the scene says.
     #[error("scanner.custom: {0}")]
     Scanner(#[from] ScanError),
-    /// A scene to trace rays in, and no more.
+    /// A scene to trace rays in or to look at mirrors, and no more.
     #[error(
         "the scene has no laboratory: recording needs a [superstructure] with markers, and either room.size_m and a \
-         board or a facet, or a [[flight]]; this scene can be traced"
+         board, or a [[flight]]; this scene can be checked, traced, exported and looked at by `layout`"
     )]
     NoLaboratory,
 }

@@ -27,7 +27,7 @@ proptest! {
         scene.seed = u64::from(seed);
         let text = scene::to_toml(&scene).expect("it is a scene");
         let back = scene::parse(&text, "again.toml", &[]).map_err(|e| TestCaseError::fail(e.to_string()))?;
-        prop_assert_eq!(&back, &scene);
+        prop_assert_eq!(&back, &*scene);
         prop_assert_eq!(scene::to_toml(&back).expect("it is a scene"), text);
     }
 

@@ -3,6 +3,7 @@
 //! Every number is a simple value plus an integer number of steps, so that it is round and shrinks to the simple value;
 //! every choice shrinks to its first option.
 
+use super::random_scene::RandomScene;
 use catoptric_files::scene::Template;
 use catoptric_sim::scene::{
     BeamShape, Board, ErrorModel, Experiment, Facet, FacetShape, Limits, Mocap, MocapProfile, Preset, Room,
@@ -155,7 +156,7 @@ fn slots(count: RangeInclusive<usize>) -> impl Strategy<Value = Vec<Slot>> {
 /// Layouts that are valid in a room of [`rooms`] and for a scanner of [`scanners`]: one to eight facets on both sides
 /// of a scanner whose forward sector is free, none of which occludes another. The simplest is one facet on the left;
 /// everything else is without errors, so that [`closure`](super::closure) holds.
-pub fn layouts() -> impl Strategy<Value = Scene> {
+pub fn layouts() -> impl Strategy<Value = RandomScene> {
     (slots(1..=4), slots(0..=4), select(vec![1.0, -1.0])).prop_map(|(near, far, side)| {
         let mut scene = without_errors(base());
         scene.superstructure.post.clear();
@@ -172,7 +173,7 @@ pub fn layouts() -> impl Strategy<Value = Scene> {
         scene.room.rig_position_m = [0.0, 0.0, 2.2];
         scene.board[0].width_mm = 1200.0;
         scene.board[0].height_mm = 1000.0;
-        scene
+        RandomScene(scene)
     })
 }
 
@@ -199,7 +200,7 @@ fn facet(side: &str, index: usize, sign: f64, &(width, distance_mm, turn, elevat
 
 /// Complete experiments, with all errors of the prototype: a layout, a scanner, a room, a board design, motion capture
 /// and a seed. Each passes `catoptric check`, and its boards can be placed.
-pub fn scenes() -> impl Strategy<Value = Scene> {
+pub fn scenes() -> impl Strategy<Value = RandomScene> {
     let mocap = select(vec![
         MocapProfile::Modern,
         MocapProfile::Ideal,
@@ -223,10 +224,10 @@ pub fn scenes() -> impl Strategy<Value = Scene> {
                 seed,
                 ..base.clone()
             };
-            scene.superstructure = layout.superstructure;
+            scene.superstructure = layout.0.superstructure;
             scene.superstructure.as_built = base.superstructure.as_built;
             scene.mocap.profile = profile;
-            scene
+            RandomScene(scene)
         })
         .prop_filter("a board that fits nowhere", |scene| {
             check::problems(scene).is_empty() && Laboratory::new(scene, scene.seed).is_ok()

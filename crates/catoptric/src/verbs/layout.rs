@@ -70,6 +70,26 @@ pub fn layout_json(analyses: &[Analysis]) -> Result<String, Error> {
         .map_err(|e| Error::invalid(e.to_string(), None))
 }
 
+/// Names that tell several layouts apart: those of their scenes, with the file where two have the same name, and with
+/// their number where that is the same too.
+pub fn distinct_names(layouts: &[(&Scene, &Analysis)]) -> Vec<String> {
+    let mut names: Vec<String> = layouts.iter().map(|(_, a)| a.name.clone()).collect();
+    let repeats = |names: &[String], name: &String| names.iter().filter(|n| *n == name).count() > 1;
+    let files: Vec<String> = (names.iter().zip(layouts))
+        .map(|(name, (scene, _))| match repeats(&names, name) {
+            true => format!("{name} ({})", scene.name()),
+            false => name.clone(),
+        })
+        .collect();
+    names.clone_from(&files);
+    for (number, name) in names.iter_mut().enumerate() {
+        if repeats(&files, name) {
+            *name = format!("{name}, no. {}", number + 1);
+        }
+    }
+    names
+}
+
 /// File name of the page about layouts.
 pub const LAYOUT_PAGE: &str = "report.html";
 
@@ -91,6 +111,12 @@ pub fn write_layouts(
         Ok(Drawn::new(scene.resolved(), analysis)?)
     };
     let drawn: Vec<Drawn> = layouts.iter().map(draw).collect::<Result<_, Error>>()?;
+    let names = distinct_names(layouts);
+    let drawn: Vec<Drawn> = drawn
+        .into_iter()
+        .zip(&names)
+        .map(|(d, name)| d.named(name))
+        .collect();
     control.check()?;
     let analyses: Vec<Analysis> = layouts.iter().map(|(_, analysis)| (*analysis).clone()).collect();
     let json = layout_json(&analyses)?;

@@ -29,7 +29,7 @@ pub use export::{ExportOptions, Exported, Format as ExportFormat, export, export
 #[cfg(all(feature = "design", feature = "report"))]
 pub use layout::write_layouts;
 #[cfg(feature = "design")]
-pub use layout::{LAYOUT_PAGE, LayoutOptions, layout, layout_json};
+pub use layout::{LAYOUT_PAGE, LayoutOptions, distinct_names, layout, layout_json};
 #[cfg(all(feature = "design", feature = "report"))]
 pub use optimize::write_optimum;
 #[cfg(feature = "design")]

@@ -64,6 +64,7 @@ pub const BEST_SCENE: &str = "best.toml";
 pub fn write_optimum(scene: &Scene, found: &Optimum, out: impl AsRef<Path>) -> Result<(), Error> {
     let out = out.as_ref();
     let template = parametric(scene)?;
+    let layouts = before_and_after(&template, found)?;
     let json = serde_json::to_string(found).map_err(|e| Error::invalid(e.to_string(), None))? + "\n";
     std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
     if let Some(best) = &found.best {
@@ -79,10 +80,31 @@ pub fn write_optimum(scene: &Scene, found: &Optimum, out: impl AsRef<Path>) -> R
     }
     write_file(
         out.join(OPTIMUM_PAGE),
-        catoptric_report::optimum(found).as_bytes(),
+        catoptric_report::optimum(found, layouts.as_ref()).as_bytes(),
     )?;
     write_file(out.join("optimum.json"), json.as_bytes())?;
     Ok(())
+}
+
+/// The layout as drawn and the best one, to be drawn; `None` if there is none, or if it is the drawing.
+#[cfg(feature = "report")]
+fn before_and_after(
+    template: &ParametricScene,
+    found: &Optimum,
+) -> Result<Option<[catoptric_report::Drawn; 2]>, Error> {
+    use catoptric_design::layout::{Detail, analyze};
+    let Some(best) = found.best.as_ref().filter(|b| b.number != found.start.number) else {
+        return Ok(None);
+    };
+    // It has been evaluated, so it is a valid scene.
+    let Ok(after) = template.with(&best.choice()) else {
+        return Ok(None);
+    };
+    let draw = |scene: &catoptric_sim::Scene, name: &str| -> Result<catoptric_report::Drawn, Error> {
+        let analysis = analyze(scene, None, Detail::Full)?;
+        Ok(catoptric_report::Drawn::new(scene, &analysis)?.named(name))
+    };
+    Ok(Some([draw(template.scene(), "as drawn")?, draw(&after, "best")?]))
 }
 
 /// Writes a layout as a scene, along with the meshes it refers to.

@@ -10,6 +10,9 @@ pub enum OptimizeError {
     /// There is no parameter to vary.
     #[error("the scene has no parameter with both `low` and `high`")]
     NothingOpen,
+    /// No parameter changes anything that is asked for.
+    #[error("none of the scene's parameters changes a goal or a requirement")]
+    NothingChanges,
     /// There is no goal.
     #[error("a search needs a goal")]
     NoGoal,
@@ -37,6 +40,7 @@ impl OptimizeError {
             Self::Requirement(error) => error.help(),
             Self::Goal(GoalError::Direction { .. } | GoalError::Directions)
             | Self::NothingOpen
+            | Self::NothingChanges
             | Self::NoGoal
             | Self::Setup(_)
             | Self::Search(_) => None,

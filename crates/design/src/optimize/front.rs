@@ -3,7 +3,7 @@
 use super::candidate::LayoutCandidate;
 
 /// Whether one is at least as good in every goal and better in one.
-fn dominates(a: &LayoutCandidate, b: &LayoutCandidate) -> bool {
+pub(super) fn dominates(a: &LayoutCandidate, b: &LayoutCandidate) -> bool {
     let pairs = || a.costs.iter().zip(&b.costs);
     pairs().all(|(a, b)| a <= b) && pairs().any(|(a, b)| a < b)
 }
@@ -91,6 +91,7 @@ mod tests {
             place: Vec::new(),
             costs: costs.to_vec(),
             shortfall: 0.0,
+            reached: Vec::new(),
         }
     }
 

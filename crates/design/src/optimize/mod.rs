@@ -16,14 +16,17 @@
 //! The front is collected from all evaluated layouts.
 //!
 //! Candidates that violate a requirement rank after all that meet them, by the size of the violation; scenes that are
-//! refused rank last. Random numbers come from one generator with a seed, candidates are evaluated in parallel and
+//! refused rank last. Parameters are searched in steps that a workshop can make. One that changes nothing on its own is not
+//! searched, and what the best layout is no worse without is undone at the end. Random numbers come from one generator with a seed, candidates are evaluated in parallel and
 //! stored in order: the same seed gives the same result on any number of threads.
 
 mod candidate;
+mod effect;
 mod error;
 mod explain;
 mod front;
 mod goal;
+mod limits;
 mod options;
 mod search;
 
@@ -31,6 +34,7 @@ pub use candidate::LayoutCandidate;
 pub use error::OptimizeError;
 pub use explain::{LeftAsItWas, Why};
 pub use goal::{Better, Goal, GoalError, Stated, Wanted};
+pub use limits::{Hold, Refusal};
 pub use options::{OpenParameter, Progress, SearchOptions};
 
 use candidate::Judge;
@@ -58,8 +62,14 @@ pub struct Optimum {
     pub goals: Vec<Stated>,
     /// Requirements that every layout had to meet.
     pub requirements: Vec<String>,
-    /// The parameters that were varied.
+    /// What all evaluated layouts reach of each requirement, and which of them holds the best layout back.
+    pub holds: Vec<Hold>,
+    /// Why scenes were refused, the most frequent reason first.
+    pub refused: Vec<Refusal>,
+    /// The parameters with limits.
     pub parameters: Vec<OpenParameter>,
+    /// Those of them that change neither a goal nor a requirement when they alone are moved; they stay as drawn.
+    pub without_effect: Vec<String>,
     /// The layout as the scene has it.
     pub start: LayoutCandidate,
     /// The layout whose smallest gain in any goal is largest; `None` if none meets the requirements.
@@ -121,13 +131,28 @@ pub fn optimize(
     if options.goals.is_empty() {
         return Err(OptimizeError::NoGoal);
     }
-    let judge = Judge::new(template, &parameters, options)?;
+    let mut judge = Judge::new(template, &parameters, options)?;
+    let idle = effect::without_effect(&judge);
+    if idle.len() == parameters.len() {
+        return Err(OptimizeError::NothingChanges);
+    }
+    for number in &idle {
+        judge.leave(*number);
+    }
     let mut search = Search::new(&judge, options, watch);
     let outcome = search.run();
     let interrupted = search.stopped();
-    let (all, start) = search.finish();
+    let (mut all, start) = search.finish();
     if !interrupted {
         outcome.map_err(OptimizeError::Search)?;
+    }
+    let evaluations = all.len();
+    let found = front::best(&all, &start);
+    let undone = found.filter(|b| b.number != start.number && !interrupted);
+    if let Some(mut simpler) = undone.and_then(|best| effect::undone(&judge, &best)) {
+        simpler.number = evaluations;
+        // Of layouts that are equally good, the front has the first.
+        all.insert(1, simpler);
     }
     let best = front::best(&all, &start);
     let beats = best.as_ref().is_some_and(|b| front::beats_in_all(b, &start));
@@ -140,12 +165,15 @@ pub fn optimize(
         schema_version: SCHEMA_VERSION,
         name: template.scene().name.clone(),
         seed: options.seed,
-        evaluations: all.len(),
+        evaluations,
         interrupted,
         goals: options.goals.iter().map(Goal::stated).collect(),
         requirements: options.requirements.iter().map(ToString::to_string).collect(),
         tried: kept.map(|c| c.goals(&options.goals)).collect(),
         front: front::front(&all),
+        holds: limits::holds(&options.requirements, &all, best.as_ref()),
+        refused: limits::refusals(&all),
+        without_effect: idle.iter().map(|n| parameters[*n].name.clone()).collect(),
         parameters,
         start,
         best,

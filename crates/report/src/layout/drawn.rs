@@ -29,6 +29,15 @@ impl Drawn {
     }
 }
 
+impl Drawn {
+    /// The same layout under another name, to distinguish it from the one beside it.
+    #[must_use]
+    pub fn named(mut self, name: &str) -> Self {
+        name.clone_into(&mut self.analysis.name);
+        self
+    }
+}
+
 /// Returns the radius about the scanner of everything built, in meters.
 pub(super) fn radius(drawing: &Drawing) -> f64 {
     let faces = drawing.facets.iter().flat_map(|f| &f.face.corners);

@@ -16,6 +16,13 @@ use super::page::{escape, figure as block, legend, page, table};
 use sides::SIDES;
 use views::LOST;
 
+/// Two layouts before and after: their structures in perspective side by side, and a table of what changed.
+pub(super) fn before_and_after(layouts: &[Drawn; 2]) -> String {
+    let (headings, rows) = tables::key_figures(layouts);
+    let headings: Vec<&str> = headings.iter().map(String::as_str).collect();
+    chapter(layouts, structure) + &table(&headings, &rows)
+}
+
 /// Returns the page, as HTML.
 pub fn layout(layouts: &[Drawn]) -> String {
     let names: Vec<&str> = layouts.iter().map(|l| l.analysis.name.as_str()).collect();
@@ -31,6 +38,13 @@ pub fn layout(layouts: &[Drawn]) -> String {
     );
     for drawn in layouts {
         html += &format!("<p>{}</p>\n", escape(&tables::summary(&drawn.analysis)));
+    }
+    if let [one] = layouts {
+        let picture = perspective::perspective(one).svg();
+        html += &format!(
+            "<div class=\"opening\">\n{picture}\n{}</div>\n",
+            legend(&perspective::legend(one))
+        );
     }
     html += "<h2>In numbers</h2>\n";
     let (headings, rows) = tables::key_figures(layouts);
@@ -164,9 +178,9 @@ fn field(drawn: &Drawn) -> Chapter {
         pictures: views::map(drawn),
         caption: "Every direction around the scanner, forward in the center, unrolled like a map of the world. Each \
                   element is drawn as the cell of directions that it represents: gray where the scan passes by the \
-                  mirrors, in the color of its facet where it is deflected. White directions are not covered: gaps in \
-                  the gray line are where mirrors are, and black marks are lost elements, drawn where they would look \
-                  without the structure. The gray line is thinnest where the long axis of the scanner's spot is along \
+                  mirrors, in the color of its facet where it is deflected. Directions without a color are not covered: gaps in \
+                  the gray line are where mirrors are. Lost elements are drawn in the color of this text, where they \
+                  would look without the structure. The gray line is thinnest where the long axis of the scanner's spot is along \
                   the scan."
             .to_owned(),
         legend: perspective::legend(drawn),
@@ -233,7 +247,7 @@ fn three_sides(drawn: &Drawn) -> Chapter {
     Chapter {
         pictures: format!("<div class=\"views\">\n{svgs}</div>"),
         caption: "The same beams. Outlines are drawn whole, even where hidden: mirrors thick and in their colors, posts \
-                  gray, the housing black."
+                  gray, the housing in the color of this text."
             .to_owned(),
         legend: perspective::legend(drawn),
         headings,
@@ -253,7 +267,7 @@ fn mirrors(drawn: &Drawn) -> Chapter {
     let (headings, rows) = tables::margins(drawn);
     Chapter {
         pictures: svgs,
-        caption: "Each mirror seen from the front, its outline in black. An ellipse is the 1/e² contour of a beam; \
+        caption: "Each mirror seen from the front, its outline in the color of this text. An ellipse is the 1/e² contour of a beam; \
                   every second unsplit one and every lost one are drawn. An unsplit ellipse may move by its margin \
                   before an edge cuts it."
         .to_owned(),
@@ -261,5 +275,28 @@ fn mirrors(drawn: &Drawn) -> Chapter {
         headings,
         rows,
         wide: true,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use catoptric_design::layout::{Detail, analyze};
+    use catoptric_sim::Scene;
+
+    #[test]
+    fn text_and_marks_have_contrast_in_light_and_dark() {
+        let scene: Scene =
+            toml::from_str(include_str!("../../../../scenes/prototype.toml")).expect("a scene");
+        let analysis = analyze(&scene, None, Detail::Coarse).expect("it can be set up");
+        let drawn = Drawn::new(&scene, &analysis).expect("it can be drawn");
+        crate::contrast::tests::assert_contrast(&layout(std::slice::from_ref(&drawn)));
+        let pair = [drawn.clone().named("one"), drawn.named("two")];
+        let html = layout(&pair);
+        assert!(
+            html.contains(">Difference</th>")
+                && html.contains("<h4>one</h4>")
+                && html.contains("<h4>two</h4>")
+        );
     }
 }

@@ -111,12 +111,68 @@ pub(super) fn summary(analysis: &Analysis) -> String {
 pub(super) fn key_figures(layouts: &[Drawn]) -> (Vec<String>, Rows) {
     let mut headings = vec!["Figure".to_owned()];
     headings.extend(layouts.iter().map(|l| l.analysis.name.clone()));
+    if layouts.len() == 2 {
+        headings.push("Difference".to_owned());
+    }
     let rows = KEY_FIGURES.iter().map(|(name, of)| {
         let mut row = vec![(*name).to_owned()];
         row.extend(layouts.iter().map(|l| of(&l.analysis)));
+        if let [_, first, second] = row.as_slice() {
+            row.push(difference(first, second));
+        }
         row
     });
     (headings, rows.collect())
+}
+
+/// What separates the numbers of a cell that holds two.
+const SEPARATORS: [&str; 3] = [" … ", " × ", ", "];
+
+/// The second minus the first, of numbers as they are printed, so that the reader's own subtraction agrees.
+fn difference(first: &str, second: &str) -> String {
+    let separator = SEPARATORS
+        .into_iter()
+        .find(|s| first.contains(s) && second.contains(s));
+    let parts = |text: &str| -> Vec<String> {
+        separator.map_or_else(
+            || vec![text.to_owned()],
+            |s| text.split(s).map(str::to_owned).collect(),
+        )
+    };
+    let one = |(a, b): (&String, &String)| {
+        let read = |text: &String| text.replace('−', "-").parse::<f64>().ok();
+        let decimals = |text: &String| text.split_once('.').map_or(0, |(_, digits)| digits.len());
+        let (from, to) = (read(a)?, read(b)?);
+        let change = number(to - from, decimals(a).max(decimals(b)));
+        let moved = change.trim_matches(['0', '.']);
+        Some(match moved {
+            "" => "0".to_owned(),
+            text if text.starts_with('−') => change,
+            _ => format!("+{change}"),
+        })
+    };
+    let changes: Option<Vec<String>> = parts(first).iter().zip(&parts(second)).map(one).collect();
+    match changes {
+        Some(changes) if changes.iter().all(|c| c == "0") => "0".to_owned(),
+        Some(changes) => changes.join(separator.unwrap_or_default()),
+        None => "–".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::difference;
+
+    #[test]
+    fn differences_are_those_of_what_is_printed() {
+        assert_eq!(difference("453", "362"), "−91");
+        assert_eq!(difference("0.402", "0.415"), "+0.013");
+        assert_eq!(difference("3.25", "3.25"), "0");
+        assert_eq!(difference("−65.2 … 65.2", "−70.0 … 0.0"), "−4.8 … −65.2");
+        assert_eq!(difference("180 × 62", "180 × 70"), "0 × +8");
+        assert_eq!(difference("39.8, 120", "39.8, 120"), "0");
+        assert_eq!(difference("–", "3.1"), "–");
+    }
 }
 
 /// Returns the ranges in the room of every facet's elements, and of the undeflected ones.

@@ -1,7 +1,7 @@
 //! Plots of the fans from above, from the side and from behind.
 
 use super::super::figure::{self, Axes, GRID, Label, Stroke};
-use super::super::page::{figure as block, number};
+use super::super::page::{escape, figure as block, legend as key, number};
 use super::elements::{Solved, azimuth_deg, color_of, facet_name, legend, solved};
 use catoptric_model::{Calibration, Dataset, Status, beam};
 use nalgebra::Point3;
@@ -20,46 +20,88 @@ const RAY_STEP: usize = 4;
 
 const DIRECT_STEP: usize = 16;
 
+/// A view of the fans.
+struct View {
+    title: &'static str,
+    reach: f64,
+    /// The axes of the sensor frame that point right and up.
+    axes: [usize; 2],
+    labels: [&'static str; 2],
+}
+
+const VIEWS: [View; 4] = [
+    View {
+        title: "From above",
+        reach: REACH_M,
+        axes: [0, 1],
+        labels: ["x, forward (m)", "y, left (m)"],
+    },
+    View {
+        title: "From above, close-up of the mirrors",
+        reach: CLOSE_M,
+        axes: [0, 1],
+        labels: ["x, forward (m)", "y, left (m)"],
+    },
+    View {
+        title: "From the side",
+        reach: REACH_M,
+        axes: [0, 2],
+        labels: ["x, forward (m)", "z, up (m)"],
+    },
+    View {
+        title: "From behind",
+        reach: REACH_M,
+        axes: [1, 2],
+        labels: ["−y, right (m)", "z, up (m)"],
+    },
+];
+
+/// The view that says most about a layout at a glance: which mirrors look up and which look down, and where to.
+const AT_A_GLANCE: &View = &VIEWS[3];
+
+fn draw(dataset: &Dataset, calibration: &Calibration, solved: &[Solved], view: &View) -> String {
+    let View {
+        title,
+        reach,
+        axes: [i, j],
+        labels: [x, y],
+    } = *view;
+    // Seen from behind, left is on the left.
+    let mirrored = if i == 1 { -1.0 } else { 1.0 };
+    let flat = |p: &Point3<f64>| (mirrored * p[i], p[j]);
+    let axes = Axes {
+        x: -reach * 1.05..reach * 1.05,
+        y: -reach * 1.05..reach * 1.05,
+        x_label: x.to_owned(),
+        y_label: y.to_owned(),
+    };
+    let names = if reach > CLOSE_M {
+        labels(dataset, solved, reach, flat)
+    } else {
+        Vec::new()
+    };
+    let strokes = strokes(dataset, calibration, solved, reach, flat);
+    figure::plan(SQUARE, &axes, title, &strokes, &names)
+}
+
+/// Plots the fans once, for the beginning of a page.
+pub(crate) fn fan(dataset: &Dataset, calibration: &Calibration) -> String {
+    let svg = draw(dataset, calibration, &solved(dataset, calibration), AT_A_GLANCE);
+    format!(
+        "<div class=\"opening\">\n{svg}\n{}<p class=\"caption\">The fans as calibrated by “{}”, seen from behind: every \
+         {RAY_STEP}th element from the scanner via its mirror to {REACH_M} m; gray rays are undeflected.</p>\n</div>\n",
+        key(&legend(dataset)),
+        escape(&calibration.method)
+    )
+}
+
 /// Plots the fans from above, from the side and from behind, with a close-up of the mirrors.
 pub(crate) fn fans(dataset: &Dataset, calibration: &Calibration) -> String {
     let solved = solved(dataset, calibration);
     let mut svgs = "<div class=\"views\">\n".to_owned();
-    for (title, reach, [i, j], [x, y]) in [
-        ("From above", REACH_M, [0, 1], ["x, forward (m)", "y, left (m)"]),
-        (
-            "From above, close-up of the mirrors",
-            CLOSE_M,
-            [0, 1],
-            ["x, forward (m)", "y, left (m)"],
-        ),
-        ("From the side", REACH_M, [0, 2], ["x, forward (m)", "z, up (m)"]),
-        ("From behind", REACH_M, [1, 2], ["y, left (m)", "z, up (m)"]),
-    ] {
-        // Seen from behind, left is on the left.
-        let mirrored = if i == 1 { -1.0 } else { 1.0 };
-        let view = |p: &Point3<f64>| (mirrored * p[i], p[j]);
-        let axes = Axes {
-            x: -reach * 1.05..reach * 1.05,
-            y: -reach * 1.05..reach * 1.05,
-            x_label: if i == 1 {
-                "−y, right (m)".to_owned()
-            } else {
-                x.to_owned()
-            },
-            y_label: y.to_owned(),
-        };
-        let svg = figure::plan(
-            SQUARE,
-            &axes,
-            title,
-            &strokes(dataset, calibration, &solved, reach, view),
-            &if reach > CLOSE_M {
-                labels(dataset, &solved, reach, view)
-            } else {
-                Vec::new()
-            },
-        );
-        svgs += &format!("<div><h4>{title}</h4>{svg}</div>\n");
+    for view in &VIEWS {
+        let svg = draw(dataset, calibration, &solved, view);
+        svgs += &format!("<div><h4>{}</h4>{svg}</div>\n", view.title);
     }
     svgs += "</div>";
     let caption = format!(

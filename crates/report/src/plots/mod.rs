@@ -11,6 +11,6 @@ mod statuses;
 pub(super) use angles::{errors, estimates};
 pub use cloud::MAX_POINTS;
 pub(super) use cloud::cloud;
-pub(super) use fans::fans;
+pub(super) use fans::{fan, fans};
 pub(super) use residuals::residuals;
 pub(super) use statuses::statuses;

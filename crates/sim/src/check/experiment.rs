@@ -19,7 +19,10 @@ const WALLS: [[&str; 2]; 3] = [
 
 pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     let before = found.0.len();
-    check_rig(scene, scan, found);
+    // A flight has the rig elsewhere.
+    if !scene.only_flies() {
+        check_rig(scene, scan, found);
+    }
     let rig_has_its_place = found.0.len() == before;
     check_boards(scene, found);
     let obstacles = Obstacles::of(scene, scan);

@@ -17,12 +17,12 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
             found.add(
                 &room,
                 "is empty, and there is no laboratory either",
-                "add [[room.mirror]] and [[room.surface]] to trace rays; recording needs a \
-                 [superstructure] with markers, and either room.size_m and a board or a facet, or a [[flight]]"
+                "add [[superstructure.facet]] to look at mirrors, [[room.mirror]] and [[room.surface]] to trace rays; \
+                 recording needs a [superstructure] with markers, and either room.size_m and a board, or a [[flight]]"
                     .to_owned(),
             );
         }
-    } else if !scene.room.has_walls() && !scene.only_flies() {
+    } else if !scene.room.has_walls() && !scene.only_flies() && !scene.only_shows_mirrors() {
         found.add(
             &room.key("size_m"),
             "is missing; boards need a room with walls",

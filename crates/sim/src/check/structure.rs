@@ -1,6 +1,7 @@
 //! Checks of mirrors, posts and markers: whether each is a valid body, and whether light can reach it.
 
 use super::outline::{Face, Meets, Obstacles};
+use super::overlap;
 use super::values::distinct;
 use crate::findings::Findings;
 use crate::scene::facet::outline::{reach, rounded, spread};
@@ -23,17 +24,14 @@ pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
         );
     }
     let obstacles = Obstacles::of(scene, scan);
-    let met = obstacles.met_by_beams();
+    let before = found.0.len();
     for (i, facet) in scene.superstructure.facet.iter().enumerate() {
         let path = structure.key("facet").index(i).key("shape");
-        let before = found.0.len();
         facet.shape.check(scan, &path, found);
-        // For an invalid facet this would only repeat what has been reported.
-        if found.0.len() == before
-            && let Some(face) = &obstacles.facets[i]
-        {
-            check_reach(scene, scan, i, face, &met, found);
-        }
+    }
+    // Of an invalid facet this would only repeat what has been reported.
+    if found.0.len() == before {
+        overlap::check(scene, &obstacles, found);
     }
     for (i, post) in scene.superstructure.post.iter().enumerate() {
         let path = structure.key("post").index(i);
@@ -63,12 +61,25 @@ pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     }
     check_housing(&scene.scanner, found);
     let path = structure.key("marker");
-    check_markers(&scene.superstructure.marker, &path, "the rig", found);
+    if !scene.only_shows_mirrors() {
+        check_markers(&scene.superstructure.marker, &path, "the rig", found);
+    }
     for (i, board) in scene.board.iter().enumerate() {
         // Without any, the laboratory places five markers itself.
         if !board.marker.is_empty() {
             let path = KeyPath::of("board").index(i).key("marker");
             check_markers(&board.marker, &path, &format!("board {:?}", board.name), found);
+        }
+    }
+}
+
+/// Warns of facets that no beam reaches.
+pub(super) fn warn(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
+    let obstacles = Obstacles::of(scene, scan);
+    let met = obstacles.met_by_beams();
+    for (i, face) in obstacles.facets.iter().enumerate() {
+        if let Some(face) = face {
+            check_reach(scene, scan, i, face, &met, found);
         }
     }
 }

@@ -44,7 +44,10 @@ impl Laboratory {
     /// A facet without a shape, an unknown color, a board that fits nowhere, an invalid flight.
     pub fn new(scene: &Scene, seed: u64) -> Result<Self, SimError> {
         // Boards need a room; a flight does not.
-        if scene.has_no_laboratory() || !(scene.room.has_walls() || scene.only_flies()) {
+        if scene.has_no_laboratory()
+            || scene.only_shows_mirrors()
+            || !(scene.room.has_walls() || scene.only_flies())
+        {
             return Err(SimError::NoLaboratory);
         }
         let sensor = Sensor::new(scene)?;

@@ -129,6 +129,18 @@ impl Scene {
         nothing_around && self.board.is_empty() && self.flight.is_empty() && !self.room.has_walls()
     }
 
+    /// Whether the scene has mirrors or posts, and nothing to record them with: it can be analyzed by `layout`,
+    /// traced and exported. Whoever gives markers and walls, but no board, wants a recording.
+    pub fn only_shows_mirrors(&self) -> bool {
+        let experiment = &self.experiment;
+        let nothing_set_up = self.board.is_empty()
+            && self.flight.is_empty()
+            && experiment.pose.is_empty()
+            && experiment.test.is_empty();
+        let half_a_laboratory = self.room.has_walls() && !self.superstructure.marker.is_empty();
+        nothing_set_up && !half_a_laboratory && !self.has_no_laboratory()
+    }
+
     /// Whether only flights can be recorded, so that no walls are needed.
     pub fn only_flies(&self) -> bool {
         !self.flight.is_empty() && self.board.is_empty() && self.experiment.pose.is_empty()

@@ -166,5 +166,6 @@ pub(crate) fn reach(scan: &ScanGeometry) -> String {
 
 /// Three decimals: as much as a message needs.
 pub(crate) fn rounded(value: f64) -> f64 {
-    (value * 1e3).round() / 1e3
+    // Adding zero turns −0 into 0.
+    (value * 1e3).round() / 1e3 + 0.0
 }

@@ -94,7 +94,7 @@ impl Wedge {
         if !covers(scan, first, last) {
             found.add(
                 &azimuths,
-                format_args!("is [{first}, {last}]°; {}", reach(scan)),
+                format_args!("is [{}, {}]°; {}", rounded(first), rounded(last), reach(scan)),
                 "a mirror behind the scanner would get no light".to_owned(),
             );
             return;
