@@ -8,6 +8,7 @@ mod experiment;
 mod flight;
 mod mishap;
 mod outline;
+mod session;
 mod stage;
 mod structure;
 mod values;
@@ -32,6 +33,7 @@ pub fn problems(scene: &Scene) -> Vec<Problem> {
             return found.0;
         }
     };
+    session::check(scene, &scan, &mut found);
     // Where there is no laboratory, structure and procedure have nothing to be checked against.
     if !scene.has_no_laboratory() {
         structure::check(scene, &scan, &mut found);
