@@ -5,8 +5,11 @@
 
 use crate::common::{run, stdout};
 use catoptric::files::scene::{self, Template};
-use catoptric::model::assessment::{Assessment, HeldOut, SharedParameter, VarianceComponent};
+use catoptric::model::assessment::{
+    Assessment, Cause, ComponentTest, Doubt, HeldOut, SharedParameter, VarianceComponent,
+};
 use catoptric::model::calibration::{FacetEstimate, MountEstimate};
+use catoptric::model::session::GlassSheet;
 use catoptric::model::{AngleTable, BeamEstimate, Calibration, RangeBias, ScanGeometry, Status};
 use catoptric::{calib, score, sim};
 use serde_json::Value;
@@ -483,6 +486,19 @@ fn assessment() -> Assessment {
             sd: 1.0,
         }],
         correlations: vec![vec![1.0]],
+        tests: vec![ComponentTest {
+            cause: Cause::Drift,
+            statistic: 9.0,
+            degrees_of_freedom: 8.5,
+            p_value: 0.3,
+        }],
+        doubts: vec![Doubt {
+            causes: vec![Cause::Board],
+            poses: vec![3],
+            statistic: 90.0,
+            degrees_of_freedom: 4.0,
+            message: "the board was moved".to_owned(),
+        }],
         open: vec!["port".to_owned()],
         held_out: Some(HeldOut {
             boards: 1,
@@ -527,10 +543,21 @@ moved_mm = [0, 0, 4]
     let small = scene::parse(&small, "two-mirror.toml", &quick).unwrap();
     let laboratory = sim::Laboratory::new(&small, small.seed).unwrap();
     let (dataset, truth) = (laboratory.dataset().unwrap(), laboratory.truth().unwrap());
+    let mut session = dataset.session.clone();
+    session.believed.element_sd_mm = 0.5;
+    session.bare_structure.noise_sd_mm = 0.5;
+    session.boards[0].thickness_mm = 2.0;
+    session.glass = Some(GlassSheet {
+        thickness_mm: 2.0,
+        thickness_sd_mm: 0.1,
+        ..GlassSheet::default()
+    });
+    let noise = session.believed.noise.clone().unwrap();
+    session.believed.noise_of.insert("grey".to_owned(), noise);
     same(
         "session.toml",
-        &json(serde_json::to_value(&dataset.session)),
-        &["believed.bias.color"],
+        &json(serde_json::to_value(&session)),
+        &["believed.bias.color", "believed.noise_of"],
     );
     same(
         "truth.json",

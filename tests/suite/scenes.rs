@@ -51,6 +51,7 @@ pub(crate) fn set_board_ahead(scene: &mut Scene, distance: f64) {
         name: "board".to_owned(),
         width_mm: 1000.0,
         height_mm: 1000.0,
+        thickness_mm: 0.0,
         color: "white".to_owned(),
         marker: Vec::new(),
     });

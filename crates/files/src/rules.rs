@@ -168,7 +168,16 @@ impl Content for Session {
                 found.add(&of("room").key("min_m").index(axis), message);
             }
         }
-        found.bias(&of("believed").key("bias"), &self.believed.bias);
+        let believed = of("believed");
+        found.bias(&believed.key("bias"), &self.believed.bias);
+        let noise = &self.believed.noise;
+        let mut tables: Vec<_> = noise.iter().map(|table| (believed.key("noise"), table)).collect();
+        for (color, table) in &self.believed.noise_of {
+            tables.push((believed.key("noise_of").key(color), table));
+        }
+        for (path, table) in tables {
+            found.table(&path, ("range_m", &table.range_m), ("sd_mm", &table.sd_mm));
+        }
         let bare = &self.bare_structure;
         let path = of("bare_structure");
         if !bare.distance_m.is_empty() {

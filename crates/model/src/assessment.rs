@@ -21,6 +21,12 @@ pub struct Assessment {
     /// Correlations of the shared parameters, in row-major order.
     #[schemars(inner(inner(range(min = -limits::WHOLE, max = limits::WHOLE))))]
     pub correlations: Vec<Vec<f64>>,
+    /// Test of each kind of error: whether the readings contradict what is assumed of it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tests: Vec<ComponentTest>,
+    /// The assumptions that the readings contradict, the clearest first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub doubts: Vec<Doubt>,
     /// Facets whose planes the boards do not determine, and why.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub open: Vec<String>,
@@ -44,6 +50,75 @@ pub struct ChiSquaredTest {
     /// Probability of a χ² at least as large if all assumptions hold.
     #[schemars(range(min = 0.0, max = limits::WHOLE))]
     pub p_value: f64,
+}
+
+/// What may be wrong with the assumptions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Cause {
+    /// The drift of a pose is larger.
+    Drift,
+    /// The error of a board's markers is larger.
+    Markers,
+    /// The ranges drift in the course of the recording.
+    WarmUp,
+    /// Noise is correlated from scan to scan.
+    CorrelatedNoise,
+    /// Single beams are off from pose to pose.
+    Noise,
+    /// The faces of all boards are nearer or farther than their markers.
+    BoardThickness,
+    /// One board was not where it was tracked.
+    Board,
+    /// The path in the mirrors is longer or shorter.
+    Glass,
+    /// The distances to the bare structure are off, or the thickness of the mirrors.
+    BareDistances,
+    /// E_r has another shape.
+    DistanceBias,
+    /// E_a has another shape.
+    AngleBias,
+    /// The errors found in step 1 are farther off than their uncertainty.
+    Characterization,
+    /// The sensor is farther from its drawn pose than its tolerance.
+    Mounting,
+}
+
+/// The test of one kind of error, as if nothing else were wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ComponentTest {
+    /// What would be wrong.
+    pub cause: Cause,
+    /// χ².
+    #[schemars(range(min = 0.0, max = limits::ANY))]
+    pub statistic: f64,
+    /// Its degrees of freedom: how many numbers of this kind the readings determine, not always a whole number.
+    #[schemars(range(min = 0.0, max = limits::ANY))]
+    pub degrees_of_freedom: f64,
+    /// Probability of a χ² at least as large if all assumptions hold; of the largest of several, for boards.
+    #[schemars(range(min = 0.0, max = limits::WHOLE))]
+    pub p_value: f64,
+}
+
+/// An assumption that the readings contradict.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Doubt {
+    /// What is wrong; of several causes the readings do not tell which.
+    pub causes: Vec<Cause>,
+    /// Numbers of the poses concerned, if it is not all of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(inner(range(max = limits::COUNT)))]
+    pub poses: Vec<usize>,
+    /// χ².
+    #[schemars(range(min = 0.0, max = limits::ANY))]
+    pub statistic: f64,
+    /// Its degrees of freedom.
+    #[schemars(range(min = 0.0, max = limits::ANY))]
+    pub degrees_of_freedom: f64,
+    /// The doubt in words.
+    pub message: String,
 }
 
 /// Slope error of the facets, 1σ, and the test of the hypothesis that they are flat.

@@ -32,6 +32,9 @@ pub const UNIT: f64 = 1.01;
 /// Largest share, probability or correlation, which arithmetic rounds.
 pub const WHOLE: f64 = 1.000_001;
 
+/// Largest refractive index of a glass in front of a mirror.
+pub const INDEX: f64 = 4.0;
+
 /// Largest divergence of a beam, in milliradians.
 pub const DIVERGENCE_MRAD: f64 = 1e3;
 

@@ -3,18 +3,22 @@
 //! This is `session.toml`. It holds the nominal design, not the structure as built, and the assumed noise and biases,
 //! not the actual ones. The truth is never here.
 
-use crate::bias::{DistanceBias, RangeBias};
+use crate::bias::{DistanceBias, RangeBias, interpolate};
 use crate::board::{BoardPlane, Rectangle};
-use crate::characterization::Characterization;
-use crate::frame::PoseData;
+use crate::characterization::{Characterization, NoiseRow};
+use crate::frame::{Pose, PoseData};
 use crate::limits;
 use crate::scan::{ScanAngles, ScanDirection, ScanError, ScanGeometry};
-use nalgebra::{Point3, Unit, Vector3};
+use nalgebra::{Point3, Translation3, Unit, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Version of `session.toml`.
 pub const SCHEMA_VERSION: u32 = 2;
+
+/// Largest difference between two distances at which noise was measured that counts as none, in meters.
+const SAME_DISTANCE: f64 = 1e-3;
 
 /// Everything known before the first reading is analyzed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -38,6 +42,9 @@ pub struct Session {
     pub believed: Beliefs,
     /// Step 3: the bare structure, measured before the mirrors were attached.
     pub bare_structure: BareStructure,
+    /// Glass in front of the mirrors' reflecting faces; `None` for front-surface mirrors.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub glass: Option<GlassSheet>,
     /// Markers of the rig, in the rig frame.
     pub rig_markers: Vec<Marker>,
     /// The mirrors as drawn, in the sensor frame of the drawing.
@@ -133,9 +140,15 @@ pub struct RoomSurvey {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Beliefs {
-    /// White noise of one reading, in millimeters.
+    /// White noise of one reading, in millimeters: typical, and where there is no table.
     #[schemars(range(min = 0.0, max = limits::ERROR_MM))]
     pub range_noise_sd_mm: f64,
+    /// White noise of one reading over distance; `None` if it is the same everywhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<Noise>,
+    /// The same on targets of some colors.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub noise_of: BTreeMap<String, Noise>,
     /// Drift, constant over one pose, in millimeters.
     #[schemars(range(min = 0.0, max = limits::ERROR_MM))]
     pub drift_sd_mm: f64,
@@ -159,12 +172,56 @@ pub struct Beliefs {
     pub color_bias_sd_mm: f64,
 }
 
+/// White noise of a reading over distance, linearly interpolated and constant outside (Cooper, Tables 2 and 4).
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Noise {
+    /// Distances in meters, strictly increasing.
+    #[schemars(length(min = 1), inner(range(min = 0.0, max = limits::FAR_M)))]
+    pub range_m: Vec<f64>,
+    /// Standard deviations at those distances, in millimeters.
+    #[schemars(inner(range(min = 0.0, max = limits::ERROR_MM)))]
+    pub sd_mm: Vec<f64>,
+}
+
+impl Noise {
+    /// The table of some measured rows; those at one distance, to the millimeter, are pooled.
+    fn of<'r>(rows: impl IntoIterator<Item = &'r NoiseRow>) -> Self {
+        let mut rows: Vec<&NoiseRow> = rows.into_iter().collect();
+        rows.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
+        let mut table = Self::default();
+        for near in rows.chunk_by(|a, b| b.distance_m - a.distance_m < SAME_DISTANCE) {
+            let freedom: f64 = near.iter().map(|r| r.degrees_of_freedom as f64).sum();
+            let weighted = |value: fn(&NoiseRow) -> f64| {
+                near.iter()
+                    .map(|r| r.degrees_of_freedom as f64 * value(r))
+                    .sum::<f64>()
+                    / freedom
+            };
+            table.range_m.push(weighted(|r| r.distance_m));
+            table.sd_mm.push(weighted(|r| r.sd_mm * r.sd_mm).sqrt());
+        }
+        table
+    }
+
+    /// Standard deviation of a reading of a target at a distance, both in meters.
+    pub fn sd(&self, range: f64) -> f64 {
+        interpolate(&self.range_m, &self.sd_mm, range) * 1e-3
+    }
+}
+
 /// Zero uncertainties are omitted from files.
 fn is_zero(sd: &f64) -> bool {
     *sd == 0.0
 }
 
 impl Beliefs {
+    /// White noise of one reading of a target of some color at a distance, 1σ, both in meters.
+    pub fn noise_sd(&self, range: f64, color: &str) -> f64 {
+        let table = self.noise_of.get(color).or(self.noise.as_ref());
+        table.map_or(self.range_noise_sd_mm * 1e-3, |table| table.sd(range))
+    }
+
     /// The assumed errors after the bare sensor has been characterized.
     ///
     /// The bias is the characterization's; each uncertainty is the root mean square over the parameters it covers.
@@ -198,6 +255,13 @@ impl Beliefs {
         let (sum, count) = of_reference.fold((0.0, 0.0), |(sum, count), n| (sum + n.sd_mm, count + 1.0));
         if count > 0.0 {
             believed.range_noise_sd_mm = sum / count;
+            believed.noise = Some(Noise::of(found.noise.iter().filter(|n| reference(&n.color))));
+            for color in found.bias.color.keys() {
+                let of_color: Vec<&NoiseRow> = found.noise.iter().filter(|n| n.color == *color).collect();
+                if !of_color.is_empty() {
+                    believed.noise_of.insert(color.clone(), Noise::of(of_color));
+                }
+            }
         }
         believed
     }
@@ -213,6 +277,11 @@ pub struct BareStructure {
     /// Uncertainty of a bare distance, in millimeters.
     #[schemars(range(min = 0.0, max = limits::ERROR_MM))]
     pub distance_sd_mm: f64,
+    /// Error of a bare distance that no other beam shares, in millimeters; `distance_sd_mm` is shared by all beams of a
+    /// facet.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    #[schemars(range(min = 0.0, max = limits::ERROR_MM))]
+    pub noise_sd_mm: f64,
     /// Whether the scanner itself measured them, in one recording: then they share its drift there and the uncertainty
     /// of the assumed biases that correct them. Both are part of the uncertainty.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -223,6 +292,74 @@ pub struct BareStructure {
     /// Mean bias-corrected range of each beam to the bare structure, in meters; 0 if there is none.
     #[schemars(inner(range(min = 0.0, max = limits::FAR_M)))]
     pub distance_m: Vec<f64>,
+}
+
+/// Glass in front of a mirror's reflecting face, as its data sheet states. The drawing shows the front of the glass.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GlassSheet {
+    /// Thickness, in millimeters.
+    #[schemars(range(min = 0.0, max = limits::THICKNESS_MM))]
+    pub thickness_mm: f64,
+    /// Uncertainty of the thickness, 1σ, in millimeters; the same glass is in front of all mirrors.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    #[schemars(range(min = 0.0, max = limits::THICKNESS_MM))]
+    pub thickness_sd_mm: f64,
+    /// Refractive index.
+    #[serde(default = "float_glass")]
+    #[schemars(range(min = 1.0, max = limits::INDEX))]
+    pub index: f64,
+}
+
+/// What a plate of glass does to a range, per meter of its thickness. See [`GlassSheet::effect`].
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct GlassEffect {
+    /// How much farther along the beam a front-surface mirror would have to be that sends it off along the same line.
+    pub setback: f64,
+    /// How much longer the range is than that mirror's.
+    pub delay: f64,
+}
+
+impl GlassSheet {
+    /// The effect of one meter of this glass on a beam that is deflected into a direction.
+    ///
+    /// Light enters at incidence α, travels t/cos α′ twice, n times slower, with sin α′ = sin α/n, and leaves t·2·tan α′
+    /// aside in the direction of an ordinary reflection. A front-surface mirror t/(n·cos α′) farther along the beam sends
+    /// it off along the same line; the range is longer by 2·t·(n − 1/n)/cos α′ than with that mirror.
+    pub fn effect(&self, beam: &Unit<Vector3<f64>>, exit: &Unit<Vector3<f64>>) -> GlassEffect {
+        let n = self.index;
+        let sin_squared = 0.5 * (1.0 + beam.dot(exit));
+        let cos_inside = (1.0 - sin_squared / (n * n)).sqrt();
+        GlassEffect {
+            setback: 1.0 / (n * cos_inside),
+            delay: 2.0 * (n - 1.0 / n) / cos_inside,
+        }
+    }
+
+    /// The effect of the glass at its stated thickness, in meters.
+    pub fn stated(&self, beam: &Unit<Vector3<f64>>, exit: &Unit<Vector3<f64>>) -> GlassEffect {
+        let one = self.effect(beam, exit);
+        let thickness = 1e-3 * self.thickness_mm;
+        GlassEffect {
+            setback: thickness * one.setback,
+            delay: thickness * one.delay,
+        }
+    }
+}
+
+/// Float glass at 905 nm.
+fn float_glass() -> f64 {
+    1.51
+}
+
+impl Default for GlassSheet {
+    fn default() -> Self {
+        Self {
+            thickness_mm: 0.0,
+            thickness_sd_mm: 0.0,
+            index: float_glass(),
+        }
+    }
 }
 
 /// A labeled marker.
@@ -262,6 +399,10 @@ pub struct BoardSheet {
     /// Extent along the board's y axis, in millimeters.
     #[schemars(extend("exclusiveMinimum" = 0.0), range(min = 0.0, max = limits::FAR_MM))]
     pub height_mm: f64,
+    /// How far the face is in front of the plane that the markers span, along the board's z axis, in millimeters.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    #[schemars(range(min = 0.0, max = limits::FAR_MM))]
+    pub thickness_mm: f64,
     /// Color.
     pub color: String,
     /// Markers on the face, in the board frame; the first three are P_p1…P_p3.
@@ -345,6 +486,11 @@ impl BoardSheet {
             width: self.width_mm * 1e-3,
             height: self.height_mm * 1e-3,
         }
+    }
+
+    /// Pose of the face, given that of the markers' plane: both have the board's axes.
+    pub fn face(&self, a_from_board: &Pose) -> Pose {
+        a_from_board * Translation3::new(0.0, 0.0, 1e-3 * self.thickness_mm)
     }
 }
 

@@ -100,7 +100,6 @@ pub fn knowable(dataset: &Dataset, truth: &Truth) -> Result<Knowable, Unreadable
         })
         .collect();
     let cone = observations::cone_half_angle(session);
-    let noise_sd = session.believed.range_noise_sd_mm * 1e-3;
     let mut knowable = Knowable {
         limits: of_experiment(dataset, truth)?,
         ..Knowable::default()
@@ -122,6 +121,9 @@ pub fn knowable(dataset: &Dataset, truth: &Truth) -> Result<Knowable, Unreadable
                 let count = summary.get(beam.beam)?.count;
                 let hit = board.hit(&origin, &exit)?;
                 let spot = cone * (deflection.distance + hit.distance);
+                let noise_sd = session
+                    .believed
+                    .noise_sd(deflection.distance + hit.distance, &board.color);
                 (count > 0 && board.holds(&hit, spot, 0.0)).then(|| (board.view(noise_sd, count), *label))
             })
             .collect();

@@ -192,10 +192,10 @@ where
     let stretches: Vec<&PoseRecord> = dataset.of_kind(kind).collect();
     let visits: Vec<Vec<Visit>> = stretches.par_iter().map(of_stretch).collect::<Result<_, _>>()?;
     let visits: Vec<Visit> = visits.into_iter().flatten().collect();
-    let noise_sd_mm = dataset.session.believed.range_noise_sd_mm;
+    let believed = &dataset.session.believed;
     let squares: Vec<f64> = visits
         .iter()
-        .filter_map(|v| v.normalized_square(noise_sd_mm))
+        .filter_map(|v| v.normalized_square(believed.noise_sd(v.on.predicted, &v.on.color) * 1e3))
         .collect();
     Ok(Judged {
         residual: summarize(&visits),

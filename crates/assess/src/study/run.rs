@@ -43,6 +43,10 @@ pub struct Run {
     pub up: f64,
     /// Its eᵀP⁻¹e.
     pub mahalanobis_squared: f64,
+    /// Share of all its elements that are inside their stated 95 % ellipses.
+    pub inside_95: f64,
+    /// The warnings of the calibration, one after the other.
+    pub warnings: String,
     /// Why there is no calibration; empty otherwise.
     pub failure: String,
     /// Duration, in milliseconds; not part of tables that are compared.
@@ -127,6 +131,8 @@ impl Experiment {
                     },
                     ..RangeBias::default()
                 };
+                // The bare distances were corrected by the biases of step 1: they share no error with readings that are not.
+                dataset.session.bare_structure.scanned = false;
                 by_method(*method, &dataset)
             }
             Contestant::Oracle => {
@@ -162,6 +168,8 @@ impl Experiment {
             across: f64::NAN,
             up: f64::NAN,
             mahalanobis_squared: f64::NAN,
+            inside_95: f64::NAN,
+            warnings: String::new(),
             failure: String::new(),
             milliseconds,
         };
@@ -178,6 +186,8 @@ impl Experiment {
             run.failure = score.reasons().join("; ");
             return (run, Vec::new());
         }
+        run.inside_95 = score.coverage_95;
+        run.warnings = calibration.warnings.join("; ");
         run.solved = score.beams.solved;
         run.abstained = score.beams.abstained;
         run.missed = score.beams.missed.unwrap_or_default();

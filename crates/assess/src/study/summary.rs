@@ -31,6 +31,8 @@ pub struct MethodSummary {
     pub runs: usize,
     /// Number of experiments without a calibration.
     pub failed: usize,
+    /// Number of experiments whose calibration warns of something.
+    pub warned: usize,
     /// Why the first of them has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
@@ -121,7 +123,7 @@ impl Summary {
                 let unmet = requirement.judge_figures(
                     &label,
                     &figures,
-                    "per_axis_rms_deg, anees, coverage_95, failed",
+                    "per_axis_rms_deg, anees, coverage_95, failed, warned",
                 )?;
                 reasons.extend(unmet.into_iter().map(|u| (label.clone(), u.to_string())));
             }
@@ -206,6 +208,7 @@ fn summary(method: String, axes: BTreeMap<String, String>, runs: &[&Run]) -> Met
         axes,
         runs: runs.len(),
         failed: failures.len(),
+        warned: runs.iter().filter(|r| !r.warnings.is_empty()).count(),
         failure: failures.first().map(|r| r.failure.clone()),
         solved: count(|r| r.solved),
         abstained: count(|r| r.abstained),
@@ -327,7 +330,7 @@ mod tests {
         let study = Study::of_scene(scene, squares.len() as u64, vec![Contestant::Oracle]);
         let rows: String = (1..)
             .zip(squares)
-            .map(|(seed, square)| format!("0,{seed},oracle,1,0,0,0,1e-8,,1e-8,,700,1e-4,1e-4,{square},\n"))
+            .map(|(seed, square)| format!("0,{seed},oracle,1,0,0,0,1e-8,,1e-8,,700,1e-4,1e-4,{square},,,\n"))
             .collect();
         let runs = from_csv(&(to_csv(&[]) + &rows)).expect("they are runs");
         summarize(&study, &runs).methods.remove(0)

@@ -3,7 +3,7 @@
 use super::Run;
 
 /// Header of `runs.csv`. Squares are in rad², errors in radians.
-pub const HEADER: [&str; 16] = [
+pub const HEADER: [&str; 18] = [
     "cell",
     "seed",
     "method",
@@ -19,6 +19,8 @@ pub const HEADER: [&str; 16] = [
     "across_rad",
     "up_rad",
     "mahalanobis_squared",
+    "inside_95",
+    "warnings",
     "failure",
 ];
 
@@ -34,7 +36,7 @@ pub fn to_csv(runs: &[Run]) -> String {
     String::from_utf8(bytes).unwrap_or_default()
 }
 
-fn row(r: &Run) -> [String; 16] {
+fn row(r: &Run) -> [String; 18] {
     let number = |x: f64| if x.is_nan() { String::new() } else { x.to_string() };
     [
         r.cell.to_string(),
@@ -52,6 +54,8 @@ fn row(r: &Run) -> [String; 16] {
         number(r.across),
         number(r.up),
         number(r.mahalanobis_squared),
+        number(r.inside_95),
+        r.warnings.clone(),
         r.failure.clone(),
     ]
 }
@@ -97,7 +101,9 @@ fn parsed(record: &csv::StringRecord) -> Option<Run> {
         across: number(12)?,
         up: number(13)?,
         mahalanobis_squared: number(14)?,
-        failure: text(15)?.to_owned(),
+        inside_95: number(15)?,
+        warnings: text(16)?.to_owned(),
+        failure: text(17)?.to_owned(),
         milliseconds: f64::NAN,
     })
 }

@@ -9,8 +9,10 @@ use crate::readings::columns::Columns;
 use crate::readings::locate;
 use crate::readings::observations::{BoardInSensor, BoardView, Observation, azimuth};
 use crate::readings::spread;
-use catoptric_model::session::NominalFacet;
-use catoptric_model::{Dataset, Deflection, Pose, PoseKind, PoseRecord, Session, Status, Stop, Summary};
+use catoptric_model::session::{GlassEffect, NominalFacet};
+use catoptric_model::{
+    Dataset, Deflection, Pose, PoseKind, PoseRecord, Session, Status, Stop, Summary, beam,
+};
 
 /// Number of boards that a solution needs (steps 7–10).
 pub const MIN_BOARDS: usize = 3;
@@ -40,8 +42,11 @@ pub(crate) struct Attempt<'a> {
     pub(crate) facet: &'a NominalFacet,
     /// The deflection by the believed plane of its facet.
     pub(crate) nominal: Deflection,
+    /// With what glass adds to it.
     pub(crate) distance: BareDistance,
-    /// Believed noise of one reading, in meters.
+    /// What glass in front of the mirror does to the ranges.
+    pub(crate) glass: GlassEffect,
+    /// Believed noise of a typical reading, in meters.
     pub(crate) noise: f64,
     /// Number of poses recorded for its facet.
     pub(crate) recorded: usize,
@@ -58,14 +63,18 @@ impl<'a> Attempt<'a> {
         nominal: &Deflection,
     ) -> Self {
         let noise = session.believed.range_noise_sd_mm * 1e-3;
+        let azimuth = azimuth(session, beam);
+        let glass = session.glass.map_or_else(GlassEffect::default, |glass| {
+            glass.stated(&beam::direction(azimuth), &nominal.exit_direction(azimuth))
+        });
         let distance = work.bare.distance(session, &facet.name, beam).map_or(
             // Not measured: the mirror as drawn, whose face is the distance itself.
             BareDistance {
-                distance: nominal.distance,
+                distance: nominal.distance + glass.setback,
                 thickness: 0.0,
             },
             |distance| BareDistance {
-                distance,
+                distance: distance + glass.setback,
                 thickness: session.bare_structure.mirror_thickness_mm * 1e-3,
             },
         );
@@ -84,10 +93,11 @@ impl<'a> Attempt<'a> {
             work,
             session,
             beam,
-            azimuth: azimuth(session, beam),
+            azimuth,
             facet,
             nominal: *nominal,
             distance,
+            glass,
             noise,
             recorded: recorded.len(),
             usable: recorded.into_iter().filter(usable).collect(),
@@ -103,20 +113,27 @@ impl<'a> Attempt<'a> {
         poses
             .iter()
             .filter_map(|p| {
-                let summary = self.summary(*p);
-                Some(
-                    boards[*p]
-                        .as_ref()?
-                        .observation(spread::noise_sd(summary, self.noise), summary),
-                )
+                let (board, summary) = (boards[*p].as_ref()?, self.summary(*p));
+                let undelayed = Summary {
+                    mean: summary.mean - self.glass.delay,
+                    ..*summary
+                };
+                Some(board.observation(self.noise_sd(summary, &board.color), &undelayed))
             })
             .collect()
+    }
+
+    /// Noise of one reading of a surface, in meters.
+    pub(crate) fn noise_sd(&self, summary: &Summary, color: &str) -> f64 {
+        spread::noise_sd(summary, self.session.believed.noise_sd(summary.mean, color))
     }
 
     /// The readings of a stretch without outliers, one by one.
     pub(crate) fn single_readings(&self, pose: usize) -> Vec<f64> {
         let columns = self.work.columns.map(|c| c.of(pose, self.beam));
-        locate::kept(columns.unwrap_or_default(), self.summary(pose), self.noise)
+        let mut kept = locate::kept(columns.unwrap_or_default(), self.summary(pose), self.noise);
+        kept.iter_mut().for_each(|range| *range -= self.glass.delay);
+        kept
     }
 
     pub(crate) fn element<'o>(&self, observations: &'o [Observation<'o>]) -> SoleElement<'o>

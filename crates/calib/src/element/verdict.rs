@@ -7,7 +7,6 @@ use crate::element::solver::Solver;
 use crate::judge::levers::libm_cos;
 use crate::readings::ahead::{AGREEMENT_FLOOR, ahead};
 use crate::readings::observations::{BoardView, Observation};
-use crate::readings::spread;
 use catoptric_model::{BeamEstimate, Deflection, PoseKind, RawRange, Status, frame};
 use nalgebra::{Matrix2, Vector2};
 
@@ -113,7 +112,7 @@ pub(crate) fn judge(solver: &Solver, attempt: &Attempt, fit: &ElementFit) -> Res
     Ok(BeamEstimate {
         azimuth_rad: Some(solution.deflection.azimuth),
         elevation_rad: Some(solution.deflection.elevation),
-        distance_m: Some(solution.deflection.distance),
+        distance_m: Some(solution.deflection.distance - attempt.glass.setback),
         covariance_rad2: Some(symmetric(covariance)),
         noise_covariance_rad2: noise.map(symmetric),
         ..found
@@ -140,10 +139,10 @@ fn check_room(attempt: &Attempt, found: &Deflection, covariance: &Matrix2<f64>) 
                 plane: wall.plane,
                 markers: &[],
                 color,
-                noise_sd: spread::noise_sd(summary, attempt.noise),
+                noise_sd: attempt.noise_sd(summary, color),
                 count: summary.count,
             },
-            mean: RawRange(summary.mean),
+            mean: RawRange(summary.mean - attempt.glass.delay),
         }];
         let budget = attempt.budget(found, &observation).ok_or_else(lost)?;
         let residuals = attempt.element(&observation).residuals(found).unwrap_or_default();

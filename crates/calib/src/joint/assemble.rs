@@ -12,7 +12,7 @@ use crate::mount::pose::{self, Mount, MountPrior};
 use crate::readings::observations::azimuth;
 use crate::readings::spread;
 use crate::screen::ScreenClass;
-use catoptric_model::{BeamEstimate, MirrorPlane, Pose, ScanGeometry, Status, beam};
+use catoptric_model::{BeamEstimate, MirrorPlane, Pose, ScanGeometry, Session, Status, beam};
 use nalgebra::{DVector, Dyn, Matrix6, OMatrix, RowDVector, U6, Vector6};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -89,10 +89,12 @@ pub(super) fn components(facets: usize, assigned: &[Assigned]) -> Vec<Vec<usize>
 fn board(work: &Workspace, pose: usize) -> Option<Board> {
     let (session, record) = (&work.dataset.session, &work.dataset.poses[pose]);
     let sheet = session.board(record.label.board.as_deref()?)?;
+    let rig_from_board = record.room_from_rig.inverse() * record.room_from_board?;
     Some(Board {
         pose,
         number: record.label.pose,
-        rig_from_board: record.room_from_rig.inverse() * record.room_from_board?,
+        rig_from_board,
+        rig_from_face: sheet.face(&rig_from_board),
         color: record.label.color.clone().unwrap_or_else(|| sheet.color.clone()),
         markers: sheet.markers.iter().map(|m| m.position()).collect(),
     })
@@ -101,7 +103,6 @@ fn board(work: &Workspace, pose: usize) -> Option<Board> {
 /// A group: the given facets with their boards and elements.
 pub(super) fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) -> Group {
     let session = &work.dataset.session;
-    let noise = session.believed.range_noise_sd_mm * 1e-3;
     let common = CommonErrors::of(session);
     let bare = |facet: usize| {
         let distances = assigned.iter().filter(|a| a.facet == facet).filter_map(|a| {
@@ -121,11 +122,12 @@ pub(super) fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) 
             variance += common.bare_sd(*distance, cos).powi(2);
         }
         let count = distances.len().max(1) as f64;
+        let own = session.bare_structure.noise_sd_mm * 1e-3;
         BareFacet {
             distances,
             thickness: session.bare_structure.mirror_thickness_mm * 1e-3,
             common: row / count,
-            sd: (variance / count).sqrt().max(MIN_SD),
+            sd: libm::hypot((variance / count).sqrt(), own / count.sqrt()).max(MIN_SD),
         }
     };
     let mut group = Group {
@@ -147,6 +149,9 @@ pub(super) fn group(work: &Workspace, facets: &[usize], assigned: &[&Assigned]) 
             });
             let summary = &work.summaries[*pose][element.beam];
             if let Some(place) = place {
+                let noise = session
+                    .believed
+                    .noise_sd(summary.mean, &group.boards[place].color);
                 let of_mean = spread::noise_sd(summary, noise) / (summary.count.max(1) as f64).sqrt();
                 let sd = libm::hypot(of_mean, session.believed.element_sd_mm * 1e-3);
                 sights.push(Sight {
@@ -207,7 +212,7 @@ pub(super) fn direct_group(work: &Workspace, selected: &DirectBoard) -> Option<G
 
 /// The mounting as estimated in step 5, with its uncertainty among the shared parameters.
 pub(super) fn mounting_as_found(work: &Workspace, mount: &Mount) -> (Mounting, DVector<f64>) {
-    let count = CommonErrors::of(&work.dataset.session).len();
+    let count = shared_errors(&work.dataset.session);
     let known = &mount.uncertainty;
     let mounting = Mounting {
         rig_from_sensor: mount.rig_from_sensor,
@@ -219,7 +224,7 @@ pub(super) fn mounting_as_found(work: &Workspace, mount: &Mount) -> (Mounting, D
 /// The mounting as drawn, to be estimated from all data; motions are counted from the estimate of step 5.
 pub(super) fn mounting_as_drawn(work: &Workspace, mount: &Mount) -> (Mounting, DVector<f64>) {
     let session = &work.dataset.session;
-    let count = CommonErrors::of(session).len();
+    let count = shared_errors(session);
     let drawn = MountPrior::of(
         &Pose::from(&session.nominal_rig_from_sensor),
         &session.mount_tolerance,
@@ -234,6 +239,15 @@ pub(super) fn mounting_as_drawn(work: &Workspace, mount: &Mount) -> (Mounting, D
         motion,
     };
     (mounting, prior_mean(&back, &drawn.sd, count))
+}
+
+/// Number of shared errors besides the mounting: of the biases, and of the thickness of glass if it is uncertain.
+fn shared_errors(session: &Session) -> usize {
+    let glass = session
+        .glass
+        .as_ref()
+        .is_some_and(|glass| glass.thickness_sd_mm > 0.0);
+    CommonErrors::of(session).len() + usize::from(glass)
 }
 
 /// The problem and its initial state.
@@ -253,6 +267,7 @@ pub(super) fn begin<'w>(
         first_common: MOTIONS,
         drift_sd: session.believed.drift_sd_mm * 1e-3,
         marker_sd: session.believed.marker_sd_mm * 1e-3,
+        glass: session.glass.as_ref(),
         flatness: Flatness::default(),
         prior_mean: mean.clone(),
         stop: work.stop,
@@ -271,9 +286,7 @@ fn motion_of(
     let root = eigen.eigenvectors * Matrix6::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0).sqrt()));
     let mut motion = OMatrix::<f64, U6, Dyn>::zeros(6 + count);
     motion.columns_mut(0, 6).copy_from(&root);
-    if common.ncols() == count {
-        motion.columns_mut(6, count).copy_from(common);
-    }
+    motion.columns_mut(6, common.ncols()).copy_from(common);
     motion
 }
 

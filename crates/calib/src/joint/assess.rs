@@ -9,16 +9,15 @@ use super::fit::JointFit;
 use super::group::{BOARD_ERRORS, FACET_PARAMETERS};
 use super::problem::Joint;
 use crate::lsq::Solution;
-use catoptric_model::Assessment;
-use catoptric_model::Session;
 use catoptric_model::assessment::{
     ChiSquaredTest, LargestResidual, Planeness, SharedParameter, VarianceComponent,
 };
+use catoptric_model::{Assessment, Dataset, Session};
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Significance level below which beliefs are called wrong.
-const DOUBTFUL: f64 = 1e-3;
+const DOUBTFUL: f64 = 1e-4;
 
 /// Effective number of parameters of one kind that the readings must determine before a size is reported.
 const MIN_DETERMINED: f64 = 0.5;
@@ -30,8 +29,9 @@ pub(super) fn upper_tail(chi_squared: f64, freedom: f64) -> f64 {
 
 impl Joint<'_> {
     /// The assessment of a solution.
-    pub(super) fn assess(&self, session: &Session, fit: &JointFit, answers: &[Answer]) -> Assessment {
-        let solution = &fit.solution;
+    pub(super) fn assess(&self, dataset: &Dataset, fit: &JointFit, answers: &[Answer]) -> Assessment {
+        let (session, solution) = (&dataset.session, &fit.solution);
+        let (tests, doubts) = self.doubts(dataset, solution);
         let freedom = solution.degrees_of_freedom();
         let global_test = ChiSquaredTest {
             chi_squared: solution.sum_of_squares,
@@ -62,6 +62,8 @@ impl Joint<'_> {
             open: self.open(session, solution),
             largest_residual: largest(answers),
             held_out: None,
+            tests,
+            doubts,
         };
         assessment.verdict = verdict(&assessment);
         assessment
@@ -148,6 +150,9 @@ impl Joint<'_> {
             names.push((format!("sensor turned about {name} (deg)"), unit));
         }
         names.extend(self.common.named());
+        if let (Some(_), Some(glass)) = (self.glass_column(), self.glass) {
+            names.push(("thickness of the glass (mm)".to_owned(), glass.thickness_sd_mm));
+        }
         debug_assert_eq!(names.len(), w.len());
         // A parameter believed to be known exactly is not estimated.
         let estimated: Vec<usize> = (0..w.len()).filter(|i| names[*i].1 > 1e-6).collect();
@@ -251,15 +256,8 @@ fn verdict(a: &Assessment) -> String {
             a.planeness.figure_deg, a.planeness.departure_deg
         );
     }
-    for component in &a.variance_components {
-        if let (Some(found), Some(sd)) = (component.found_mm, component.found_sd_mm)
-            && (found - component.believed_mm).abs() > 4.0 * sd
-        {
-            words += &format!(
-                "; {} is {found:.2} mm; the session states {:.2} mm",
-                component.name, component.believed_mm
-            );
-        }
+    for doubt in &a.doubts {
+        words += &format!("; {}", doubt.message);
     }
     words
 }

@@ -26,6 +26,8 @@ pub(super) struct Board {
     pub(super) number: usize,
     /// Tracked pose of the board in the rig.
     pub(super) rig_from_board: Pose,
+    /// The same of its face, in front by the board's thickness.
+    pub(super) rig_from_face: Pose,
     pub(super) color: String,
     /// Markers in the board frame.
     pub(super) markers: Vec<Point3<f64>>,

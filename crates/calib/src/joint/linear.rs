@@ -6,7 +6,8 @@ use super::placed::{Boards, Placed};
 use super::problem::Joint;
 use crate::lsq::{GroupJacobian, Point};
 use crate::readings::jacobian;
-use catoptric_model::frame;
+use catoptric_model::session::{GlassEffect, GlassSheet};
+use catoptric_model::{BoardPlane, frame};
 use nalgebra::{DVector, Dyn, Matrix2, OMatrix, Point3, U2, Unit, Vector2, Vector3};
 
 /// Maximum number of iterations for a beam's own deviation, and the change that ends them, in radians.
@@ -27,12 +28,16 @@ pub(super) struct Linear {
     pub(super) v: Unit<Vector3<f64>>,
     /// The facet's deflection of the beam.
     pub(super) fan: Fan,
+    /// How far glass sets the mirror back along the beam, in meters.
+    setback: f64,
     sightlines: Vec<Sightline>,
 }
 
 /// One board where the beam meets it.
 #[derive(Clone, Copy, Default)]
 struct Sightline {
+    /// Range without biases.
+    range: f64,
     /// Distance from the mirror to the board, and the signed cosine of incidence.
     s: f64,
     closing: f64,
@@ -52,6 +57,22 @@ pub(super) struct Weight<'l> {
 }
 
 impl Linear {
+    /// Range to each board without biases, and the signed cosine of incidence there.
+    pub(super) fn met(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        self.sightlines.iter().map(|line| (line.range, line.closing))
+    }
+
+    /// Change of the range to a plane per thickness of a glass.
+    pub(super) fn through_glass(
+        &self,
+        u: &Unit<Vector3<f64>>,
+        plane: &BoardPlane,
+        glass: &GlassSheet,
+    ) -> f64 {
+        let effect = glass.effect(u, &self.v);
+        effect.delay + effect.setback * (1.0 - plane.normal.dot(u) / plane.normal.dot(&self.v))
+    }
+
     /// Prediction errors that remain after the deviation, divided by the standard deviations.
     pub(super) fn rest(&self) -> DVector<f64> {
         &self.y - &self.h * self.delta
@@ -90,6 +111,22 @@ impl Weight<'_> {
 }
 
 impl Joint<'_> {
+    /// What glass, as thick as w says, does to the range of an element.
+    fn glass_effect(&self, element: &JointElement, fan: &Fan, w: &DVector<f64>) -> GlassEffect {
+        let (Some(glass), Some(_)) = (self.glass, element.facet) else {
+            return GlassEffect::default();
+        };
+        let more = self
+            .glass_column()
+            .map_or(0.0, |column| w[column] * glass.thickness_sd_mm);
+        let thickness_mm = glass.thickness_mm + more;
+        GlassSheet {
+            thickness_mm,
+            ..*glass
+        }
+        .stated(&element.u, &fan.v)
+    }
+
     /// An element linearized at a point; `None` if it meets none of its boards.
     pub(super) fn element(
         &self,
@@ -109,7 +146,9 @@ impl Joint<'_> {
                 orders: [0.0; FIGURE_ORDERS],
             },
         };
-        let origin = Point3::from(element.u.into_inner() * fan.distance);
+        let glass = self.glass_effect(element, &fan, shared.numbers(0)?);
+        let start = fan.distance + glass.setback;
+        let origin = Point3::from(element.u.into_inner() * start);
         let (across, up) = frame::tangent_basis(&fan.v);
         let base = [across.into_inner(), up.into_inner()];
         let rows = element.sights.len();
@@ -130,7 +169,8 @@ impl Joint<'_> {
                 } = &boards.placed[sight.board];
                 line.s = plane.distance_along(&origin, &v)?;
                 line.closing = plane.normal.dot(&v);
-                let range = fan.distance + line.s;
+                let range = start + line.s + glass.delay;
+                line.range = range;
                 let cos = line.closing.abs().min(1.0);
                 if round == 0 {
                     let (by_range, by_cos) = paint.slopes(range, cos);
@@ -166,6 +206,7 @@ impl Joint<'_> {
             axes,
             v,
             fan,
+            setback: glass.setback,
             sightlines,
         })
     }
@@ -182,7 +223,7 @@ impl Joint<'_> {
         first_row: usize,
     ) {
         let Linear { fan, v, .. } = linear;
-        let origin = Point3::from(element.u.into_inner() * fan.distance);
+        let origin = Point3::from(element.u.into_inner() * (fan.distance + linear.setback));
         for (i, (sight, line)) in element.sights.iter().zip(&linear.sightlines).enumerate() {
             let row = first_row + i;
             let board = &boards.placed[sight.board];
@@ -199,6 +240,10 @@ impl Joint<'_> {
             }
             for (column, value) in &line.common {
                 into.shared[(row, self.first_common + column)] += value * weight;
+            }
+            if let (Some(column), Some(glass), Some(_)) = (self.glass_column(), self.glass, element.facet) {
+                let path = linear.through_glass(&element.u, &board.plane, glass);
+                into.shared[(row, column)] = line.by_range * path * glass.thickness_sd_mm * 1e-3 * weight;
             }
             if let Some(facet) = element.facet {
                 let first = facet * FACET_PARAMETERS;

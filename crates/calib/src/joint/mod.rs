@@ -1,13 +1,14 @@
 //! All elements at once: facets are planes that their beams share, and what all readings share is estimated once.
 //!
-//! Methods `facet` (each connected set of facets separately, rigid planes, the mounting as already found) and `joint`
-//! (all of them with the boards in front of undeflected beams, and beams that may deviate from their planes by an
-//! estimated τ). Both keep the boards and the verdict on an element's readings that its individual calibration arrived
+//! Methods `facet` (each connected set of facets separately, the mounting as already found) and `joint` (all of them with
+//! the boards in front of undeflected beams). In both, beams may deviate from their planes by as much as all facets
+//! together show. Both keep the boards and the verdict on an element's readings that its individual calibration arrived
 //! at.
 
 mod answer;
 mod assemble;
 mod assess;
+mod doubt;
 mod estimate;
 mod fan;
 mod fit;
@@ -22,11 +23,12 @@ mod reach;
 mod rows;
 
 use crate::element::attempt::Workspace;
-use crate::lsq::{self, ProblemError, State};
+use crate::lsq::{self, ProblemError, Solution, State};
 use crate::mount::pose::Mount;
 use assemble::{Assigned, begin, components, direct_group, group, mounting_as_drawn, mounting_as_found};
 use catoptric_model::calibration::{FacetEstimate, MountEstimate};
 use catoptric_model::{Assessment, BeamEstimate, Calibration, MirrorPlane, RangeBias};
+use fan::Flatness;
 use fit::JointFit;
 use group::Group;
 use nalgebra::DVector;
@@ -42,9 +44,9 @@ const ROUNDS: usize = 3;
 /// What is solved at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Extent {
-    /// Each set of facets that share boards, with rigid planes and the mounting from step 5.
+    /// Each set of facets that share boards, with the mounting from step 5.
     EachFacet,
-    /// All facets and the boards in front of undeflected beams; beams may deviate from their facet's plane.
+    /// All facets and the boards in front of undeflected beams.
     Everything,
 }
 
@@ -57,6 +59,8 @@ struct Outcome {
     mount: Option<MountEstimate>,
     bias: Option<RangeBias>,
     assessment: Option<Assessment>,
+    /// What the reader must know.
+    warnings: Vec<String>,
 }
 
 /// Calibrates the assigned elements together and replaces their individual results.
@@ -78,6 +82,7 @@ pub(crate) fn together(
             calibration.rig_from_sensor = outcome.mount.or(calibration.rig_from_sensor);
             calibration.bias = outcome.bias;
             calibration.assessment = outcome.assessment;
+            calibration.warnings.extend(outcome.warnings);
         }
         Err(problem) => calibration.warnings.push(format!(
             "the elements could not be solved together ({problem}); each was solved individually"
@@ -101,11 +106,17 @@ fn within_pool(
     match extent {
         Extent::EachFacet => {
             let mut outcome = Outcome::default();
+            // One facet alone shows too little of how flat such mirrors are.
+            let groups: Vec<Group> = groups.collect();
+            let (mounting, mean) = mounting_as_found(work, mount);
+            let (mut all, start) = begin(work, groups.clone(), mounting, &mean, planes);
+            all.fit(start)?;
             for group in groups {
                 let (mounting, mean) = mounting_as_found(work, mount);
-                let part = solve(work, vec![group], mounting, &mean, planes, false)?;
+                let part = solve(work, vec![group], mounting, &mean, planes, Some(all.flatness))?;
                 outcome.beams.extend(part.beams);
                 outcome.facets.extend(part.facets);
+                outcome.warnings.extend(part.warnings);
             }
             Ok(outcome)
         }
@@ -116,21 +127,24 @@ fn within_pool(
                 .filter_map(|board| direct_group(work, board));
             let groups = groups.chain(direct).collect();
             let (mounting, mean) = mounting_as_drawn(work, mount);
-            solve(work, groups, mounting, &mean, planes, true)
+            solve(work, groups, mounting, &mean, planes, None)
         }
     }
 }
 
+/// Solves groups together. Without a given flatness it is estimated, and so are mounting and biases.
 fn solve(
     work: &Workspace,
     groups: Vec<Group>,
     mounting: Mounting,
     mean: &DVector<f64>,
     planes: &[MirrorPlane],
-    deviating: bool,
+    flatness: Option<Flatness>,
 ) -> Result<Outcome, ProblemError> {
     let session = &work.dataset.session;
     let (mut joint, start) = begin(work, groups, mounting, mean, planes);
+    joint.flatness = flatness.unwrap_or_default();
+    let deviating = flatness.is_none();
     let exact = lsq::SolverOptions::default();
     let rigid = |joint: &Joint, from: State| {
         joint.solve(from, &exact).map(|solution| JointFit {
@@ -164,12 +178,15 @@ fn solve(
     let answers = joint.answers(&fit.solution);
     let solution = &fit.solution;
     let bent = joint.bent(solution);
-    let mut assessment = deviating.then(|| joint.assess(session, &fit, &answers));
+    let mut assessment = deviating.then(|| joint.assess(work.dataset, &fit, &answers));
     if let Some(assessment) = &mut assessment
         && work.options.cross_validation
     {
         assessment.held_out = joint.cross_validated(&solution.state)?;
     }
+    let doubts = assessment.iter().flat_map(|a| &a.doubts);
+    let doubts = doubts.map(|doubt| format!("the readings contradict the session: {}", doubt.message));
+    let warnings = unconverged(solution).into_iter().chain(doubts).collect();
     let names = |facet: usize| session.facets[facet].name.clone();
     Ok(Outcome {
         beams: answers
@@ -187,5 +204,17 @@ fn solve(
             None
         },
         assessment,
+        warnings,
+    })
+}
+
+/// A warning about a solution that is no minimum.
+fn unconverged(solution: &Solution) -> Option<String> {
+    (!solution.stop.converged()).then(|| {
+        format!(
+            "the elements solved together have not converged after {} iterations: their directions and covariances may be \
+             wrong",
+            solution.iterations
+        )
     })
 }

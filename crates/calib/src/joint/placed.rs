@@ -73,7 +73,7 @@ impl Joint<'_> {
 
     fn placed(&self, board: &Board, rig_from_sensor: &Pose, b: &[f64]) -> Option<Placed<'_>> {
         let sensor_from_board = rig_from_sensor.inverse() * board.rig_from_board;
-        let tracked = BoardPlane::of_pose(&sensor_from_board);
+        let tracked = BoardPlane::of_pose(&(rig_from_sensor.inverse() * board.rig_from_face));
         let markers: Vec<Point3<f64>> = board.markers.iter().map(|m| sensor_from_board * m).collect();
         let fit = PlaneFit::new(&markers, &tracked.normal);
         let errors = fit.errors() * self.marker_sd;

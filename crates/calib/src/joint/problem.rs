@@ -4,7 +4,8 @@
 //! z = d + s + E(r, θ_N, color) + c·w + σ_d·b₀ + noise            u → v₀ = u − 2(m·u)m,  d = h/(m·u),  v = v₀ ⊞ δ
 //! ```
 //!
-//! All groups share `w`, standard normal by its prior, which moves the mounting and the biases. A group owns the planes
+//! All groups share `w`, standard normal by its prior, which moves the mounting and the biases, and the thickness of glass
+//! that is not known exactly. A group owns the planes
 //! (m, h) of its facets and, for each of its boards, b: drift, and the offset and two tilts of the plane. Each beam
 //! deviates by δ ~ N(0, τ²) from its facet's plane; δ is eliminated beam by beam, which leaves (I + τ²HHᵀ)^(−½) as the
 //! weight of its rows.
@@ -13,6 +14,7 @@ use super::fan::{Flatness, Shape};
 use super::group::{BOARD_ERRORS, FACET_BLOCKS, FIGURE, Group, JointElement};
 use crate::judge::common::CommonErrors;
 use crate::lsq::{ParameterBlock, Point};
+use catoptric_model::session::GlassSheet;
 use catoptric_model::{MirrorPlane, Pose, RangeBias, Stop};
 use nalgebra::{DVector, Dyn, OMatrix, U6};
 
@@ -34,6 +36,8 @@ pub(super) struct Joint<'a> {
     pub(super) first_common: usize,
     pub(super) drift_sd: f64,
     pub(super) marker_sd: f64,
+    /// Glass in front of the mirrors.
+    pub(super) glass: Option<&'a GlassSheet>,
     /// How far facets are from flat.
     pub(super) flatness: Flatness,
     /// Prior mean of w.
@@ -44,7 +48,13 @@ pub(super) struct Joint<'a> {
 impl Joint<'_> {
     /// Number of shared parameters.
     pub(super) fn shared_dimension(&self) -> usize {
-        self.first_common + self.common.len()
+        self.first_common + self.common.len() + usize::from(self.glass_column().is_some())
+    }
+
+    /// Index of the glass's thickness among the shared parameters, if it is uncertain.
+    pub(super) fn glass_column(&self) -> Option<usize> {
+        let glass = self.glass.filter(|glass| glass.thickness_sd_mm > 0.0);
+        glass.map(|_| self.first_common + self.common.len())
     }
 
     /// A facet of a group.

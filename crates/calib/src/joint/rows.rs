@@ -79,7 +79,7 @@ impl Joint<'_> {
 
     /// Predicted minus measured distance of a facet, in standard deviations, and its derivatives with respect to the
     /// plane.
-    fn bare(&self, facet: &BareFacet, shape: &Shape, w: &DVector<f64>) -> Option<(f64, [f64; 3])> {
+    pub(super) fn bare(&self, facet: &BareFacet, shape: &Shape, w: &DVector<f64>) -> Option<(f64, [f64; 3])> {
         let (mut sum, mut derivative) = (0.0, [0.0; 3]);
         let (a, b) = frame::tangent_basis(&shape.normal);
         for (u, measured) in &facet.distances {

@@ -74,7 +74,8 @@ impl<'a> CommonErrors<'a> {
         row
     }
 
-    /// Standard deviation of a bare distance from all other errors, which the facets do not share, in meters.
+    /// Standard deviation of a bare distance from all other errors that the beams of a facet share, and the facets do
+    /// not, in meters.
     pub(crate) fn bare_sd(&self, distance: f64, cos_incidence: f64) -> f64 {
         let whole = self.session.bare_structure.distance_sd_mm * 1e-3;
         let shared = self.bare_row(distance, cos_incidence).norm_squared();

@@ -17,6 +17,18 @@ const STEP_THRESHOLD: f64 = 1e-14;
 /// Minimum fraction of the predicted reduction that a step must achieve.
 const MIN_GAIN: f64 = 1e-4;
 
+/// Cosine of f with a column of J up to which a point counts as stationary. Converged iterations end below 10⁻⁷, stalled
+/// ones above 10⁻³.
+const NO_SLOPE: f64 = 1e-5;
+
+/// Slope of ‖f‖², relative to it, per relative change of a parameter that runs to infinity, and how many times its first
+/// size such a parameter has reached: ‖f‖² is then as low as it gets.
+const NO_SLOPE_AFAR: f64 = 1e-7;
+const AFAR: f64 = 1e3;
+
+/// ‖f‖ relative to the scaled parameters, in roundings, below which f is rounding and its direction means nothing.
+const ROUNDINGS: f64 = 100.0;
+
 /// When to stop, and what counts as dependent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolverOptions {
@@ -58,14 +70,16 @@ pub enum Termination {
     Step,
     /// Rounding hides any further reduction, although a tolerance asks for it.
     Rounding,
+    /// Steps have become short, or bring nothing, where ‖f‖² still has a slope: not a minimum.
+    Stalled,
     /// `max_evaluations` reached: not a minimum.
     Limit,
 }
 
 impl Termination {
-    /// Whether the iteration converged.
+    /// Whether the iteration converged: to a point where ‖f‖² has no slope.
     pub fn converged(self) -> bool {
-        self != Self::Limit
+        !matches!(self, Self::Stalled | Self::Limit)
     }
 }
 
@@ -115,10 +129,18 @@ pub fn minimize<P: GroupedResiduals>(
     let start = start.into();
     assert!(start.own.len() <= problem.groups(), "own parameters need a group");
     let mut search = Search::begin(problem, start)?;
+    let sizes = search.state.extent();
     let stop = search.run(options)?;
     let rows = rows(problem, &search.state, &search.residuals)?;
     let slope = Slope::of(&rows, search.state.shared.dimension(), search.norm);
     let linear = Elimination::new(rows, search.state.shared.dimension(), options.rank_threshold);
+    let stationary = slope.is_none(linear.scale(), [&sizes, &search.state.extent()], search.norm);
+    let stop = match stop {
+        Termination::Reduction | Termination::Step | Termination::Rounding if !stationary => {
+            Termination::Stalled
+        }
+        stop => stop,
+    };
     Ok(Solution {
         gradient_cosine: slope.cosine(linear.scale(), search.norm),
         sum_of_squares: search.norm * search.norm,
@@ -273,6 +295,19 @@ impl Slope {
         }
         own.splice(0..0, shared.iter().copied());
         Self(DVector::from_vec(own))
+    }
+
+    /// Whether a point is stationary, given the lengths of the columns of J and the size of each parameter at the start
+    /// and there.
+    fn is_none(&self, lengths: &DVector<f64>, [first, sizes]: [&DVector<f64>; 2], norm: f64) -> bool {
+        if norm <= ROUNDINGS * f64::EPSILON * lengths.component_mul(sizes).norm() {
+            return true;
+        }
+        (0..self.0.len()).all(|i| {
+            let slope = self.0[i].abs();
+            let afar = first[i] > 0.0 && sizes[i] > AFAR * first[i];
+            slope <= NO_SLOPE * lengths[i] * norm || (afar && slope * sizes[i] <= NO_SLOPE_AFAR * norm * norm)
+        })
     }
 
     fn cosine(&self, lengths: &DVector<f64>, norm: f64) -> f64 {

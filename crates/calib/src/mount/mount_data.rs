@@ -236,6 +236,7 @@ impl<'a> Selector<'a> {
             .bias
             .correct(RawRange(summary.mean), hit.distance, cos_incidence, &board.color);
         let tan = (1.0 / (cos_incidence * cos_incidence) - 1.0).max(0.0).sqrt();
+        let noise = believed.noise_sd(summary.mean, &board.color);
         let variance = (spread::noise_sd(summary, noise).powi(2) / summary.count as f64
             + (1e-3 * believed.element_sd_mm).powi(2))
         .max(MIN_NOISE * MIN_NOISE);

@@ -7,7 +7,7 @@
 use super::answer::{Open, Standing};
 use super::candidates::{PoseCandidate, Site, candidates};
 use super::request::{Criterion, Request};
-use super::situation::{Fan, PlannedElement, Situation};
+use super::situation::{Fan, PlannedElement, Situation, noise_on};
 use super::words;
 use crate::element::attempt::MIN_BOARDS;
 use crate::error::CalibError;
@@ -16,7 +16,7 @@ use crate::judge::covariance::{self, MountUncertainty, Sighting};
 use crate::judge::levers::libm_cos;
 use crate::judge::observability::{self, WEAKEST_SD};
 use crate::readings::observations::BoardView;
-use catoptric_model::{Session, Stop, Stopped};
+use catoptric_model::{Stop, Stopped};
 use nalgebra::{DMatrix, DVector, Matrix6};
 
 /// Prior of each angle, in radians (30°): 10⁻⁶ of the information about a determined element.
@@ -388,7 +388,7 @@ impl<'a> Designer<'a> {
     }
 
     fn view<'c>(&self, candidate: &'c PoseCandidate) -> BoardView<'c> {
-        let noise = noise(self.situation.session());
+        let noise = noise_on(self.situation.session(), &candidate.in_sensor);
         candidate.in_sensor.view(noise, self.request.readings)
     }
 
@@ -401,10 +401,6 @@ impl<'a> Designer<'a> {
             .map(|(number, noise, count)| boards[*number].view(*noise, *count))
             .collect()
     }
-}
-
-fn noise(session: &Session) -> f64 {
-    session.believed.range_noise_sd_mm * 1e-3
 }
 
 fn add(known: &mut [Known], rows: &[Row]) {

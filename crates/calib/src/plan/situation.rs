@@ -90,7 +90,6 @@ impl Situation {
                 of_facet.push((facet.as_str(), place.readings));
             }
         }
-        let noise = session.believed.range_noise_sd_mm * 1e-3;
         let cone = cone_half_angle(session);
         let mut fans = Vec::new();
         for (facet, plane) in session.facets.iter().zip(&planes) {
@@ -100,6 +99,7 @@ impl Situation {
                 for (number, board) in boards.iter().enumerate() {
                     let (name, readings) = of_facet[number];
                     if name == facet.name && element.is_held(board, cone, DRAWN_MARGIN) {
+                        let noise = noise_on(session, board);
                         element.read.push((number, noise, readings));
                     }
                 }
@@ -136,7 +136,6 @@ impl Situation {
                 boards.push(board.clone());
             }
         }
-        let noise = session.believed.range_noise_sd_mm * 1e-3;
         let mut fans = Vec::new();
         for (facet, drawn) in session.facets.iter().zip(&prepared.drawn) {
             let built = plane_as_built(session, facet, &calibration.beams);
@@ -169,7 +168,8 @@ impl Situation {
                 for pose in hit.unwrap_or_default() {
                     if let Some(number) = number_of[pose] {
                         let summary = &work.summaries[pose][element.beam];
-                        let sd = spread::noise_sd(summary, noise);
+                        let color = &boards[number].color;
+                        let sd = spread::noise_sd(summary, session.believed.noise_sd(summary.mean, color));
                         element.read.push((number, sd, summary.count));
                     }
                 }
@@ -350,6 +350,13 @@ fn expected_mount(session: &Session, room_from_rig: &Pose, placed: &[Placed]) ->
     pose::estimate(&dataset, &summaries).uncertainty
 }
 
+/// Believed noise of one reading of a board, at the distance of its middle, in meters.
+pub(super) fn noise_on(session: &Session, board: &BoardInSensor) -> f64 {
+    session
+        .believed
+        .noise_sd(board.plane.point.coords.norm(), &board.color)
+}
+
 /// The noise-free readings of a board by every undeflected beam.
 fn predicted(session: &Session, board: &BoardInSensor, readings: usize) -> Vec<Summary> {
     let believed = &session.believed;
@@ -365,7 +372,7 @@ fn predicted(session: &Session, board: &BoardInSensor, readings: usize) -> Vec<S
                         outliers: 0,
                         missing: 0,
                         mean: hit.distance + bias.total(),
-                        sd: believed.range_noise_sd_mm * 1e-3,
+                        sd: believed.noise_sd(hit.distance, &board.color),
                     }
                 }
                 None => Summary {

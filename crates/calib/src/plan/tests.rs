@@ -44,6 +44,8 @@ fn session() -> Session {
         }),
         believed: Beliefs {
             range_noise_sd_mm: 4.0,
+            noise: None,
+            noise_of: Default::default(),
             drift_sd_mm: 0.9,
             element_sd_mm: 0.2,
             marker_sd_mm: 0.2,
@@ -52,9 +54,11 @@ fn session() -> Session {
             angle_gain_sd_mm: 3.0,
             color_bias_sd_mm: 0.0,
         },
+        glass: None,
         bare_structure: BareStructure {
             mirror_thickness_mm: 0.0,
             distance_sd_mm: 0.5,
+            noise_sd_mm: 0.0,
             scanned: false,
             first_beam: 0,
             distance_m: Vec::new(),
@@ -74,6 +78,7 @@ fn session() -> Session {
             name: "board".to_owned(),
             width_mm: 900.0,
             height_mm: 700.0,
+            thickness_mm: 0.0,
             color: "white".to_owned(),
             markers: vec![
                 marker(400.0, 300.0),

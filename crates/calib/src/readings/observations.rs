@@ -11,7 +11,7 @@ pub const SPOT_RADII: f64 = 1.5;
 /// The board of one pose, in the sensor frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoardInSensor {
-    /// The board's tracked pose.
+    /// Pose of its face: the tracked one, in front by the board's thickness.
     pub sensor_from_board: Pose,
     /// The plane of its face.
     pub plane: BoardPlane,
@@ -66,16 +66,13 @@ impl BoardInSensor {
     pub fn of(record: &PoseRecord, session: &Session, rig_from_sensor: &Pose) -> Option<Self> {
         let sheet = session.board(record.label.board.as_deref()?)?;
         let room_from_board = record.room_from_board?;
-        let sensor_from_board = (record.room_from_rig * rig_from_sensor).inverse() * room_from_board;
+        let tracked = (record.room_from_rig * rig_from_sensor).inverse() * room_from_board;
+        let sensor_from_board = sheet.face(&tracked);
         Some(Self {
             sensor_from_board,
             plane: BoardPlane::of_pose(&sensor_from_board),
             outline: sheet.outline(),
-            markers: sheet
-                .markers
-                .iter()
-                .map(|m| sensor_from_board * m.position())
-                .collect(),
+            markers: sheet.markers.iter().map(|m| tracked * m.position()).collect(),
             color: record.label.color.clone().unwrap_or_else(|| sheet.color.clone()),
         })
     }

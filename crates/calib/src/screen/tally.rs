@@ -114,7 +114,7 @@ impl Screen<'_> {
         let bias = beliefs.bias.terms(ahead.distance, cos_incidence, color).total();
         let hit = Point3::origin() + u.into_inner() * ahead.distance;
         let row = jacobian::of_mount(&hit, &ahead.plane.normal, &u);
-        let noise = spread::noise_sd(summary, beliefs.range_noise_sd_mm * 1e-3);
+        let noise = spread::noise_sd(summary, beliefs.noise_sd(summary.mean, color));
         let variance = (row * self.mount * row.transpose())[0]
             + self
                 .common

@@ -335,6 +335,8 @@ impl World {
             }),
             believed: Beliefs {
                 range_noise_sd_mm: self.noise_mm,
+                noise: None,
+                noise_of: Default::default(),
                 drift_sd_mm: self.drift_mm,
                 element_sd_mm: 0.0,
                 marker_sd_mm: self.marker_mm,
@@ -343,9 +345,11 @@ impl World {
                 angle_gain_sd_mm: self.angle_gain_sd_mm,
                 color_bias_sd_mm: self.color_bias_sd_mm,
             },
+            glass: None,
             bare_structure: BareStructure {
                 mirror_thickness_mm: self.thickness_mm,
                 distance_sd_mm: self.distance_sd_mm,
+                noise_sd_mm: 0.0,
                 scanned: false,
                 first_beam: 0,
                 distance_m: bare,
@@ -356,6 +360,7 @@ impl World {
                 name: "board".to_owned(),
                 width_mm: self.board_mm,
                 height_mm: self.board_mm,
+                thickness_mm: 0.0,
                 color: "white".to_owned(),
                 markers: vec![
                     marker("1", -0.45, -0.45),

@@ -4,16 +4,16 @@ use super::duals::{ByDuals, Formula};
 use catoptric_calib::lsq::{Point, Solution, SolverOptions, Termination, minimize};
 use num_dual::DualNumCopy;
 
-struct Rosenbrock;
-struct PowellSingular;
-struct HelicalValley;
-struct KowalikOsborne;
-struct Meyer;
-struct FreudensteinRoth;
-struct Bard;
-struct BrownDennis;
-struct Jennrich;
-struct BrownBadlyScaled;
+pub(super) struct Rosenbrock;
+pub(super) struct PowellSingular;
+pub(super) struct HelicalValley;
+pub(super) struct KowalikOsborne;
+pub(super) struct Meyer;
+pub(super) struct FreudensteinRoth;
+pub(super) struct Bard;
+pub(super) struct BrownDennis;
+pub(super) struct Jennrich;
+pub(super) struct BrownBadlyScaled;
 
 impl Formula for Rosenbrock {
     fn residuals<D: DualNumCopy<Primitive = f64>>(&self, x: &[D]) -> Vec<D> {
@@ -125,7 +125,7 @@ impl Formula for BrownBadlyScaled {
     }
 }
 
-fn solve<F: Formula>(formula: F, start: &[f64]) -> Solution {
+pub(super) fn solve<F: Formula>(formula: F, start: &[f64]) -> Solution {
     minimize(&ByDuals(formula), Point::vector(start), &SolverOptions::default())
         .expect("the residuals are defined")
 }
@@ -141,7 +141,7 @@ fn close(found: &[f64], expected: &[f64], tolerance: f64) -> bool {
         .all(|(f, e)| (f - e).abs() <= tolerance)
 }
 
-fn far(start: &[f64]) -> impl Iterator<Item = Vec<f64>> {
+pub(super) fn far(start: &[f64]) -> impl Iterator<Item = Vec<f64>> {
     [1.0, 10.0, 100.0]
         .into_iter()
         .map(|factor| start.iter().map(|x| x * factor).collect())

@@ -10,3 +10,4 @@ mod manifolds;
 mod nist;
 mod priors;
 mod sample;
+mod stationary;

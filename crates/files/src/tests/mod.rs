@@ -38,6 +38,7 @@ fn session(beams: usize) -> Session {
         name: name.to_owned(),
         width_mm: 600.0,
         height_mm: 400.0,
+        thickness_mm: 0.0,
         color: color.to_owned(),
         markers: corners
             .map(|(n, x, y)| marker(n, [x * 280.0, y * 180.0, 0.0]))
@@ -69,6 +70,8 @@ fn session(beams: usize) -> Session {
         }),
         believed: Beliefs {
             range_noise_sd_mm: 10.0,
+            noise: None,
+            noise_of: Default::default(),
             drift_sd_mm: 1.0,
             element_sd_mm: 0.0,
             marker_sd_mm: 0.2,
@@ -77,9 +80,11 @@ fn session(beams: usize) -> Session {
             angle_gain_sd_mm: 0.5,
             color_bias_sd_mm: 0.5,
         },
+        glass: None,
         bare_structure: BareStructure {
             mirror_thickness_mm: 3.0,
             distance_sd_mm: 1.0,
+            noise_sd_mm: 0.0,
             scanned: false,
             first_beam: first,
             distance_m: [0.1, 0.0, 0.12].into_iter().take(beams - first).collect(),

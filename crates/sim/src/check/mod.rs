@@ -10,6 +10,7 @@ mod flight;
 mod mishap;
 mod outline;
 mod overlap;
+mod session;
 mod stage;
 mod structure;
 mod values;
@@ -43,6 +44,7 @@ pub fn problems(scene: &Scene) -> Vec<Problem> {
             return found.0;
         }
     };
+    session::check(scene, &scan, &mut found);
     // Where there is no laboratory, structure and procedure have nothing to be checked against.
     if !scene.has_no_laboratory() {
         structure::check(scene, &scan, &mut found);

@@ -262,7 +262,7 @@ fn detection(scene: &Scene, found: &mut Findings) {
     }
 }
 
-fn columns(range_m: &[f64], values: &[f64], path: &KeyPath, column: &str, found: &mut Findings) {
+pub(super) fn columns(range_m: &[f64], values: &[f64], path: &KeyPath, column: &str, found: &mut Findings) {
     increasing(("range_m", " m", range_m), values, path, column, found);
     let path = path.key("range_m");
     if let Some(first) = range_m.first().filter(|r| **r < 0.0) {
@@ -276,7 +276,7 @@ fn columns(range_m: &[f64], values: &[f64], path: &KeyPath, column: &str, found:
 
 /// Checks a column of nodes (its name, unit and values) and a column of values: equally long, the nodes strictly
 /// increasing.
-fn increasing(
+pub(super) fn increasing(
     (name, unit, nodes): (&str, &str, &[f64]),
     values: &[f64],
     path: &KeyPath,

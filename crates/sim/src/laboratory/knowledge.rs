@@ -2,15 +2,17 @@
 
 use super::setup::Laboratory;
 use crate::build::board::board_markers;
+use crate::build::color;
 use crate::build::structure::{self, Structure};
 use crate::error::SimError;
 use crate::laboratory::placement;
 use crate::light::optics::{Mirrors, Setting};
 use crate::noise::{Draws, Purpose};
-use crate::scene::{ErrorModel, Marker};
+use crate::scene::{ErrorModel, Marker, NoiseTable};
 use catoptric_model::session::{self, Session};
 use catoptric_model::{PoseData, PoseKind, PoseRecord, Summary, beam};
 use nalgebra::{Unit, Vector3};
+use std::collections::BTreeMap;
 
 /// Bare readings beyond this do not come from the structure, in meters.
 const FARTHEST_STRUCTURE: f64 = 0.3;
@@ -31,7 +33,7 @@ impl Laboratory {
         let sd = |limit: f64| limit / 3.0_f64.sqrt();
         let tilt = sd(mount.tilt_tolerance_deg);
         let [x, y, z] = scene.room.size_m;
-        Ok(Session {
+        let mut session = Session {
             schema_version: session::SCHEMA_VERSION,
             name: scene.name.clone(),
             scanner: session::ScannerSheet {
@@ -53,6 +55,15 @@ impl Laboratory {
             }),
             believed: self.beliefs(),
             bare_structure: self.bare_structure()?,
+            glass: scene
+                .superstructure
+                .mirror
+                .glass
+                .map(|glass| session::GlassSheet {
+                    thickness_mm: glass.thickness_mm,
+                    thickness_sd_mm: 0.0,
+                    index: glass.index,
+                }),
             rig_markers: known_markers(&scene.superstructure.marker),
             facets: self.nominal_facets()?,
             boards: scene
@@ -62,11 +73,14 @@ impl Laboratory {
                     name: b.name.clone(),
                     width_mm: b.width_mm,
                     height_mm: b.height_mm,
+                    thickness_mm: b.thickness_mm,
                     color: b.color.clone(),
                     markers: known_markers(&board_markers(b)),
                 })
                 .collect(),
-        })
+        };
+        scene.session.lie_over(&mut session)?;
+        Ok(session)
     }
 
     fn beliefs(&self) -> session::Beliefs {
@@ -79,6 +93,12 @@ impl Laboratory {
         let noise = &errors.noise.sd_mm;
         session::Beliefs {
             range_noise_sd_mm: unless_perfect(noise.iter().sum::<f64>() / noise.len().max(1) as f64),
+            noise: (!perfect).then(|| self.stated(&errors.noise)),
+            noise_of: if perfect {
+                BTreeMap::new()
+            } else {
+                self.noise_of_colors()
+            },
             drift_sd_mm: unless_perfect(errors.drift_sd_mm),
             element_sd_mm: unless_perfect(errors.element_sd_mm),
             marker_sd_mm: self.scene.mocap.errors().constant.norm() / 3.0_f64.sqrt() * 1e3,
@@ -87,6 +107,28 @@ impl Laboratory {
             angle_gain_sd_mm: if_biased(known.angle_gain_sd_mm),
             color_bias_sd_mm: if_biased(known.color_sd_mm),
         }
+    }
+
+    /// A table of noise as the readings show it, with their rounding.
+    fn stated(&self, table: &NoiseTable) -> session::Noise {
+        // The standard deviation of a rounded value is its step over √12.
+        let rounding = self.scene.errors.quantization_mm / 12.0_f64.sqrt();
+        let sd = table.sd_mm.iter().map(|sd| libm::hypot(*sd, rounding));
+        session::Noise {
+            range_m: table.range_m.clone(),
+            sd_mm: sd.collect(),
+        }
+    }
+
+    /// Noise on the boards and the walls whose color has a table of its own.
+    fn noise_of_colors(&self) -> BTreeMap<String, session::Noise> {
+        let boards = self.scene.board.iter().map(|b| &b.color);
+        let names = boards.chain([&self.scene.room.color]);
+        let own = names.filter_map(|name| {
+            let noise = color::paint(&self.scene, name).ok()?.noise;
+            (noise != self.scene.errors.noise).then(|| (name.clone(), self.stated(&noise)))
+        });
+        own.collect()
     }
 
     fn nominal_facets(&self) -> Result<Vec<session::NominalFacet>, SimError> {
@@ -148,41 +190,48 @@ impl Laboratory {
                 continue;
             }
             let cos = normal.dot(&beam::direction(scan.azimuth(beam))).abs();
-            distance_m[beam] = summary.mean - self.believed.terms(summary.mean, cos, "structure").total();
+            let bias = self.believed.terms(summary.mean, cos, "structure").total();
+            distance_m[beam] = summary.mean - bias + self.scene.experiment.bare_distance_error_mm * 1e-3;
             variance = variance.max(self.bare_variance(summary.count, cos));
         }
         Ok(session::BareStructure {
             mirror_thickness_mm: thickness,
             distance_sd_mm: variance.sqrt() * 1e3,
+            noise_sd_mm: 0.0,
             scanned: true,
             first_beam: 0,
             distance_m,
         })
     }
 
-    /// Step 3 with another instrument: the distances of all beams of a facet share one error.
+    /// Step 3 with another instrument: the distances of all beams of a facet share one error, and each has its own.
     fn measured_bare(&self, sd_mm: f64) -> Result<session::BareStructure, SimError> {
         let served = self.nominal_facets()?;
         let scan = self.sensor.scan();
+        let experiment = &self.scene.experiment;
+        let noise_sd_mm = experiment.bare_noise_sd_mm.unwrap_or(sd_mm);
         let mut distance_m = vec![0.0; scan.beams()];
         for (index, built) in self.structure.facets.iter().enumerate() {
             let Some(sheet) = served.iter().find(|f| f.name == built.name) else {
                 continue;
             };
             let mut draws = Draws::new(self.seed, Purpose::BareDistance, index as u64);
-            let error = sd_mm * 1e-3 * draws.normal();
+            let of_all = 1e-3 * (sd_mm * draws.normal() + experiment.bare_distance_error_mm);
             let normal = built.face.normal;
             for beam in scan.run(scan.widened(sheet.beams, NEAR_FACET)) {
                 let u = beam::direction(scan.azimuth(beam));
                 let facing = normal.dot(&u).abs();
                 let to_face = normal.dot(&built.face.corners[0].coords) / normal.dot(&u);
-                distance_m[beam] = to_face + built.thickness / facing + error;
+                draws.seek(1 + beam as u64);
+                let own = 1e-3 * noise_sd_mm * draws.normal();
+                distance_m[beam] = to_face + built.thickness / facing + of_all + own;
             }
         }
         let superstructure = &self.scene.superstructure;
         Ok(session::BareStructure {
             mirror_thickness_mm: superstructure.mirror.thickness_mm,
             distance_sd_mm: libm::hypot(sd_mm, superstructure.as_built.thickness_sd_mm),
+            noise_sd_mm,
             scanned: false,
             first_beam: 0,
             distance_m,

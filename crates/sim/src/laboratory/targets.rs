@@ -9,7 +9,7 @@ use crate::light::optics::{Role, Target};
 use crate::scene::Scene;
 use catoptric_cast::{Polygon, Shape};
 use catoptric_model::Pose;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 impl Laboratory {
     /// Walls, and the stretch's board at a given pose, in the sensor frame.
@@ -22,7 +22,12 @@ impl Laboratory {
         let wall_paint = color::paint(&self.scene, &self.scene.room.color)?;
         let mut targets = wall_targets(&self.scene, &sensor_from_room, &wall_paint);
         if let (Some(board), Some(room_from_board)) = (self.board_of(number), room_from_board) {
-            let corners = outline(board).corners().map(|c| room_from_board * c).to_vec();
+            // The pose is that of the markers' plane; light hits the face.
+            let front = Vector3::z() * (1e-3 * board.thickness_mm);
+            let corners = outline(board)
+                .corners()
+                .map(|c| room_from_board * (c + front))
+                .to_vec();
             if let Some(polygon) = placed(&sensor_from_room, corners) {
                 targets.push(Target {
                     name: board.name.clone(),

@@ -16,6 +16,7 @@ mod pattern;
 mod preset;
 mod room;
 mod scanner;
+mod session;
 mod shape;
 mod sheet;
 mod superstructure;
@@ -35,6 +36,11 @@ pub use pattern::{CopyList, Exchange, FacetCopy, MirrorImage, Pattern, Ring};
 pub use preset::Preset;
 pub use room::{Board, BoardPose, Color, Design, Experiment, MarkerNoise, Mocap, MocapProfile, Room};
 pub use scanner::{Light, Mount, Scanner};
+pub use session::{
+    AngleBiasOverlay, AngleTableOverlay, BareStructureOverlay, BeliefsOverlay, BoardOverlay,
+    ColorBiasOverlay, DistanceBiasOverlay, FacetOverlay, GlassOverlay, MarkerOverlay, MountToleranceOverlay,
+    NoiseOverlay, PoseOverlay, RangeBiasOverlay, RoomOverlay, ScannerOverlay, SessionOverlay,
+};
 pub use shape::{MeshShape, MeshUnits, PostCylinder, PostShape};
 pub use sheet::{BeamShape, HousingBox, Limits};
 pub use superstructure::{AsBuilt, Glass, Marker, Mirror, Post, Superstructure};
@@ -98,6 +104,9 @@ pub struct Scene {
     /// How well step 1 knows those errors.
     #[serde(default)]
     pub characterization: Characterization,
+    /// What the written session says otherwise.
+    #[serde(default, skip_serializing_if = "omit::is_default")]
+    pub session: SessionOverlay,
     /// The meshes that the scene names, supplied by the caller who read them. Not part of the file.
     #[serde(skip)]
     pub meshes: Meshes,

@@ -7,3 +7,7 @@ pub(super) fn is_false(value: &bool) -> bool {
 pub(super) fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
+
+pub(super) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}

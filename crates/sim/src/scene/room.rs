@@ -4,6 +4,7 @@ use super::Marker;
 use super::body::{RoomMirror, RoomSurface};
 use super::errors::NoiseTable;
 use super::mishap::Mishap;
+use super::omit::is_zero;
 use super::test::SensorTest;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -32,6 +33,10 @@ pub struct Board {
     /// Extent along its y axis, in millimeters.
     #[schemars(range(min = 10.0, max = 10000.0))]
     pub height_mm: f64,
+    /// How far its face is in front of the plane that its markers span, along its z axis, in millimeters.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub thickness_mm: f64,
     /// Color.
     #[serde(default = "white")]
     pub color: String,
@@ -183,6 +188,15 @@ pub struct Experiment {
     #[schemars(range(min = 0.0, max = 100.0))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bare_distance_sd_mm: Option<f64>,
+    /// Error of such a distance that no other beam shares, 1σ, in millimeters; as large as `bare_distance_sd_mm` if it
+    /// is omitted.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bare_noise_sd_mm: Option<f64>,
+    /// Error of all distances to the bare structure that nobody knows of, in millimeters.
+    #[schemars(range(min = -100.0, max = 100.0))]
+    #[serde(skip_serializing_if = "is_zero")]
+    pub bare_distance_error_mm: f64,
     /// Number of scans of the empty room.
     #[schemars(range(min = 1, max = 1000000))]
     pub room_scans: u32,
@@ -271,6 +285,8 @@ impl Default for Experiment {
             direct_poses: 9,
             design: Design::Even,
             bare_distance_sd_mm: None,
+            bare_noise_sd_mm: None,
+            bare_distance_error_mm: 0.0,
             room_scans: 100,
             bare_scans: 100,
             placement_sd_mm: 10.0,

@@ -159,7 +159,9 @@ impl Sighting {
         biases -= common.bare_row(deflection.distance, bare_cos) * gradient.distance;
         let mut shared = RowDVector::zeros(common.len() + 1);
         shared.columns_mut(0, common.len()).copy_from(&biases);
-        shared[common.len()] = gradient.distance * common.bare_sd(deflection.distance, bare_cos);
+        let own_distance = session.bare_structure.noise_sd_mm * 1e-3;
+        let distance_sd = libm::hypot(common.bare_sd(deflection.distance, bare_cos), own_distance);
+        shared[common.len()] = gradient.distance * distance_sd;
         Some(Self {
             angles: gradient.angles(),
             own,

@@ -31,6 +31,8 @@ fn session() -> Session {
         }),
         believed: Beliefs {
             range_noise_sd_mm: 4.0,
+            noise: None,
+            noise_of: Default::default(),
             drift_sd_mm: 0.0,
             element_sd_mm: 0.0,
             marker_sd_mm: 0.0,
@@ -39,9 +41,11 @@ fn session() -> Session {
             angle_gain_sd_mm: 0.0,
             color_bias_sd_mm: 0.0,
         },
+        glass: None,
         bare_structure: BareStructure {
             mirror_thickness_mm: 0.0,
             distance_sd_mm: 0.0,
+            noise_sd_mm: 0.0,
             scanned: false,
             first_beam: 0,
             distance_m: Vec::new(),

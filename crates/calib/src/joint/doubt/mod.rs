@@ -1,0 +1,215 @@
+//! Doubts: which of the believed errors do the readings contradict?
+//!
+//! Each hypothesis adds errors to the model: a shape ([`shapes`]), or a larger spread of a kind of error. The one with the
+//! smallest probability is named if that is too small to be chance, all hypotheses considered; then its errors count as
+//! estimated, and the others are tested again. Others that would explain the same, nearly as well, are named with it.
+
+mod evidence;
+mod halves;
+mod shapes;
+mod tail;
+mod words;
+
+use super::group::BOARD_ERRORS;
+use super::problem::Joint;
+use crate::lsq::Solution;
+use catoptric_model::assessment::{Cause, ComponentTest, Doubt};
+use catoptric_model::{Dataset, Session};
+use evidence::{Evidence, Statistic};
+use shapes::Shapes;
+
+/// Probability of any doubt if all beliefs hold.
+const FALSE_ALARM: f64 = 1e-3;
+
+/// Maximum number of doubts that are followed up.
+const ROUNDS: usize = 6;
+
+/// Share of the best explanation's evidence, in logarithms, that another one needs to be named with it.
+const NEARLY: f64 = 0.7;
+
+/// Smallest spread of a kind of error, relative to the believed one, that is worth a doubt.
+const WORTH: f64 = 1.1;
+
+/// How a hypothesis is tested.
+enum Kind {
+    /// The errors of these columns are not 0.
+    Shift,
+    /// The errors of these columns, each with its own size, are larger than believed.
+    Spread,
+}
+
+/// Errors that the beliefs omit, or underrate.
+struct Hypothesis {
+    cause: Cause,
+    kind: Kind,
+    columns: Vec<usize>,
+    /// Number of the pose, if the hypothesis is about one.
+    pose: Option<usize>,
+    /// Number of hypotheses of its kind, each about another pose.
+    among: usize,
+}
+
+impl Hypothesis {
+    fn shift(cause: Cause, columns: Vec<usize>) -> Self {
+        Self {
+            cause,
+            kind: Kind::Shift,
+            columns,
+            pose: None,
+            among: 1,
+        }
+    }
+
+    fn spread(cause: Cause, columns: Vec<usize>) -> Self {
+        Self {
+            kind: Kind::Spread,
+            ..Self::shift(cause, columns)
+        }
+    }
+
+    /// The statistic, and ln of its probability for any hypothesis of its kind.
+    fn test(&self, evidence: &Evidence) -> (Statistic, f64) {
+        let statistic = match self.kind {
+            Kind::Shift => evidence.shift(&self.columns),
+            Kind::Spread => match evidence.spread(&self.columns) {
+                (statistic, ratio) if ratio > WORTH * WORTH => statistic,
+                _ => Statistic::default(),
+            },
+        };
+        (
+            statistic,
+            (statistic.ln_p() + libm::log(self.among as f64)).min(0.0),
+        )
+    }
+}
+
+/// All hypotheses about a solution.
+fn hypotheses(joint: &Joint, shapes: &Shapes) -> Vec<Hypothesis> {
+    let boards = shapes.poses.len();
+    let shared = |from: usize, to: usize| (shapes.shared + from..shapes.shared + to).collect::<Vec<_>>();
+    let first = joint.first_common;
+    let glass = joint.glass_column();
+    let mut all = vec![
+        Hypothesis::spread(Cause::Drift, shapes.of_boards(0..1)),
+        Hypothesis::spread(Cause::Markers, shapes.of_boards(1..BOARD_ERRORS)),
+        Hypothesis::shift(Cause::WarmUp, (shapes.warming..shapes.thickness).collect()),
+        Hypothesis::shift(Cause::BoardThickness, vec![shapes.thickness]),
+        Hypothesis::shift(Cause::Glass, vec![shapes.glass]),
+        Hypothesis::shift(Cause::BareDistances, vec![shapes.bare]),
+        Hypothesis::shift(
+            Cause::BareDistances,
+            (shapes.bare_of_facets..shapes.bare_of_facets + shapes.facets).collect(),
+        ),
+        Hypothesis::shift(Cause::DistanceBias, shapes.distance.columns()),
+        Hypothesis::shift(Cause::AngleBias, shapes.incidence.columns()),
+        Hypothesis::shift(Cause::Mounting, shared(0, first)),
+        Hypothesis::shift(Cause::Characterization, shared(first, first + joint.common.len())),
+    ];
+    if let Some(column) = glass {
+        all.push(Hypothesis::shift(Cause::Glass, shared(column, column + 1)));
+    }
+    all.extend((0..boards).map(|board| Hypothesis {
+        pose: Some(shapes.poses[board]),
+        among: boards,
+        ..Hypothesis::shift(Cause::Board, shapes.of_board(board))
+    }));
+    all
+}
+
+impl Joint<'_> {
+    /// Tests of the beliefs, and what is doubtful about them.
+    pub(super) fn doubts(&self, dataset: &Dataset, solution: &Solution) -> (Vec<ComponentTest>, Vec<Doubt>) {
+        let session = &dataset.session;
+        let glass = session.glass.unwrap_or_default();
+        let Some((shapes, evidence)) = self.evidence(solution, &glass) else {
+            return (Vec::new(), Vec::new());
+        };
+        let all = hypotheses(self, &shapes);
+        let kinds = all.iter().filter(|h| h.pose.is_none()).count() + 3;
+        let limit = libm::log(FALSE_ALARM / kinds as f64);
+        let tests = all
+            .iter()
+            .filter(|h| h.pose.is_none())
+            .map(|h| component(h, &evidence));
+        let mut tests: Vec<ComponentTest> = tests.collect();
+        tests.extend(worst_board(&all, &evidence));
+        let mut doubts = Vec::new();
+        let halves = halves::correlated(self, dataset);
+        tests.extend(halves.as_ref().map(|h| h.test()));
+        let correlated = halves.filter(|h| h.statistic.ln_p() < limit && h.inflation > WORTH * WORTH);
+        doubts.extend(correlated.as_ref().map(|h| words::correlated(h)));
+        let mut estimated: Vec<usize> = Vec::new();
+        let mut left = evidence.clone();
+        for _ in 0..ROUNDS {
+            let tested: Vec<_> = all.iter().map(|h| h.test(&left)).collect();
+            let best = (0..all.len()).min_by(|a, b| tested[*a].1.total_cmp(&tested[*b].1));
+            let Some(best) = best.filter(|b| tested[*b].1 < limit) else {
+                break;
+            };
+            let others = (0..all.len()).filter(|other| {
+                let nearly = tested[*other].1 < NEARLY * tested[best].1 && tested[*other].1 < limit;
+                all[*other].cause != all[best].cause
+                    && nearly
+                    && all[best].test(&left.given(&all[*other].columns)).1 > limit
+            });
+            let named: Vec<&Hypothesis> = [best].into_iter().chain(others).map(|i| &all[i]).collect();
+            doubts.push(words::doubt(self, session, &named, &left, &tested[best].0));
+            estimated.extend(&all[best].columns);
+            left = evidence.given(&estimated);
+        }
+        if correlated.is_none() {
+            doubts.extend(self.unexplained(session, solution, &evidence, &estimated, limit, &mut tests));
+        }
+        (tests, words::merged(doubts))
+    }
+
+    /// Whether the residuals are larger than expected, whatever else is estimated.
+    fn unexplained(
+        &self,
+        session: &Session,
+        solution: &Solution,
+        evidence: &Evidence,
+        estimated: &[usize],
+        limit: f64,
+        tests: &mut Vec<ComponentTest>,
+    ) -> Option<Doubt> {
+        let explained = evidence.shift(estimated);
+        let statistic = Statistic {
+            chi_squared: solution.sum_of_squares - explained.chi_squared,
+            freedom: solution.degrees_of_freedom() as f64 - explained.freedom,
+        };
+        tests.push(ComponentTest {
+            cause: Cause::Noise,
+            statistic: statistic.chi_squared,
+            degrees_of_freedom: statistic.freedom,
+            p_value: libm::exp(statistic.ln_p()),
+        });
+        (statistic.ln_p() < limit).then(|| words::noise(session, &statistic))
+    }
+}
+
+fn component(hypothesis: &Hypothesis, evidence: &Evidence) -> ComponentTest {
+    let statistic = match hypothesis.kind {
+        Kind::Shift => evidence.shift(&hypothesis.columns),
+        Kind::Spread => evidence.spread(&hypothesis.columns).0,
+    };
+    ComponentTest {
+        cause: hypothesis.cause,
+        statistic: statistic.chi_squared,
+        degrees_of_freedom: statistic.freedom,
+        p_value: libm::exp(statistic.ln_p()),
+    }
+}
+
+/// The board that the others predict worst.
+fn worst_board(all: &[Hypothesis], evidence: &Evidence) -> Option<ComponentTest> {
+    let of_boards = all.iter().filter(|h| h.pose.is_some());
+    let tested = of_boards.map(|h| h.test(evidence));
+    let (statistic, ln_p) = tested.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(ComponentTest {
+        cause: Cause::Board,
+        statistic: statistic.chi_squared,
+        degrees_of_freedom: statistic.freedom,
+        p_value: libm::exp(ln_p),
+    })
+}
