@@ -2,7 +2,8 @@
 //!
 //! The types of the files name them in their schemas, which readers check every number against before it is used.
 
-use crate::scan::MOST_BEAMS;
+/// Maximum number of beams of a scan: far more than any scanner has, and few enough to fit in memory.
+pub const MOST_BEAMS: usize = 1 << 16;
 
 /// Largest distance and largest coordinate, in meters: 10 km, as far as rays are cast.
 pub const FAR_M: f64 = 1e4;

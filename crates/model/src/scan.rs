@@ -9,12 +9,10 @@
 //! beams are neighbors, and a run of beams may cross the seam, `[first, last]` with first > last.
 
 use crate::limits;
+pub use crate::limits::MOST_BEAMS;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
-
-/// Maximum number of beams of a scan: far more than any scanner has, and few enough to fit in memory.
-pub const MOST_BEAMS: usize = 1 << 16;
 
 /// Tolerance for equal azimuths, as a fraction of a step: the rounding of decimals in files.
 const SAME_PART_OF_STEP: f64 = 1e-3;

@@ -64,8 +64,8 @@ impl Program {
         if !out.exists() {
             return Err("it wrote no calibration".to_owned());
         }
-        let calibration: Calibration =
-            catoptric_files::read_calibration(&out).map_err(|e| format!("what it wrote cannot be read: {e}"))?;
+        let calibration: Calibration = catoptric_files::read_calibration(&out)
+            .map_err(|e| format!("what it wrote cannot be read: {e}"))?;
         let problems = validate(&calibration);
         match problems.iter().find(|p| p.severity == Severity::Error) {
             Some(problem) => Err(format!("what it wrote is not valid: {problem}")),
