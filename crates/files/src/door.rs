@@ -16,6 +16,9 @@ use std::path::Path;
 
 /// A type that is read from a file of its own.
 pub(super) trait Content: DeserializeOwned + JsonSchema {
+    /// The schema, made once.
+    fn schema() -> &'static Json;
+
     /// What is wrong although every single number is within its limits.
     fn problems(&self) -> Vec<Problem>;
 }
@@ -72,7 +75,7 @@ fn checked<T: Content>(
     root: &Node,
     convert: impl FnOnce() -> Result<T, IoError>,
 ) -> Result<T, IoError> {
-    let mut departures = format::check(root, &schema_of::<T>());
+    let mut departures = format::check(root, T::schema());
     // A file of another version differs in more than its version.
     if let Some(version) = departures
         .iter()

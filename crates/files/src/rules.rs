@@ -2,16 +2,28 @@
 //!
 //! The limits of single numbers stand at their fields, in the schemas of the types.
 
-use super::door::Content;
+use super::door::{Content, schema_of};
 #[cfg(feature = "recording")]
 use super::manifest::Manifest;
 use catoptric_model::place::{KeyPath, Problem};
 use catoptric_model::{Calibration, Characterization, PoseData, RangeBias, Session, covariance};
+use serde_json::Value as Json;
 use std::collections::BTreeMap;
 use std::fmt::{Debug, Display};
+use std::sync::OnceLock;
 
 /// Tolerance of the length of a quaternion or a normal that was written by hand with one decimal.
 const UNIT_TOLERANCE: f64 = 0.1;
+
+/// The schema of a type, which takes longer to make than a file to check.
+macro_rules! made_once {
+    () => {
+        fn schema() -> &'static Json {
+            static SCHEMA: OnceLock<Json> = OnceLock::new();
+            SCHEMA.get_or_init(schema_of::<Self>)
+        }
+    };
+}
 
 /// Collects problems.
 #[derive(Default)]
@@ -146,6 +158,8 @@ impl Found {
 }
 
 impl Content for Session {
+    made_once!();
+
     fn problems(&self) -> Vec<Problem> {
         let mut found = Found::default();
         let (of, scanner) = (KeyPath::of, &self.scanner);
@@ -213,6 +227,8 @@ impl Content for Session {
 /// Well formed is all that is asked of a calibration here: how plausible it is, and which mistake was made where it is
 /// not, is up to `validate`, which every verdict begins with.
 impl Content for Calibration {
+    made_once!();
+
     fn problems(&self) -> Vec<Problem> {
         let mut found = Found::default();
         if let Some(Err(wrong)) = self.scanner.map(|angles| angles.check()) {
@@ -235,6 +251,8 @@ impl Content for Calibration {
 }
 
 impl Content for Characterization {
+    made_once!();
+
     fn problems(&self) -> Vec<Problem> {
         let mut found = Found::default();
         let of = KeyPath::of;
@@ -258,6 +276,8 @@ impl Content for Characterization {
 
 #[cfg(feature = "recording")]
 impl Content for Manifest {
+    made_once!();
+
     fn problems(&self) -> Vec<Problem> {
         let mut found = Found::default();
         let hashes = self
@@ -279,6 +299,8 @@ impl Content for Manifest {
 
 #[cfg(feature = "scene")]
 impl Content for catoptric_sim::Truth {
+    made_once!();
+
     fn problems(&self) -> Vec<Problem> {
         let mut found = Found::default();
         let of = KeyPath::of;

@@ -20,7 +20,7 @@ use catoptric_sim::build::pattern::{self, Expanded};
 use catoptric_sim::check;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Why a scene could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -252,14 +252,14 @@ pub fn parse(text: &str, file_name: &str, sets: &[String]) -> Result<Scene, Scen
             });
         }
     }
-    let schema = json_schema();
-    let faults = parameters::resolve(&mut root, text, &parameters::text_keys(&schema));
+    let schema = schema();
+    let faults = parameters::resolve(&mut root, text, &parameters::text_keys(schema));
     let placed = faults
         .iter()
         .map(|f| f.whole.clone())
         .filter(|s| *s != Source::Unknown);
     let flawed: Vec<Source> = placed.collect();
-    let departures = departures(&root, text, &schema, &list);
+    let departures = departures(&root, text, schema, &list);
     // An expression without a value is reported only once.
     let departures = departures.into_iter().filter(|f| !flawed.contains(&f.source));
     list.extend(departures.map(|f| Diagnostic {
@@ -299,7 +299,7 @@ pub fn parse(text: &str, file_name: &str, sets: &[String]) -> Result<Scene, Scen
     if problems.is_empty() {
         return Ok(scene);
     }
-    let of_file = problems_without_sets(&file, text, sets, &schema);
+    let of_file = problems_without_sets(&file, text, sets, schema);
     let made = Expanded {
         scene,
         drawn,
@@ -334,7 +334,13 @@ pub fn to_toml(scene: &Scene) -> Result<String, toml::ser::Error> {
 
 /// JSON Schema of a scene whose expressions have been evaluated.
 pub fn json_schema() -> serde_json::Value {
-    schema_of::<Scene>()
+    schema().clone()
+}
+
+/// The same, made once.
+fn schema() -> &'static serde_json::Value {
+    static SCHEMA: OnceLock<serde_json::Value> = OnceLock::new();
+    SCHEMA.get_or_init(schema_of::<Scene>)
 }
 
 /// JSON Schema of a scene file, for editors: numbers may be expressions.

@@ -2,6 +2,9 @@
 //!
 //! The types of the files name them in their schemas, which readers check every number against before it is used.
 
+/// Maximum number of beams of a scan: far more than any scanner has, and few enough to fit in memory.
+pub const MOST_BEAMS: usize = 1 << 16;
+
 /// Largest distance and largest coordinate, in meters: 10 km, as far as rays are cast.
 pub const FAR_M: f64 = 1e4;
 
@@ -46,9 +49,6 @@ pub const FASTEST_HZ: f64 = 1e5;
 
 /// Shortest and longest time from beam to beam, in microseconds.
 pub const BEAM_TIME_US: [f64; 2] = [1e-3, 1e9];
-
-/// Maximum number of beams of a scan: far more than any scanner has, and few enough to fit in memory.
-pub const MOST_BEAMS: usize = 1 << 16;
 
 /// Largest index of a beam.
 pub const LAST_BEAM: usize = MOST_BEAMS - 1;

@@ -79,7 +79,7 @@ struct FlatSheet {
     /// Name of the preset.
     preset: String,
     /// Number of beams of a scan.
-    #[schemars(range(min = 1, max = crate::scan::MOST_BEAMS))]
+    #[schemars(range(min = 1, max = limits::MOST_BEAMS))]
     beams: usize,
     /// Angle between neighboring beams, in degrees.
     #[schemars(range(min = limits::STEP_DEG, max = limits::TURN_DEG))]
