@@ -1,5 +1,6 @@
 //! Problems in a file written by a person: each with its location, an excerpt, and a suggestion.
 
+use super::names::{masked, printable};
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 use std::fmt;
 use std::ops::Range;
@@ -58,42 +59,46 @@ impl Diagnostics {
         };
         let mut out = String::new();
         for diagnostic in &self.list {
-            out.push_str(&renderer.render(&[self.group(diagnostic)]));
+            let text = masked(&self.text);
+            let file = printable(&self.file);
+            out.push_str(&renderer.render(&[group(&file, &text, diagnostic)]));
             out.push_str("\n\n");
         }
         let count = match self.list.len() {
             1 => "1 problem".to_owned(),
             n => format!("{n} problems"),
         };
-        out.push_str(&format!("{}: {count}", self.file));
+        out.push_str(&format!("{}: {count}", printable(&self.file)));
         out
     }
+}
 
-    fn group<'a>(&'a self, diagnostic: &'a Diagnostic) -> Group<'a> {
-        let message = match &diagnostic.place {
-            Place::Set(argument) => format!("--set {argument}: {}", diagnostic.message),
-            _ => diagnostic.message.clone(),
-        };
-        let mut group = Group::with_title(Level::ERROR.primary_title(message));
-        match &diagnostic.place {
-            Place::Span(span) => {
-                group = group.element(
-                    Snippet::source(self.text.as_str())
-                        .path(self.file.as_str())
-                        .annotation(AnnotationKind::Primary.span(first_line(&self.text, span))),
-                );
-            }
-            Place::Position(line, column) => {
-                group = group.element(Origin::path(self.file.as_str()).line(*line).char_column(*column));
-            }
-            Place::Key(_) => group = group.element(Origin::path(self.file.as_str())),
-            Place::Set(_) => {}
+/// A problem with its excerpt from a text that a terminal can be shown.
+fn group<'a>(file: &'a str, text: &'a str, diagnostic: &'a Diagnostic) -> Group<'a> {
+    let message = match &diagnostic.place {
+        Place::Set(argument) => format!("--set {argument}: {}", diagnostic.message),
+        _ => diagnostic.message.clone(),
+    };
+    let message = printable(&message).into_owned();
+    let mut group = Group::with_title(Level::ERROR.primary_title(message));
+    match &diagnostic.place {
+        Place::Span(span) => {
+            group = group.element(
+                Snippet::source(text)
+                    .path(file)
+                    .annotation(AnnotationKind::Primary.span(first_line(text, span))),
+            );
         }
-        if let Some(help) = &diagnostic.help {
-            group = group.element(Level::HELP.message(help.as_str()));
+        Place::Position(line, column) => {
+            group = group.element(Origin::path(file).line(*line).char_column(*column));
         }
-        group
+        Place::Key(_) => group = group.element(Origin::path(file)),
+        Place::Set(_) => {}
     }
+    if let Some(help) = &diagnostic.help {
+        group = group.element(Level::HELP.message(printable(help)));
+    }
+    group
 }
 
 impl fmt::Display for Diagnostics {

@@ -1,6 +1,7 @@
 //! Runs as rows of a CSV table, which preserves every number exactly.
 
 use super::Run;
+use catoptric_files::names::{defused, original};
 
 /// Header of `runs.csv`. Squares are in rad², errors in radians.
 pub const HEADER: [&str; 16] = [
@@ -39,7 +40,7 @@ fn row(r: &Run) -> [String; 16] {
     [
         r.cell.to_string(),
         r.seed.to_string(),
-        r.method.clone(),
+        defused(&r.method).into_owned(),
         r.solved.to_string(),
         r.abstained.to_string(),
         r.missed.to_string(),
@@ -52,7 +53,7 @@ fn row(r: &Run) -> [String; 16] {
         number(r.across),
         number(r.up),
         number(r.mahalanobis_squared),
-        r.failure.clone(),
+        defused(&r.failure).into_owned(),
     ]
 }
 
@@ -84,7 +85,7 @@ fn parsed(record: &csv::StringRecord) -> Option<Run> {
     Some(Run {
         cell: count(0)?,
         seed: text(1)?.parse().ok()?,
-        method: text(2)?.to_owned(),
+        method: original(text(2)?).to_owned(),
         solved: count(3)?,
         abstained: count(4)?,
         missed: count(5)?,
@@ -97,7 +98,7 @@ fn parsed(record: &csv::StringRecord) -> Option<Run> {
         across: number(12)?,
         up: number(13)?,
         mahalanobis_squared: number(14)?,
-        failure: text(15)?.to_owned(),
+        failure: original(text(15)?).to_owned(),
         milliseconds: f64::NAN,
     })
 }
