@@ -4,7 +4,9 @@ use super::context::{Context, Reading};
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print};
+use super::outputs::Replacing;
 use super::validate::invalid;
+use catoptric::files::Content;
 use catoptric::files::cloud::CloudFormat;
 use catoptric::validate::{Severity, validate_for};
 use catoptric::{CloudFrame, apply_into, read_calibration_for};
@@ -33,19 +35,27 @@ pub(crate) struct Arguments {
     pose: Option<usize>,
     #[command(flatten)]
     reading: Reading,
+    #[command(flatten)]
+    replacing: Replacing,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let path = &arguments.out;
     // Said before anything is read.
-    CloudFormat::of_path(path).map_err(|e| CliError::invalid(e.to_string(), None))?;
+    let content = match CloudFormat::of_path(path) {
+        Ok(CloudFormat::Ply) => Content::PlyCloud,
+        Ok(CloudFormat::Pcd) => Content::PcdCloud,
+        Err(e) => return Err(CliError::invalid(e.to_string(), None)),
+    };
+    let outputs = arguments.replacing.outputs([&arguments.calibration]);
+    let out = outputs.file(path, &content)?;
     let dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
     let calibration = read_calibration_for(&arguments.calibration, &dataset.session)?;
     let problems = validate_for(&calibration, &dataset.session);
     if problems.iter().any(|p| p.severity == Severity::Error) {
         return Err(invalid(&arguments.calibration, &problems));
     }
-    let cloud = apply_into(&dataset, &calibration, arguments.pose, arguments.frame, path)?;
+    let cloud = apply_into(&dataset, &calibration, arguments.pose, arguments.frame, out)?;
     if cloud.mount_is_nominal {
         context.say("the calibration has no mounting: using the one of the drawing");
     }

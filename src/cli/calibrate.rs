@@ -4,7 +4,9 @@ use super::context::{Context, Reading};
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print, quoted};
+use super::outputs::Replacing;
 use catoptric::calib::{JacobianForm, Options};
+use catoptric::files::Content;
 use catoptric::model::Status;
 use catoptric::{Calibration, Method, calibrate_with, read_characterization, write_json};
 use clap::Args;
@@ -41,9 +43,13 @@ pub(crate) struct Arguments {
     jacobian: JacobianForm,
     #[command(flatten)]
     reading: Reading,
+    #[command(flatten)]
+    replacing: Replacing,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
+    let outputs = arguments.replacing.outputs(&arguments.characterization);
+    let out = outputs.file(&arguments.out, &Content::Calibration)?;
     let mut dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
     context.check()?;
     if let Some(path) = &arguments.characterization {
@@ -70,7 +76,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     for warning in calibration.warnings.iter().filter(known) {
         context.say(&format!("warning: {warning}"));
     }
-    write_json(&arguments.out, &calibration)?;
+    write_json(out, &calibration)?;
     print(&format!(
         "wrote {}: {}\n{}next: catoptric score {} {}\n",
         arguments.out.display(),

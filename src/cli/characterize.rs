@@ -3,6 +3,8 @@
 use super::context::{Context, Reading};
 use super::error::CliError;
 use super::output::{print, print_json, quoted};
+use super::outputs::Replacing;
+use catoptric::files::Content;
 use catoptric::model::{Characterization, RangeBias};
 use catoptric::{Error, Scene, characterize, files, read_truth, report, simulate_with, tables};
 use clap::Args;
@@ -29,10 +31,17 @@ pub(crate) struct Arguments {
     json: bool,
     #[command(flatten)]
     reading: Reading,
+    #[command(flatten)]
+    replacing: Replacing,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let page = page_path(&arguments.out)?;
+    let outputs = arguments.replacing.outputs([&arguments.input]);
+    let places = [
+        outputs.file(&arguments.out, &Content::Characterization)?,
+        outputs.file(&page, &Content::Page)?,
+    ];
     let (dataset, truth) = if arguments.input.is_dir() {
         if arguments.seed.is_some() || !arguments.set.is_empty() {
             let message = "--seed and --set change a scene; a dataset cannot be changed";
@@ -58,11 +67,10 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         other => other.into(),
     })?;
     context.check()?;
-    files::write_json(&arguments.out, &found)?;
-    files::write_file(
-        &page,
-        report::characterization(&found, injected.as_ref()).as_bytes(),
-    )?;
+    let json = files::json::to_json(&arguments.out, &found)?;
+    let html = report::characterization(&found, injected.as_ref()).into_bytes();
+    let [to_json, to_page] = places;
+    files::write_files(&[(to_json, json), (to_page, html)])?;
     if arguments.json {
         return print_json(&found);
     }

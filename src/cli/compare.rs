@@ -32,6 +32,7 @@ pub(crate) struct Arguments {
 /// Succeeds if every calibration does.
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let rules = arguments.judging.rules()?;
+    let junit = arguments.judging.place(&arguments.calibrations)?;
     let dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
     let truth = read_reference(&arguments.dataset, arguments.judging.blind)?;
     let contestants: Vec<Contestant> = arguments
@@ -40,12 +41,12 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         .map(|path| {
             Ok(Contestant {
                 name: path.display().to_string(),
-                calibration: arguments.judging.read(path)?,
+                calibration: arguments.judging.read(path, junit.as_ref())?,
             })
         })
         .collect::<Result<_, CliError>>()?;
     let found = compare_with(&dataset, &contestants, truth.as_ref(), &rules)?;
-    write_junit(arguments.judging.junit.as_ref(), &Suite::of_comparison(&found))?;
+    write_junit(junit.as_ref(), &Suite::of_comparison(&found))?;
     if arguments.json {
         let json = serde_json::to_string_pretty(&found).map_err(|e| CliError::Output(e.into()))?;
         print(&format!("{json}\n"))?;

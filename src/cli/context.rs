@@ -2,6 +2,7 @@
 
 use super::error::CliError;
 use super::progress::Reporter;
+use catoptric::files::names::printable;
 use catoptric::{Control, Damage, Dataset, Stop, read_dataset_with};
 use clap::{ArgAction, Args};
 use std::ffi::OsString;
@@ -82,7 +83,7 @@ impl Context {
     pub(super) fn say(&self, text: &str) {
         if !self.global.quiet {
             // If stderr is closed, there is nowhere left to report to.
-            let _ = writeln!(anstream::stderr(), "{text}");
+            let _ = writeln!(anstream::stderr(), "{}", printable(text));
         }
     }
 

@@ -5,17 +5,18 @@ use super::context::{Context, Reading};
 use super::error::CliError;
 use super::judging::conclude;
 use super::output::{counted, grouped, print, quoted};
+use super::outputs::Replacing;
 use super::score::figure;
 use catoptric::apply::{CloudSketch, Lift};
 use catoptric::calib::Options;
-use catoptric::files;
+use catoptric::files::{self, Content, Manifest};
 use catoptric::report::MAX_POINTS;
 use catoptric::{
     CloudFrame, Error, Method, Recording, Scene, Template, apply_into, calibrate_with, read_truth, report,
     score, simulate_into, write_json,
 };
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// The methods shown: the best one, the best that treats each element separately, and the paper's.
@@ -30,6 +31,16 @@ pub(crate) struct Arguments {
     /// Seed of all random effects, instead of the scene's.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    #[command(flatten)]
+    replacing: Replacing,
+}
+
+/// Whether a dataset was written by a demo.
+fn is_of_demo(dataset: &Path) -> bool {
+    let manifest: Option<Manifest> = files::read_json(dataset.join(files::dataset::MANIFEST)).ok();
+    manifest
+        .and_then(|m| m.command_line)
+        .is_some_and(|line| line.starts_with("catoptric demo"))
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
@@ -47,9 +58,27 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         scene = scene.with_seed(seed);
     }
     let dataset_folder = folder.join("dataset");
+    let outputs = arguments.replacing.outputs(&[] as &[PathBuf]);
+    let place = |name: String, content| {
+        let out = outputs.place(&folder.join(name))?;
+        out.admit(content)?;
+        Ok::<_, CliError>(out)
+    };
+    let mut places = Vec::new();
+    for method in SHOWN {
+        let name = method.name();
+        let calibration = place(format!("calibration-{name}.json"), &Content::Calibration)?;
+        places.push((
+            method,
+            calibration,
+            place(format!("score-{name}.json"), &Content::Score)?,
+        ));
+    }
+    let cloud_place = place("cloud.ply".to_owned(), &Content::PlyCloud)?;
+    let report_place = place("report.html".to_owned(), &Content::Page)?;
     let recording = Recording {
-        // Only datasets are ever replaced, and a second demo creates the same one.
-        replace: true,
+        // A second demo creates the same dataset as the first.
+        replace: arguments.replacing.replace || is_of_demo(&dataset_folder),
         command_line: Some(format!("catoptric demo --seed {}", scene.resolved().seed)),
         ..Recording::default()
     };
@@ -61,14 +90,14 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let truth = read_truth(&dataset_folder)?;
     let mut results = Vec::new();
     let mut lines = Vec::new();
-    for method in SHOWN {
+    for (method, to_calibration, to_score) in places {
         context.check()?;
         let name = method.name();
         context.say(&format!("calibrating: {name}"));
         let calibration = calibrate_with(&dataset, method, &Options::default(), &control)?;
-        write_json(folder.join(format!("calibration-{name}.json")), &calibration)?;
+        write_json(to_calibration, &calibration)?;
         let result = score(&dataset, &calibration, truth.as_ref()).map_err(Error::from)?;
-        write_json(folder.join(format!("score-{name}.json")), &result)?;
+        write_json(to_score, &result)?;
         lines.push(format!(
             "{name:8}  {}; per-axis error {} rms",
             summary(&calibration),
@@ -78,13 +107,13 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     }
     context.check()?;
     context.say("writing cloud and report");
-    let cloud_path = folder.join("cloud.ply");
-    let cloud = apply_into(&dataset, &results[0].0, None, CloudFrame::Room, &cloud_path)?;
+    let cloud_path = cloud_place.path().to_owned();
+    let cloud = apply_into(&dataset, &results[0].0, None, CloudFrame::Room, cloud_place)?;
     let lift = Lift::new(&dataset, &results[0].0, None, CloudFrame::Room).map_err(Error::from)?;
     let sketch = CloudSketch::of(&lift, MAX_POINTS).map_err(Error::from)?;
-    let report_path = folder.join("report.html");
+    let report_path = report_place.path().to_owned();
     let html = report(&dataset, truth.as_ref(), &results, Some(&sketch));
-    files::write_file(&report_path, html.as_bytes())?;
+    files::write_file(report_place, html.as_bytes())?;
 
     let (scene, score) = (scene.resolved(), &results[0].1);
     let verdict = score.verdict.word();

@@ -1,7 +1,9 @@
 //! Why a verb can fail, the message it prints and the exit code the shell receives.
 
+use super::interrupt;
 use catoptric::Error;
 use catoptric::files::IoError;
+use catoptric::files::names::printable;
 use catoptric::files::scene::SceneErrors;
 use catoptric::sim::SimError;
 use std::io::{IsTerminal, Write};
@@ -59,6 +61,7 @@ impl CliError {
             Self::Verdict(_) => 1,
             Self::Invalid(_) => 2,
             Self::Output(_) => 3,
+            Self::Library(Error::Stopped(_)) => interrupt::exit_code(),
             Self::Library(error) => error.exit_code(),
         }
     }
@@ -73,13 +76,20 @@ impl CliError {
                 writeln!(stderr, "{}", problems.render(std::io::stderr().is_terminal()))
             }
             Self::Library(Error::Stopped(_)) => {
-                writeln!(stderr, "interrupted; no incomplete files were left behind")
+                writeln!(
+                    stderr,
+                    "{}; no incomplete files were left behind",
+                    interrupt::word()
+                )
             }
-            Self::Verdict(_) | Self::Invalid(_) => writeln!(stderr, "{self}"),
-            Self::Library(error) => match help(error) {
-                Some(help) => writeln!(stderr, "error: {error}\nhelp: {help}"),
-                None => writeln!(stderr, "error: {error}"),
-            },
+            Self::Verdict(_) | Self::Invalid(_) => writeln!(stderr, "{}", printable(&self.to_string())),
+            Self::Library(error) => {
+                let text = match help(error) {
+                    Some(help) => format!("error: {error}\nhelp: {help}"),
+                    None => format!("error: {error}"),
+                };
+                writeln!(stderr, "{}", printable(&text))
+            }
             Self::Output(error) => writeln!(stderr, "error: {error}"),
         };
         self.exit_code()
@@ -99,7 +109,10 @@ fn help(error: &Error) -> Option<String> {
             Some("--partial uses what can be read of it nevertheless".to_owned())
         }
         Error::File(IoError::NoTruth { .. }) => Some("--blind judges by boards and walls alone".to_owned()),
-        Error::File(IoError::Exists { .. }) => Some("use --replace or another --out".to_owned()),
+        Error::File(IoError::Foreign { .. }) => Some("choose another --out".to_owned()),
+        Error::File(IoError::Exists { .. }) => {
+            Some("--replace replaces it; another --out leaves it as it is".to_owned())
+        }
         other => other.help(),
     }
 }

@@ -4,6 +4,7 @@ use super::context::{Context, Reading};
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print, quoted};
+use super::outputs::Replacing;
 use catoptric::export::ExportPart;
 use catoptric::{Error, ExportFormat, ExportOptions, Scene, export, export_boards, files};
 use clap::Args;
@@ -41,6 +42,8 @@ pub(crate) struct Arguments {
     set: Vec<String>,
     #[command(flatten)]
     reading: Reading,
+    #[command(flatten)]
+    replacing: Replacing,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
@@ -54,6 +57,8 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         return Err(CliError::invalid(message, None));
     }
     let scene = Scene::load_with(&arguments.input, &arguments.set)?;
+    let outputs = arguments.replacing.outputs(scene.files(&arguments.input));
+    let out = outputs.place(&arguments.out)?;
     let options = ExportOptions {
         part: arguments.part.unwrap_or(default.part),
         reach_m,
@@ -68,7 +73,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
             names.join(", ")
         ));
     }
-    files::write_file(&arguments.out, &exported.bytes)?;
+    files::write_file(out, &exported.bytes)?;
     let parts = exported.parts;
     let what = match arguments.format {
         ExportFormat::Stl => format!("{}, millimeters", counted(parts, "solid")),
@@ -107,7 +112,11 @@ fn boards(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
         Error::Invalid { message, help } => CliError::invalid(format!("{message} in {shown}"), help),
         other => other.into(),
     })?;
-    files::write_file(&arguments.out, &table)?;
+    let out = arguments
+        .replacing
+        .outputs([&arguments.input])
+        .place(&arguments.out)?;
+    files::write_file(out, &table)?;
     print(&format!(
         "wrote {}: {}\n",
         quoted(&arguments.out),

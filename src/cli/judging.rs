@@ -1,9 +1,11 @@
 //! What the verbs that judge have in common: limits on figures, the JUnit file, and exit codes that follow from verdicts.
 
 use super::error::CliError;
+use super::outputs::{Outputs, Replacing};
+use catoptric::files::Content;
 use catoptric::junit::{self, Case, Ended, Suite};
 use catoptric::requirement::{Requirement, RequirementError};
-use catoptric::{Calibration, Error, Rules, Verdict, files, read_calibration};
+use catoptric::{Calibration, Error, Output, Rules, Verdict, files, read_calibration};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -66,6 +68,8 @@ pub(crate) struct Judging {
     /// Also write the verdict as JUnit XML.
     #[arg(long, value_name = "FILE")]
     pub(crate) junit: Option<PathBuf>,
+    #[command(flatten)]
+    replacing: Replacing,
 }
 
 fn share(text: &str) -> Result<f64, String> {
@@ -83,11 +87,16 @@ impl Judging {
         })
     }
 
+    /// The place of the JUnit file, if one is asked for.
+    pub(crate) fn place(&self, calibrations: &[PathBuf]) -> Result<Option<Output>, CliError> {
+        junit_place(self.junit.as_ref(), &self.replacing.outputs(calibrations))
+    }
+
     /// Reads a calibration; one that is not valid is reported in the JUnit file, too.
-    pub(crate) fn read(&self, path: &Path) -> Result<Calibration, CliError> {
+    pub(crate) fn read(&self, path: &Path, junit: Option<&Output>) -> Result<Calibration, CliError> {
         read_calibration(path).map_err(|error| {
             let error = Error::from(error);
-            match (&self.junit, error.exit_code()) {
+            match (junit, error.exit_code()) {
                 (Some(junit), 2) => match write_junit(Some(junit), &[unread(path, &error)]) {
                     Ok(()) => error.into(),
                     Err(error) => error,
@@ -110,10 +119,15 @@ pub(crate) fn unread(path: &Path, error: &Error) -> Suite {
     }
 }
 
+/// The place of the JUnit file, if one is asked for; refused before any work is done.
+pub(crate) fn junit_place(path: Option<&PathBuf>, outputs: &Outputs) -> Result<Option<Output>, CliError> {
+    path.map(|path| outputs.file(path, &Content::Junit)).transpose()
+}
+
 /// Writes the JUnit file if one is asked for.
-pub(crate) fn write_junit(path: Option<&PathBuf>, suites: &[Suite]) -> Result<(), CliError> {
-    match path {
-        Some(path) => Ok(files::write_file(path, junit::to_xml(suites).as_bytes())?),
+pub(crate) fn write_junit(out: Option<&Output>, suites: &[Suite]) -> Result<(), CliError> {
+    match out {
+        Some(out) => Ok(files::write_file(out.clone(), junit::to_xml(suites).as_bytes())?),
         None => Ok(()),
     }
 }

@@ -2,12 +2,16 @@
 
 use super::context::Context;
 use super::error::CliError;
-use super::judging::{Limits, write_junit};
+use super::judging::{Limits, junit_place, write_junit};
 use super::optimize::REQUIRE;
 use super::output::{print, quoted};
+use super::outputs::Replacing;
+use catoptric::files::names::printable_name;
 use catoptric::junit::{Case, Ended, Suite};
 use catoptric::layout::{Analysis, Class, FacetView, Requirement, RequirementError};
-use catoptric::{LAYOUT_PAGE, LayoutOptions, Scene, distinct_names, layout, layout_json, write_layouts};
+use catoptric::{
+    LAYOUT_FOLDER, LAYOUT_PAGE, LayoutOptions, Scene, distinct_names, layout, layout_json, write_layouts,
+};
 use clap::Args;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -39,6 +43,8 @@ pub(crate) struct Arguments {
     /// Write layout.json, the pictures and a page, report.html, to this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    replacing: Replacing,
     /// Print all figures as JSON.
     #[arg(long)]
     json: bool,
@@ -46,6 +52,10 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let requirements = arguments.limits.requirements(EXAMPLE)?;
+    let outputs = arguments.replacing.outputs(&arguments.scenes);
+    let place = |out: &PathBuf| outputs.folder(out, &LAYOUT_FOLDER);
+    let out = arguments.out.as_ref().map(place).transpose()?;
+    let junit = junit_place(arguments.junit.as_ref(), &outputs)?;
     let mut scenes = Vec::new();
     for path in &arguments.scenes {
         let scene = Scene::load_with(path, &arguments.set)?;
@@ -65,12 +75,12 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     }
     context.detail(&format!("analyzed in {:.3} s", begin.elapsed().as_secs_f64()));
     let (unmet, suites) = unmet(&requirements, &analyses)?;
-    write_junit(arguments.junit.as_ref(), &suites)?;
+    write_junit(junit.as_ref(), &suites)?;
     let mut said = String::new();
-    if let Some(out) = &arguments.out {
+    if let Some(out) = out {
+        said = format!("wrote {}\n", quoted(&out.path().join(LAYOUT_PAGE)));
         let layouts: Vec<(&Scene, &Analysis)> = scenes.iter().zip(&analyses).collect();
         write_layouts(&layouts, out, &context.control())?;
-        said = format!("wrote {}\n", quoted(&out.join(LAYOUT_PAGE)));
     }
     if arguments.json {
         print(&layout_json(&analyses)?)?;
@@ -160,7 +170,7 @@ fn text(analysis: &Analysis, name: &str) -> String {
     let mut text = format!(
         "{}{built}: {}\n  largest gap {:.2}° of the scan; field of regard {:.3} % of all directions ({:.4} sr), {:.1} % within \
          5° of a beam; {elevation}, {:.0} of 360° of azimuth\n",
-        name,
+        printable_name(name),
         counts.join(", "),
         analysis.largest_gap_deg,
         100.0 * analysis.field_of_regard,
@@ -219,7 +229,7 @@ fn corners(drawing: &layout::Drawing) -> String {
 
 fn facet(facet: &FacetView, width: usize) -> String {
     let Some(([low, high], [left, right])) = facet.exit_elevation_deg.zip(facet.exit_azimuth_deg) else {
-        return format!("  {:width$}  serves no element\n", facet.name);
+        return format!("  {:width$}  serves no element\n", printable_name(&facet.name));
     };
     let number = |value: Option<f64>, decimals: usize| {
         value.map_or_else(|| "–".to_owned(), |v| format!("{v:.decimals$}"))
@@ -227,7 +237,7 @@ fn facet(facet: &FacetView, width: usize) -> String {
     format!(
         "  {:width$}  {:3} elements to azimuth {left:.0}° to {right:.0}°, elevation {low:.0}° to {high:.0}°; {} split; margin {} \
          mm ({} beams); to {} m at 10 %; 0.1° of tilt moves 4 m by {} mm\n",
-        facet.name,
+        printable_name(&facet.name),
         facet.elements,
         facet.split,
         number(facet.margin_mm, 2),

@@ -2,7 +2,8 @@
 
 use super::error::CliError;
 use super::output::print;
-use catoptric::files::IoError;
+use super::outputs::Replacing;
+use catoptric::files::{self, IoError};
 use clap::{Args, Command};
 use std::path::PathBuf;
 
@@ -12,6 +13,8 @@ pub(crate) struct Arguments {
     /// Write the pages of all verbs to this folder instead of printing the main one.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    replacing: Replacing,
 }
 
 pub(crate) fn run(arguments: &Arguments, program: Command) -> Result<(), CliError> {
@@ -22,8 +25,29 @@ pub(crate) fn run(arguments: &Arguments, program: Command) -> Result<(), CliErro
             .map_err(CliError::Output)?;
         return print(&String::from_utf8_lossy(&page));
     };
-    let write_error = |source| IoError::write(folder, source);
-    std::fs::create_dir_all(folder).map_err(write_error)?;
-    clap_mangen::generate_to(program, folder).map_err(write_error)?;
+    let outputs = arguments.replacing.outputs(&[] as &[PathBuf]);
+    let mut program = program.disable_help_subcommand(true);
+    program.build();
+    let mut written = Vec::new();
+    pages(program, &mut |name, page| {
+        written.push((outputs.place(&folder.join(name))?, page));
+        Ok(())
+    })?;
+    std::fs::create_dir_all(folder).map_err(|source| IoError::write(folder, source))?;
+    files::write_files(&written)?;
     print(&format!("wrote the manual pages to {}\n", folder.display()))
+}
+
+/// The pages of a command and of its verbs, by the names of their files.
+fn pages(
+    command: Command,
+    each: &mut dyn FnMut(String, Vec<u8>) -> Result<(), CliError>,
+) -> Result<(), CliError> {
+    for verb in command.get_subcommands().filter(|verb| !verb.is_hide_set()) {
+        pages(verb.clone(), each)?;
+    }
+    let page = clap_mangen::Man::new(command);
+    let mut bytes = Vec::new();
+    page.render(&mut bytes).map_err(CliError::Output)?;
+    each(page.get_filename(), bytes)
 }

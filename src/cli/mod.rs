@@ -18,6 +18,7 @@ mod new;
 mod one_of;
 mod optimize;
 mod output;
+mod outputs;
 mod plan;
 mod progress;
 mod report;
@@ -38,7 +39,7 @@ use std::sync::Arc;
 
 /// Printed at the end of every help text.
 const EXIT_CODES: &str = "Exit codes: 0 ok · 1 the verdict is \"not good enough\" · 2 usage or invalid input · \
-                          3 input/output · 130 interrupted";
+                          3 input/output · 130 interrupted · 143 terminated · 129 hung up";
 
 /// Simulator and calibration testbed for 2D LiDARs that see in 3D through mirrors.
 #[derive(Debug, Parser)]
@@ -98,7 +99,7 @@ enum Verb {
 
 /// Runs the program on its arguments, the first of which is its name, and returns its exit code.
 ///
-/// Results go to standard output, everything else to standard error. Ctrl-C stops the current run.
+/// Results go to standard output, everything else to standard error. Ctrl-C, SIGTERM and SIGHUP stop the current run.
 pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
     let cli = match Cli::try_parse_from(&arguments) {

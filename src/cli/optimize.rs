@@ -4,12 +4,15 @@ use super::context::Context;
 use super::error::CliError;
 use super::judging::Limits;
 use super::output::{counted, grouped, print, print_json, quoted};
+use super::outputs::Replacing;
+use catoptric::files::names::printable_name;
 use catoptric::layout::{Detail, RequirementError};
 use catoptric::optimize::{
     Better, Goal, GoalError, LayoutCandidate, OptimizeError, Optimum, SearchOptions, Wanted,
 };
 use catoptric::{
-    BEST_SCENE, Error, OPTIMUM_PAGE, Scene, optimize, report, shown_of_front as shown, write_optimum,
+    BEST_SCENE, Error, OPTIMUM_FOLDER, OPTIMUM_PAGE, Scene, optimize, report, shown_of_front as shown,
+    write_optimum,
 };
 use clap::Args;
 use std::path::PathBuf;
@@ -46,6 +49,8 @@ pub(crate) struct Arguments {
     /// Write optimum.json, front.csv, front.svg, a page, report.html, and the best layouts as scenes to this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    replacing: Replacing,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -53,6 +58,9 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let options = options(arguments)?;
+    let outputs = arguments.replacing.outputs([&arguments.scene]);
+    let place = |out: &PathBuf| outputs.folder(out, &OPTIMUM_FOLDER);
+    let place = arguments.out.as_ref().map(place).transpose()?;
     let scene = Scene::load_with(&arguments.scene, &arguments.set)?;
     let begin = Instant::now();
     let found = optimize(&scene, &options, &context.control()).map_err(|error| match error {
@@ -66,8 +74,9 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         begin.elapsed().as_secs_f64()
     ));
     let mut next = String::new();
-    if let Some(out) = &arguments.out {
-        write_optimum(&scene, &found, out)?;
+    if let Some(place) = place {
+        let out = place.path().to_owned();
+        write_optimum(&scene, &found, place)?;
         next = format!("wrote {}\n", quoted(&out.join(OPTIMUM_PAGE)));
         if found.best.is_some() {
             next += &format!(
@@ -217,7 +226,7 @@ fn text(found: &Optimum) -> String {
         .collect();
     let mut text = format!(
         "{}: {} on the front of {} that meet the requirements; goals: {}{}\n",
-        found.name,
+        printable_name(&found.name),
         counted(found.front.len(), "layout"),
         grouped(found.tried.len()),
         goals.join(", "),

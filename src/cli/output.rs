@@ -1,11 +1,13 @@
 //! Standard output: data and results; a closed pipe ends the program quietly.
 
 use super::error::CliError;
+use catoptric::files::names::printable;
 pub(crate) use catoptric::files::paths::quoted;
 use std::io::{ErrorKind, Write};
 
-/// Writes text to stdout unchanged.
+/// Writes text to stdout; nothing in it moves the cursor or changes colors of a terminal, whatever names it contains.
 pub(crate) fn print(text: &str) -> Result<(), CliError> {
+    let text = printable(text);
     let mut stdout = std::io::stdout().lock();
     let written = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush());
     written.map_err(|e| match e.kind() {

@@ -4,9 +4,13 @@ use super::context::{Context, Reading};
 use super::error::CliError;
 use super::one_of::one_of;
 use super::output::{counted, print, print_json, quoted};
+use super::outputs::Replacing;
 use catoptric::calib::plan::{Criterion, FacetPlan, Open, Plan, PlannedPose, Request, Standing};
-use catoptric::files::{self, dataset};
-use catoptric::{Dataset, PlanStart, Scene, completed_scene, plan, planned_scene, report, write_planned};
+use catoptric::files::names::printable_name;
+use catoptric::files::{self, Content, dataset};
+use catoptric::{
+    Dataset, Output, PlanStart, Scene, completed_scene, plan, planned_scene, planned_text, report,
+};
 use clap::Args;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -56,6 +60,27 @@ pub(crate) struct Arguments {
     json: bool,
     #[command(flatten)]
     reading: Reading,
+    #[command(flatten)]
+    replacing: Replacing,
+}
+
+/// Where the plan is written.
+struct Places {
+    scene: Option<Output>,
+    page: Option<Output>,
+}
+
+impl Places {
+    fn of(arguments: &Arguments) -> Result<Self, CliError> {
+        let outputs = arguments.replacing.outputs([&arguments.input]);
+        let place = |path: &Option<PathBuf>, content| {
+            path.as_ref().map(|path| outputs.file(path, content)).transpose()
+        };
+        Ok(Self {
+            scene: place(&arguments.out, &Content::Scene)?,
+            page: place(&arguments.report, &Content::Page)?,
+        })
+    }
 }
 
 /// Where the plan starts from.
@@ -66,6 +91,7 @@ enum Source {
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let begin = Instant::now();
+    let places = Places::of(arguments)?;
     let source = source(arguments, context)?;
     let start = match &source {
         Source::Drawing(scene) => PlanStart::of_scene(scene)?,
@@ -75,7 +101,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let facets = start.facets(&arguments.facet)?;
     let request = request(arguments, start.readings)?;
     let plan = plan(&start, &facets, &request, &context.control())?;
-    let written = write(arguments, context, &source, &start, &plan)?;
+    let written = write(arguments, context, places, &source, &start, &plan)?;
     context.detail(&format!("planned in {:.2} s", begin.elapsed().as_secs_f64()));
     if arguments.json {
         return print_json(&plan);
@@ -121,16 +147,19 @@ fn request(arguments: &Arguments, readings: usize) -> Result<Request, CliError> 
 fn write(
     arguments: &Arguments,
     context: &Context,
+    places: Places,
     source: &Source,
     start: &PlanStart,
     plan: &Plan,
 ) -> Result<String, CliError> {
     let mut said = String::new();
-    if let Some(path) = &arguments.report {
-        files::write_file(path, report::plan(&start.situation, plan).as_bytes())?;
-        said += &format!("wrote {}\n", path.display());
+    let mut written = Vec::new();
+    if let Some(page) = places.page {
+        said += &format!("wrote {}\n", page.path().display());
+        written.push((page, report::plan(&start.situation, plan).into_bytes()));
     }
-    let Some(out) = &arguments.out else {
+    let Some(place) = places.scene else {
+        files::write_files(&written)?;
         let blind = matches!(source, Source::Recording(_)) && !arguments.input.join(dataset::SCENE).exists();
         let next = if blind {
             "next: record these poses and calibrate\n".to_owned()
@@ -157,20 +186,27 @@ fn write(
         }
     };
     let poses = planned.experiment.pose.len();
-    write_planned(planned, &folder, out)?;
+    let out = place.path().to_owned();
+    let text = planned_text(planned, &folder, &out)?;
+    written.push((place, text.into_bytes()));
+    files::write_files(&written)?;
     let stem = out.file_stem().unwrap_or(out.as_os_str()).to_string_lossy();
     Ok(said
         + &format!(
             "wrote {}: {}\nnext: catoptric simulate {} --out {}\n",
             out.display(),
             counted(poses, "pose"),
-            quoted(out),
+            quoted(&out),
             quoted(format!("{stem}-dataset").as_ref())
         ))
 }
 
 fn text(facet: &FacetPlan) -> String {
-    let mut text = format!("facet {}: {}\n", facet.facet, standing(&facet.before));
+    let mut text = format!(
+        "facet {}: {}\n",
+        printable_name(&facet.facet),
+        standing(&facet.before)
+    );
     for (number, pose) in facet.poses.iter().enumerate() {
         text += &line(number + 1, pose);
     }
@@ -211,7 +247,7 @@ fn line(number: usize, pose: &PlannedPose) -> String {
     format!(
         "  {number}. {}: {}\n     center ({x:.3}, {y:.3}, {z:.3}) m, yaw {yaw:.1}°, pitch {pitch:.1}°, roll {roll:.1}°; \
          beams {}; {} → {}\n",
-        pose.board,
+        printable_name(&pose.board),
         pose.words,
         served.join(", "),
         bound(&pose.before),

@@ -4,7 +4,9 @@ use super::context::{Context, Reading};
 use super::error::CliError;
 use super::judging::conclude;
 use super::output::print;
+use super::outputs::Replacing;
 use catoptric::apply::{CloudSketch, Lift};
+use catoptric::files::Content;
 use catoptric::report::MAX_POINTS;
 use catoptric::{CloudFrame, Error, Verdict, files, read_calibration, read_reference, report, score};
 use clap::Args;
@@ -26,9 +28,13 @@ pub(crate) struct Arguments {
     out: PathBuf,
     #[command(flatten)]
     reading: Reading,
+    #[command(flatten)]
+    replacing: Replacing,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
+    let outputs = arguments.replacing.outputs(&arguments.calibrations);
+    let out = outputs.file(&arguments.out, &Content::Page)?;
     let dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
     let truth = read_reference(&arguments.dataset, arguments.blind)?;
     let mut results = Vec::new();
@@ -58,7 +64,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         None => None,
     };
     let html = report(&dataset, truth.as_ref(), &results, cloud.as_ref());
-    files::write_file(&arguments.out, html.as_bytes())?;
+    files::write_file(out, html.as_bytes())?;
     print(&format!(
         "wrote {path}\nnext: open {path} in a browser\n",
         path = arguments.out.display()

@@ -4,6 +4,7 @@ use super::context::{Context, Reading};
 use super::error::CliError;
 use super::judging::{Judging, conclude, write_junit};
 use super::output::{print, quoted};
+use catoptric::files::names::printable_name;
 use catoptric::junit::Suite;
 use catoptric::{Score, read_reference, score_with};
 use clap::Args;
@@ -38,18 +39,18 @@ fn positive(text: &str) -> Result<f64, String> {
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let rules = arguments.judging.rules()?;
+    let junit = arguments
+        .judging
+        .place(std::slice::from_ref(&arguments.calibration))?;
     let dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
     let truth = read_reference(&arguments.dataset, arguments.judging.blind)?;
-    let calibration = arguments.judging.read(&arguments.calibration)?;
+    let calibration = arguments.judging.read(&arguments.calibration, junit.as_ref())?;
     let mut result = score_with(&dataset, &calibration, truth.as_ref(), &rules)?;
     if let Some(limit) = arguments.max_rms_deg {
         result = result.with_limit(limit);
     }
     let name = arguments.calibration.display().to_string();
-    write_junit(
-        arguments.judging.junit.as_ref(),
-        &[Suite::of_score(&name, &result)],
-    )?;
+    write_junit(junit.as_ref(), &[Suite::of_score(&name, &result)])?;
     if arguments.json {
         let json = serde_json::to_string_pretty(&result).map_err(|e| CliError::Output(e.into()))?;
         print(&format!("{json}\n"))?;
@@ -70,7 +71,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
 /// A score as a few lines of text.
 fn words(score: &Score) -> String {
     let verdict = score.verdict.word();
-    let mut text = format!("{verdict}: method {}\n", score.method);
+    let mut text = format!("{verdict}: method {}\n", printable_name(&score.method));
     let mut line = |name: &str, value: String| text.push_str(&format!("  {name:<22}{value}\n"));
     let beams = &score.beams;
     line(

@@ -3,6 +3,7 @@
 use super::context::Context;
 use super::error::CliError;
 use super::output::{counted, print, print_json, quoted};
+use super::outputs::Replacing;
 use catoptric::{Recording, Scene, simulate_into};
 use clap::Args;
 use std::path::PathBuf;
@@ -24,9 +25,8 @@ pub(crate) struct Arguments {
     /// Print the figures of the run as JSON.
     #[arg(long)]
     json: bool,
-    /// Replace an existing dataset.
-    #[arg(long)]
-    replace: bool,
+    #[command(flatten)]
+    replacing: Replacing,
     /// Write no truth/, and neither seed nor command into the manifest: the dataset is blind. A run of the same scene and seed without this option has the truth.
     #[arg(long, conflicts_with_all = ["returns", "readings", "sub_rays"])]
     blind: bool,
@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         scene = scene.with_seed(seed);
     }
     let recording = Recording {
-        replace: arguments.replace,
+        replace: arguments.replacing.replace,
         blind: arguments.blind,
         returns: arguments.returns,
         readings: arguments.readings,

@@ -2,13 +2,14 @@
 
 use super::context::Context;
 use super::error::CliError;
-use super::judging::{Limits, conclude, unknown, write_junit};
+use super::judging::{Limits, conclude, junit_place, unknown, write_junit};
 use super::output::{print, print_json, quoted};
+use super::outputs::Replacing;
 use catoptric::junit::Suite;
 use catoptric::requirement::Requirement;
-use catoptric::study::folder::RESULT;
+use catoptric::study::folder::{PLAN, RESULT, SPREAD};
 use catoptric::study::{Axis, Contestant, Part, Program, Study, StudyError, Summary, grid};
-use catoptric::{Error, STUDY_PAGE, Scene, Stop, Verdict, merge_studies, study_into};
+use catoptric::{Error, Output, STUDY_PAGE, Scene, Stop, Verdict, merge_studies, study_into};
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -51,6 +52,29 @@ struct Judging {
     /// Also write the verdict on every contestant as JUnit XML.
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
+    #[command(flatten)]
+    replacing: Replacing,
+}
+
+impl Judging {
+    /// The places of the study and of the JUnit file.
+    fn places(&self, out: &Path, scene: Option<&PathBuf>) -> Result<(Output, Option<Output>), CliError> {
+        let outputs = self.replacing.outputs(scene);
+        // A folder that the study shares with others: only its own files are its own.
+        for name in [
+            PLAN,
+            RESULT,
+            SPREAD,
+            STUDY_PAGE,
+            "runs.csv",
+            "elements.csv",
+            "times.csv",
+        ] {
+            outputs.place(&out.join(name))?;
+        }
+        let junit = junit_place(self.junit.as_ref(), &outputs)?;
+        Ok((Output::new(out).replacing(self.replacing.replace), junit))
+    }
 }
 
 #[derive(Debug, Args)]
@@ -66,7 +90,7 @@ struct StudyArguments {
     methods: Vec<String>,
     /// A calibration program to study as well: NAME=COMMAND. May be given more than once. {dataset} and {out} in the
     /// command are replaced by the folder of a blind dataset and the file to write; they are appended if missing. The
-    /// command is split at spaces and run without a shell.
+    /// command is split into words as a shell does, with quotes and backslashes, and run without a shell.
     #[arg(long, value_name = "NAME=COMMAND")]
     program: Vec<String>,
     /// Time limit of a program, in seconds.
@@ -103,9 +127,10 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     match &arguments.verb {
         Some(Verb::Merge(merge)) => {
             let requirements = merge.judging.limits.requirements(EXAMPLE)?;
-            let summary = merge_studies(&merge.shards, &merge.out)?;
+            let (place, junit) = merge.judging.places(&merge.out, None)?;
+            let summary = merge_studies(&merge.shards, place)?;
             show(&summary, &merge.out, merge.json)?;
-            judge(&summary, &requirements, &merge.out, &merge.judging)
+            judge(&summary, &requirements, &merge.out, junit.as_ref())
         }
         None => study_scene(&arguments.study, context),
     }
@@ -151,9 +176,10 @@ fn study_scene(arguments: &StudyArguments, context: &Context) -> Result<(), CliE
         contestants: contestants(arguments)?,
         stop: Stop::default(),
     };
-    let summary = study_into(&study, part, arguments.elements, out, &context.control())?;
+    let (place, junit) = arguments.judging.places(out, Some(scene))?;
+    let summary = study_into(&study, part, arguments.elements, place, &context.control())?;
     show(&summary, out, arguments.json)?;
-    judge(&summary, &requirements, out, &arguments.judging)
+    judge(&summary, &requirements, out, junit.as_ref())
 }
 
 /// An example of a requirement.
@@ -164,11 +190,11 @@ fn judge(
     summary: &Summary,
     requirements: &[Requirement],
     out: &Path,
-    judging: &Judging,
+    junit: Option<&Output>,
 ) -> Result<(), CliError> {
     let reasons = summary.reasons(requirements).map_err(|e| unknown(&e))?;
     let suite = Suite::of_study(&out.display().to_string(), summary, &reasons);
-    write_junit(judging.junit.as_ref(), &[suite])?;
+    write_junit(junit, &[suite])?;
     let words: Vec<String> = reasons.into_iter().map(|(_, why)| why).collect();
     let verdict = if words.is_empty() {
         Verdict::Pass
@@ -192,9 +218,9 @@ fn contestants(arguments: &StudyArguments) -> Result<Vec<Contestant>, CliError> 
         }
     }
     for text in &arguments.program {
-        let program = Program::parse(text, arguments.program_timeout_s).ok_or_else(|| {
+        let program = Program::parse(text, arguments.program_timeout_s).map_err(|why| {
             invalid(
-                format!("--program {text}: expected NAME=COMMAND"),
+                format!("--program {text}: {why}"),
                 "--program 'mine=python3 mine.py {dataset} {out}'",
             )
         })?;

@@ -6,8 +6,12 @@ use super::judging::Limits;
 use super::layout::refused;
 use super::optimize::REQUIRE;
 use super::output::{print, print_json, quoted};
+use super::outputs::Replacing;
+use catoptric::files::names::printable_name;
 use catoptric::tolerance::{Distribution, Tolerance};
-use catoptric::{Error, Scene, TOLERANCE_PAGE, ToleranceOptions, tolerance, write_tolerance};
+use catoptric::{
+    Error, Scene, TOLERANCE_FOLDER, TOLERANCE_PAGE, ToleranceOptions, tolerance, write_tolerance,
+};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -38,6 +42,8 @@ pub(crate) struct Arguments {
     /// Write tolerance.json, the plot and a page, report.html, to this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    replacing: Replacing,
     /// Print all figures as JSON.
     #[arg(long)]
     json: bool,
@@ -54,15 +60,18 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         calibrate: arguments.calibrate,
         requirements: arguments.limits.requirements(EXAMPLE)?,
     };
+    let outputs = arguments.replacing.outputs([&arguments.scene]);
+    let place = |out: &PathBuf| outputs.folder(out, &TOLERANCE_FOLDER);
+    let out = arguments.out.as_ref().map(place).transpose()?;
     let scene = Scene::load_with(&arguments.scene, &arguments.set)?;
     let (found, unmet) = tolerance(&scene, &options, &context.control()).map_err(|error| match error {
         Error::Requirement(error) => refused(error, EXAMPLE),
         other => other.into(),
     })?;
     let mut said = String::new();
-    if let Some(out) = &arguments.out {
+    if let Some(out) = out {
+        said = format!("wrote {}\n", quoted(&out.path().join(TOLERANCE_PAGE)));
         write_tolerance(&found, out)?;
-        said = format!("wrote {}\n", quoted(&out.join(TOLERANCE_PAGE)));
     }
     if arguments.json {
         print_json(&found)?;
@@ -109,7 +118,7 @@ fn text(found: &Tolerance) -> String {
     let mut text = format!(
         "{}: {} structures as built, seeds {} to {last}\n  facets turned by {}°, shifted by {} mm, thicker by {} mm (1σ), slope error \
          {} mrad; scanner within {}° of yaw, {}° of tilt, {} mm\n  before calibration:\n  directions {}\n  points at 4 m {}\n",
-        found.name,
+        printable_name(&found.name),
         found.draws,
         found.seed,
         errors.tilt_sd_deg,
@@ -127,7 +136,7 @@ fn text(found: &Tolerance) -> String {
     for facet in &found.facets {
         text += &format!(
             "  {:width$}  {:3} elements, {}\n",
-            facet.name,
+            printable_name(&facet.name),
             facet.elements,
             distribution(&facet.direction_deg, "°", 3)
         );

@@ -3,6 +3,7 @@
 use super::context::Context;
 use super::error::CliError;
 use super::output::{counted, print, print_json};
+use super::outputs::Replacing;
 use catoptric::files::IoError;
 use catoptric::{Error, MAX_BOUNCES, Scene, trace};
 use clap::Args;
@@ -30,14 +31,18 @@ pub(crate) struct Arguments {
     /// Print the figures of the run as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    replacing: Replacing,
 }
 
 pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliError> {
     let scene = Scene::load_with(&arguments.scene, &arguments.set)?;
+    let outputs = arguments.replacing.outputs(scene.files(&arguments.scene));
+    let out = outputs.place(&arguments.out)?;
     let figures = trace(
         &scene,
         &arguments.rays,
-        &arguments.out,
+        out,
         arguments.max_bounces,
         &context.control(),
     )

@@ -2,8 +2,9 @@
 
 use super::calibrate::summary;
 use super::error::CliError;
-use super::judging::{conclude, unread, write_junit};
+use super::judging::{conclude, junit_place, unread, write_junit};
 use super::output::{counted, print, print_json, quoted};
+use super::outputs::Replacing;
 use catoptric::junit::Suite;
 use catoptric::validate::{Problem, Severity};
 use catoptric::{Calibration, Error, Verdict, files, validate};
@@ -25,10 +26,14 @@ pub(crate) struct Arguments {
     /// Also write them as JUnit XML.
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
+    #[command(flatten)]
+    replacing: Replacing,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
-    let (path, junit) = (&arguments.calibration, arguments.junit.as_ref());
+    let path = &arguments.calibration;
+    let junit = junit_place(arguments.junit.as_ref(), &arguments.replacing.outputs([path]))?;
+    let junit = junit.as_ref();
     let calibration: Calibration = match files::read_calibration(path) {
         Ok(calibration) => calibration,
         Err(error) => {

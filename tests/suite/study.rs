@@ -266,12 +266,12 @@ fn programs_are_contestants_and_their_failures_are_results() {
         ("missing", "cannot be started"),
         (
             "broken",
-            "it ended with exit status: 1: cat: {dataset}/no-such-file",
+            "it ended with exit status: 1: cat: dataset/no-such-file",
         ),
-        ("nonsense", "what it wrote cannot be read: {out}:1"),
+        ("nonsense", "what it wrote cannot be read: calibration.json:1"),
         ("hanging", "it did not end within 2 s"),
         // A blind dataset contains no truth.
-        ("peeking", "{dataset}/truth/truth.json"),
+        ("peeking", "dataset/truth/truth.json"),
     ] {
         let failure = of(name)["failure"].as_str().unwrap();
         assert!(failure.contains(words), "{name}: {failure}");

@@ -73,7 +73,7 @@ pub use catoptric_design::{export, layout, optimize, plan, tolerance};
 pub use catoptric_files as files;
 pub use catoptric_files::scene::Template;
 #[cfg(feature = "recording")]
-pub use catoptric_files::{Damage, read_dataset, read_reference, read_truth, write_json};
+pub use catoptric_files::{Damage, Output, read_dataset, read_reference, read_truth, write_json};
 pub use catoptric_files::{read_calibration, read_calibration_for, read_characterization};
 pub use catoptric_model as model;
 pub use catoptric_model::{Calibration, Characterization, CloudFrame, Dataset, PointCloud, Stop, Stopped};

@@ -146,6 +146,14 @@ impl Scene {
         &self.folder
     }
 
+    /// The files it was read from, if this was the first: it and its meshes.
+    pub fn files(&self, scene: impl AsRef<Path>) -> Vec<PathBuf> {
+        let meshes = self.resolved.mesh_shapes().into_iter();
+        let mut files = vec![scene.as_ref().to_owned()];
+        files.extend(meshes.map(|(_, mesh)| self.folder.join(&mesh.file)));
+        files
+    }
+
     /// The settings applied to it, in order.
     pub fn settings(&self) -> &[String] {
         &self.settings

@@ -167,9 +167,9 @@ impl DatasetWriter {
 /// Checks whether the contents of `out`, if any, may be overwritten.
 fn occupant(out: &Path, replace: bool) -> Result<Occupant, IoError> {
     let path = out.to_owned();
-    let foreign = |what| IoError::Foreign {
+    let foreign = |what: &str| IoError::Foreign {
         path: path.clone(),
-        what,
+        what: what.to_owned(),
     };
     match fs::symlink_metadata(out) {
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(Occupant::Nothing),
@@ -187,7 +187,8 @@ fn occupant(out: &Path, replace: bool) -> Result<Occupant, IoError> {
         return Err(foreign("holds files that are not a dataset of ours"));
     };
     if !replace {
-        return Err(IoError::Exists { path });
+        let what = "holds a dataset".to_owned();
+        return Err(IoError::Exists { path, what });
     }
     let files = list(out).map_err(|e| IoError::read(out, e))?;
     if files

@@ -1,5 +1,6 @@
 //! Problems in a file written by a person: each with its location, an excerpt, and a suggestion.
 
+use super::names::{masked, printable};
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 use std::fmt;
 use std::ops::Range;
@@ -59,10 +60,11 @@ impl Diagnostics {
         } else {
             Renderer::plain()
         };
-        let lines = Lines::of(&self.text);
+        let (file, text) = (printable(&self.file), masked(&self.text));
+        let lines = Lines::of(&text);
         let mut out = String::new();
         for diagnostic in self.list.iter().take(MOST_SHOWN) {
-            out.push_str(&renderer.render(&[self.group(diagnostic, &lines)]));
+            out.push_str(&renderer.render(&[group(&file, &lines, diagnostic)]));
             out.push_str("\n\n");
         }
         let count = match self.list.len() {
@@ -70,40 +72,42 @@ impl Diagnostics {
             n if n > MOST_SHOWN => format!("{n} problems, of which the first {MOST_SHOWN} are shown"),
             n => format!("{n} problems"),
         };
-        out.push_str(&format!("{}: {count}", self.file));
+        out.push_str(&format!("{file}: {count}"));
         out
     }
+}
 
-    fn group<'a>(&'a self, diagnostic: &'a Diagnostic, lines: &Lines<'a>) -> Group<'a> {
-        let message = match &diagnostic.place {
-            Place::Set(argument) => format!("--set {argument}: {}", diagnostic.message),
-            _ => diagnostic.message.clone(),
-        };
-        let mut group = Group::with_title(Level::ERROR.primary_title(message));
-        match &diagnostic.place {
-            Place::Span(span) => {
-                // The line alone: an excerpt of a whole table would hide the problem.
-                let (number, line) = lines.line(span.start);
-                let start = span.start.clamp(line.start, line.end) - line.start;
-                let end = span.end.clamp(line.start + start, line.end) - line.start;
-                group = group.element(
-                    Snippet::source(&self.text[line])
-                        .line_start(number)
-                        .path(self.file.as_str())
-                        .annotation(AnnotationKind::Primary.span(start..end)),
-                );
-            }
-            Place::Position(line, column) => {
-                group = group.element(Origin::path(self.file.as_str()).line(*line).char_column(*column));
-            }
-            Place::Key(_) => group = group.element(Origin::path(self.file.as_str())),
-            Place::Set(_) => {}
+/// A problem with its excerpt from the lines of a text that a terminal can be shown.
+fn group<'a>(file: &'a str, lines: &Lines<'a>, diagnostic: &'a Diagnostic) -> Group<'a> {
+    let message = match &diagnostic.place {
+        Place::Set(argument) => format!("--set {argument}: {}", diagnostic.message),
+        _ => diagnostic.message.clone(),
+    };
+    let message = printable(&message).into_owned();
+    let mut group = Group::with_title(Level::ERROR.primary_title(message));
+    match &diagnostic.place {
+        Place::Span(span) => {
+            // The line alone: an excerpt of a whole table would hide the problem.
+            let (number, line) = lines.line(span.start);
+            let start = span.start.clamp(line.start, line.end) - line.start;
+            let end = span.end.clamp(line.start + start, line.end) - line.start;
+            group = group.element(
+                Snippet::source(&lines.text[line])
+                    .line_start(number)
+                    .path(file)
+                    .annotation(AnnotationKind::Primary.span(start..end)),
+            );
         }
-        if let Some(help) = &diagnostic.help {
-            group = group.element(Level::HELP.message(help.as_str()));
+        Place::Position(line, column) => {
+            group = group.element(Origin::path(file).line(*line).char_column(*column));
         }
-        group
+        Place::Key(_) => group = group.element(Origin::path(file)),
+        Place::Set(_) => {}
     }
+    if let Some(help) = &diagnostic.help {
+        group = group.element(Level::HELP.message(printable(help)));
+    }
+    group
 }
 
 impl fmt::Display for Diagnostics {

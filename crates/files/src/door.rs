@@ -15,7 +15,7 @@ use serde_json::Value as Json;
 use std::path::Path;
 
 /// A type that is read from a file of its own.
-pub(super) trait Content: DeserializeOwned + JsonSchema {
+pub(super) trait Readable: DeserializeOwned + JsonSchema {
     /// The schema, made once.
     fn schema() -> &'static Json;
 
@@ -32,7 +32,7 @@ pub(super) fn schema_of<T: JsonSchema>() -> Json {
 ///
 /// # Errors
 /// [`IoError::Text`] or [`IoError::Faults`] with line and column of what is wrong.
-pub(super) fn from_json<T: Content>(bytes: &[u8], path: &Path) -> Result<T, IoError> {
+pub(super) fn from_json<T: Readable>(bytes: &[u8], path: &Path) -> Result<T, IoError> {
     let text = text_of(bytes, path)?;
     let lines = Lines::of(text);
     let root = tree::from_json(text).map_err(|d| refused(path, &lines, vec![d]))?;
@@ -44,7 +44,7 @@ pub(super) fn from_json<T: Content>(bytes: &[u8], path: &Path) -> Result<T, IoEr
 ///
 /// # Errors
 /// As [`from_json`].
-pub(super) fn from_toml<T: Content>(bytes: &[u8], path: &Path) -> Result<T, IoError> {
+pub(super) fn from_toml<T: Readable>(bytes: &[u8], path: &Path) -> Result<T, IoError> {
     let text = text_of(bytes, path)?;
     let lines = Lines::of(text);
     let (root, wrong) = tree::from_toml(text);
@@ -69,7 +69,7 @@ fn text_of<'a>(bytes: &'a [u8], path: &Path) -> Result<&'a str, IoError> {
     })
 }
 
-fn checked<T: Content>(
+fn checked<T: Readable>(
     path: &Path,
     lines: &Lines<'_>,
     root: &Node,

@@ -26,27 +26,29 @@ pub enum IoError {
         /// The operating system's reason.
         source: io::Error,
     },
-    /// The disk, or the user's quota on it, is full.
-    #[error("{}: cannot be written: the disk is full; nothing half-written was left behind", path.display())]
+    /// The disk, or the user's quota on it, is full, or a file is larger than it may become.
+    #[error("{}: cannot be written: {}; nothing half-written was left behind", path.display(), full(source))]
     DiskFull {
         /// The file.
         path: PathBuf,
         /// The operating system's reason.
         source: io::Error,
     },
-    /// A dataset exists already and may not be replaced.
-    #[error("{}: holds a dataset already; it is replaced only on request", path.display())]
+    /// Something exists already that is replaced only on request.
+    #[error("{} exists already and {what}; it was not changed", path.display())]
     Exists {
-        /// The folder.
+        /// The file or folder.
         path: PathBuf,
+        /// What exists there.
+        what: String,
     },
-    /// Something that is not a dataset exists already; it is never touched.
+    /// Something exists already that is never touched.
     #[error("{}: {what}; it is left as it is", path.display())]
     Foreign {
         /// The file or folder.
         path: PathBuf,
         /// What exists there instead.
-        what: &'static str,
+        what: String,
     },
     /// Text that is not valid content for the file.
     #[error("{}:{line}:{column}: {message}", path.display())]
@@ -158,7 +160,9 @@ impl IoError {
     pub fn write(path: impl AsRef<Path>, source: io::Error) -> Self {
         let path = path.as_ref().to_owned();
         match source.kind() {
-            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Self::DiskFull { path, source },
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => {
+                Self::DiskFull { path, source }
+            }
             _ => Self::Write { path, source },
         }
     }
@@ -198,8 +202,8 @@ impl IoError {
         }
     }
 
-    /// The exit code of a program that ends with this error: 2 if the content of a file is wrong, 3 if the system could
-    /// not read or write, or if an existing file or folder may not be replaced.
+    /// The exit code of a program that ends with this error: 2 if the content of a file is wrong, or an existing file or
+    /// folder may not be replaced, 3 if the system could not read or write.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Stopped(_) => 130,
@@ -210,13 +214,19 @@ impl IoError {
             | Self::Content { .. }
             | Self::Inconsistent { .. }
             | Self::NoTruth { .. }
-            | Self::Changed { .. } => 2,
-            Self::Read { .. }
-            | Self::Write { .. }
-            | Self::DiskFull { .. }
+            | Self::Changed { .. }
             | Self::Exists { .. }
-            | Self::Foreign { .. } => 3,
+            | Self::Foreign { .. } => 2,
+            Self::Read { .. } | Self::Write { .. } | Self::DiskFull { .. } => 3,
         }
+    }
+}
+
+/// What is full.
+fn full(source: &io::Error) -> &'static str {
+    match source.kind() {
+        io::ErrorKind::FileTooLarge => "the file is larger than the system allows",
+        _ => "the disk is full",
     }
 }
 

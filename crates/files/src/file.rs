@@ -1,22 +1,27 @@
 //! Atomic writing of one file: it is written next to its destination, flushed to disk, then renamed.
 
+use super::content::Content;
 use super::error::IoError;
 use super::json::to_json;
+use super::leftovers;
+use super::output::{Output, There};
 use super::paths::parent;
 use catoptric_model::Stop;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
-/// Writes a file completely or not at all, replacing any existing file.
+/// Writes a file completely or not at all.
 ///
-/// Links are followed; a pipe or a device, which cannot be replaced, is written to directly.
+/// An existing file is written over as [`Output`] says. Links are followed; a pipe or a device, which cannot be replaced, is
+/// written to directly.
 ///
 /// # Errors
-/// [`IoError`] if the system refuses; then the file is unchanged and no temporary file is left.
+/// [`IoError::Exists`] if something else is there, or the error of the system; then the file is unchanged and no temporary
+/// file is left.
 ///
 /// ```
 /// let folder = tempfile::tempdir()?;
@@ -25,43 +30,31 @@ use tempfile::NamedTempFile;
 /// assert_eq!(std::fs::read(&path)?, b"one scan");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn write_file(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), IoError> {
-    let path = path.as_ref();
-    let fail = |e| IoError::write(path, e);
-    match fs::metadata(path) {
-        Ok(there) if there.is_file() => replace(&fs::canonicalize(path).map_err(fail)?, bytes).map_err(fail),
-        Ok(there) if there.is_dir() => Err(fail(io::ErrorKind::IsADirectory.into())),
-        Ok(_) => write_through(path, bytes).map_err(fail),
-        Err(e) if e.kind() == io::ErrorKind::NotFound => replace(path, bytes).map_err(fail),
-        Err(e) => Err(fail(e)),
+pub fn write_file(out: impl Into<Output>, bytes: &[u8]) -> Result<(), IoError> {
+    let mut file = StagedOutput::create(out, &Content::of(bytes))?;
+    file.write(bytes)?;
+    file.finish()
+}
+
+/// Writes several files, none of which appears before all are on disk. They appear in the order given.
+///
+/// # Errors
+/// As [`write_file`], and [`IoError::Foreign`] if two of them have the same place.
+pub fn write_files(files: &[(Output, Vec<u8>)]) -> Result<(), IoError> {
+    let mut staged: Vec<StagedOutput> = Vec::with_capacity(files.len());
+    for (out, bytes) in files {
+        let mut file = StagedOutput::create(out.clone(), &Content::of(bytes))?;
+        if !file.is_direct() && staged.iter().any(|other| other.place == file.place) {
+            return Err(IoError::Foreign {
+                path: file.shown,
+                what: "would be written twice by this run".to_owned(),
+            });
+        }
+        file.write(bytes)?;
+        file.flush()?;
+        staged.push(file);
     }
-}
-
-/// Writes a temporary file in the same folder and renames it.
-fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut file = temporary(parent(path))?;
-    file.write_all(bytes)?;
-    place(file, path)
-}
-
-/// Flushes a temporary file to disk and renames it.
-fn place(file: NamedTempFile, path: &Path) -> io::Result<()> {
-    file.as_file().sync_all()?;
-    file.persist(path).map_err(|e| e.error)?;
-    sync_folder(parent(path));
-    Ok(())
-}
-
-fn temporary(folder: &Path) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".partial-");
-    #[cfg(unix)]
-    {
-        // Temporary files are private by default; this one gets the ordinary permissions under the user's mask.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
-    builder.tempfile_in(folder)
+    staged.into_iter().try_for_each(StagedOutput::finish)
 }
 
 /// A file written piece by piece, completely or not at all. A pipe or a device receives the pieces directly.
@@ -74,31 +67,39 @@ pub struct StagedOutput {
 
 #[derive(Debug)]
 enum Target {
-    Staged(BufWriter<NamedTempFile>),
+    Staged {
+        file: BufWriter<NamedTempFile>,
+        /// Whether something may be there that is replaced.
+        replaces: bool,
+    },
     Direct(BufWriter<File>),
 }
 
 impl StagedOutput {
-    /// Begins a file; an existing one remains until [`finish`](Self::finish).
+    /// Begins a file of this content; an existing one remains until [`finish`](Self::finish).
     ///
     /// # Errors
-    /// [`IoError`] if the system refuses.
-    pub fn create(path: impl AsRef<Path>) -> Result<Self, IoError> {
-        let shown = path.as_ref().to_owned();
+    /// [`IoError`] if the system refuses, or if what is there may not be written over.
+    pub fn create(out: impl Into<Output>, content: &Content) -> Result<Self, IoError> {
+        let out = out.into();
+        let shown = out.path().to_owned();
         let fail = |e| IoError::write(&shown, e);
-        let (place, direct) = match fs::metadata(&shown) {
-            Ok(there) if there.is_file() => (fs::canonicalize(&shown).map_err(fail)?, false),
-            Ok(there) if there.is_dir() => return Err(fail(io::ErrorKind::IsADirectory.into())),
-            Ok(_) => (shown.clone(), true),
-            Err(e) if e.kind() == io::ErrorKind::NotFound => (shown.clone(), false),
-            Err(e) => return Err(fail(e)),
+        let (place, replaces) = match out.there(content)? {
+            There::Nothing => (shown.clone(), false),
+            There::Link => (shown.clone(), true),
+            There::File(place) => (place, true),
+            There::Device => {
+                let file = File::options().write(true).open(&shown).map_err(fail)?;
+                return Ok(Self {
+                    place: shown.clone(),
+                    target: Target::Direct(BufWriter::new(file)),
+                    shown,
+                });
+            }
         };
-        let target = if direct {
-            let file = File::options().write(true).open(&place).map_err(fail)?;
-            Target::Direct(BufWriter::new(file))
-        } else {
-            Target::Staged(BufWriter::new(temporary(parent(&place)).map_err(fail)?))
-        };
+        let file = leftovers::file_in(parent(&place)).map_err(fail)?;
+        let file = BufWriter::new(file);
+        let target = Target::Staged { file, replaces };
         Ok(Self { place, shown, target })
     }
 
@@ -113,10 +114,19 @@ impl StagedOutput {
     /// [`IoError`] if the system refuses.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), IoError> {
         match &mut self.target {
-            Target::Staged(file) => file.write_all(bytes),
+            Target::Staged { file, .. } => file.write_all(bytes),
             Target::Direct(file) => file.write_all(bytes),
         }
         .map_err(|e| IoError::write(&self.shown, e))
+    }
+
+    /// Flushes what was written to disk.
+    fn flush(&mut self) -> Result<(), IoError> {
+        let flushed = match &mut self.target {
+            Target::Staged { file, .. } => file.flush().and_then(|()| file.get_ref().as_file().sync_all()),
+            Target::Direct(file) => file.flush(),
+        };
+        flushed.map_err(|e| IoError::write(&self.shown, e))
     }
 
     /// Overwrites the beginning of a file, which must not be a pipe; nothing may be appended afterwards.
@@ -125,7 +135,7 @@ impl StagedOutput {
     /// [`IoError`] if the system refuses.
     pub fn rewrite_start(&mut self, bytes: &[u8]) -> Result<(), IoError> {
         let rewritten = match &mut self.target {
-            Target::Staged(file) => file.rewind().and_then(|()| file.write_all(bytes)),
+            Target::Staged { file, .. } => file.rewind().and_then(|()| file.write_all(bytes)),
             Target::Direct(_) => Err(io::ErrorKind::NotSeekable.into()),
         };
         rewritten.map_err(|e| IoError::write(&self.shown, e))
@@ -134,23 +144,36 @@ impl StagedOutput {
     /// Ends the file and moves it to its destination.
     ///
     /// # Errors
-    /// [`IoError`] if the system refuses; then no part of it is left.
-    pub fn finish(self) -> Result<(), IoError> {
-        let ended = match self.target {
-            Target::Staged(file) => match file.into_inner() {
-                Ok(file) => place(file, &self.place),
-                Err(e) => Err(e.into_error()),
-            },
-            Target::Direct(mut file) => file.flush(),
+    /// [`IoError`] if the system refuses, or if something appeared there meanwhile; then no part of it is left.
+    pub fn finish(mut self) -> Result<(), IoError> {
+        self.flush()?;
+        let Self { place, shown, target } = self;
+        let Target::Staged { file, replaces } = target else {
+            return Ok(());
         };
-        ended.map_err(|e| IoError::write(&self.shown, e))
+        let fail = |e| IoError::write(&shown, e);
+        let file = file.into_inner().map_err(|e| fail(e.into_error()))?;
+        let file = if replaces {
+            Err(file)
+        } else {
+            match file.persist_noclobber(&place) {
+                Ok(_) => Ok(()),
+                Err(error) if error.error.kind() == io::ErrorKind::AlreadyExists => {
+                    return Err(IoError::Exists {
+                        path: shown,
+                        what: "appeared while this run was going on".to_owned(),
+                    });
+                }
+                // Not every file system can do that.
+                Err(error) => Err(error.file),
+            }
+        };
+        if let Err(file) = file {
+            file.persist(&place).map_err(|e| fail(e.error))?;
+        }
+        sync_folder(parent(&place));
+        Ok(())
     }
-}
-
-fn write_through(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut file = File::options().write(true).open(path)?;
-    file.write_all(bytes)?;
-    file.flush()
 }
 
 /// Flushes a rename to disk.
@@ -165,9 +188,10 @@ pub(super) fn sync_folder(folder: &Path) {
 ///
 /// # Errors
 /// [`IoError`] as [`write_file`] and [`to_json`].
-pub fn write_json(path: impl AsRef<Path>, value: &impl Serialize) -> Result<(), IoError> {
-    let path = path.as_ref();
-    write_file(path, &to_json(path, value)?)
+pub fn write_json(out: impl Into<Output>, value: &impl Serialize) -> Result<(), IoError> {
+    let out = out.into();
+    let bytes = to_json(out.path(), value)?;
+    write_file(out, &bytes)
 }
 
 /// SHA-256 of some bytes, in hexadecimal.
@@ -201,6 +225,7 @@ fn hexadecimal(bytes: &[u8]) -> String {
 mod tests {
     use super::*;
     use crate::read_json;
+    use std::fs;
 
     fn names(folder: &Path) -> Vec<String> {
         let entries = fs::read_dir(folder).expect("folder");
@@ -213,7 +238,9 @@ mod tests {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("a.json");
         write_json(&path, &[1.0, f64::NAN]).expect("written");
-        write_json(&path, &[2.5, f64::INFINITY]).expect("written again");
+        let error = write_json(&path, &[2.5]).expect_err("it is nothing that can be told");
+        assert!(matches!(error, IoError::Exists { .. }), "{error}");
+        write_json(Output::new(&path).replacing(true), &[2.5, f64::INFINITY]).expect("written again");
         let back: Vec<Option<f64>> = read_json(&path).expect("read");
         assert_eq!(back, [Some(2.5), None]);
         assert_eq!(names(folder.path()), ["a.json"]);
@@ -227,9 +254,36 @@ mod tests {
         assert_eq!(error.exit_code(), 3);
         assert!(error.to_string().contains("place.txt"));
         let error = write_file(folder.path(), b"").expect_err("a folder");
-        assert!(matches!(error, IoError::Write { .. }));
+        assert!(matches!(error, IoError::Foreign { .. }));
         let error = read_json::<u8>(folder.path().join("none.json")).expect_err("no file");
         assert!(matches!(error, IoError::Read { .. }));
+    }
+
+    #[test]
+    fn several_files_appear_together_or_not_at_all() {
+        let folder = tempfile::tempdir().expect("folder");
+        let at = |name: &str| Output::new(folder.path().join(name));
+        let fine = (at("a"), b"a".to_vec());
+        let missing = (at("no/such/b"), b"b".to_vec());
+        write_files(&[fine.clone(), missing]).expect_err("no folder");
+        let error = write_files(&[fine.clone(), fine.clone()]).expect_err("the same place");
+        assert!(error.to_string().contains("written twice"), "{error}");
+        assert!(names(folder.path()).is_empty());
+        write_files(&[fine, (at("b"), b"b".to_vec())]).expect("written");
+        assert_eq!(names(folder.path()).len(), 2);
+    }
+
+    #[test]
+    fn what_appears_meanwhile_is_not_written_over() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("a.json");
+        let mut file = StagedOutput::create(&path, &Content::Score).expect("nothing there");
+        file.write(b"{}").expect("written");
+        fs::write(&path, "mine").expect("written");
+        let error = file.finish().expect_err("it appeared");
+        assert!(matches!(error, IoError::Exists { .. }), "{error}");
+        assert_eq!(fs::read(&path).expect("there"), b"mine");
+        assert_eq!(names(folder.path()), ["a.json"]);
     }
 
     /// The device that is always full is used for the disk.

@@ -2,7 +2,7 @@
 //!
 //! A dataset is a folder ([`dataset`]) whose observations are a recording in the Robot Operating System's
 //! format ([`recording`], [`playback`]), readable by third-party tools. Every output is written completely or not
-//! at all ([`file`](mod@file), [`folder`]); every error names the file ([`error`]).
+//! at all ([`file`](mod@file), [`folder`]), and over nothing that is not a result of the same kind ([`output`]); every error names the file ([`error`]).
 
 #[cfg(feature = "recording")]
 mod blocks;
@@ -12,6 +12,8 @@ mod bodies;
 mod capture;
 #[cfg(feature = "recording")]
 mod container;
+#[cfg(feature = "recording")]
+pub mod content;
 pub mod error;
 mod extension;
 #[cfg(feature = "recording")]
@@ -19,6 +21,11 @@ pub mod file;
 #[cfg(feature = "recording")]
 pub mod folder;
 pub mod json;
+#[cfg(feature = "recording")]
+mod leftovers;
+pub mod names;
+#[cfg(feature = "recording")]
+pub mod output;
 pub mod paths;
 
 #[cfg(feature = "recording")]
@@ -81,16 +88,20 @@ pub mod results;
 pub mod schema;
 
 #[cfg(feature = "recording")]
+pub use content::Content;
+#[cfg(feature = "recording")]
 pub use dataset::{
     DatasetWriter, parse_dataset, parse_manifest, parse_session, read_dataset, read_dataset_with,
     read_session,
 };
 pub use error::IoError;
 #[cfg(feature = "recording")]
-pub use file::{StagedOutput, write_file, write_json};
+pub use file::{StagedOutput, write_file, write_files, write_json};
 pub use json::read_json;
 #[cfg(feature = "recording")]
 pub use manifest::{Manifest, Provenance};
+#[cfg(feature = "recording")]
+pub use output::Output;
 #[cfg(feature = "recording")]
 pub use playback::read_recording;
 #[cfg(feature = "recording")]

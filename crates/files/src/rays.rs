@@ -1,9 +1,12 @@
 //! Rays from CSV (`x_m,y_m,z_m,dx,dy,dz`) or NumPy (N × 6), read in batches; and their paths, written the same way.
 
+use super::content::Content;
 use super::error::IoError;
 use super::extension::{by_extension, listed};
 use super::file::StagedOutput;
+use super::names::defused;
 use super::npy::{self, Float};
+use super::output::Output;
 use super::paths::unread;
 use catoptric_cast::Ray;
 use catoptric_model::limits::FAR_M;
@@ -306,9 +309,14 @@ impl PathWriter {
     ///
     /// # Errors
     /// [`IoError`] if the system refuses or the extension is unknown.
-    pub fn create(path: &Path) -> Result<Self, IoError> {
-        let format = Format::of(path)?;
-        let mut output = StagedOutput::create(path)?;
+    pub fn create(out: impl Into<Output>) -> Result<Self, IoError> {
+        let out = out.into();
+        let format = Format::of(out.path())?;
+        let content = match format {
+            Format::Csv => Content::of(PATH_HEADER.as_bytes()),
+            Format::Npy => Content::Array(PATH_COLUMNS),
+        };
+        let mut output = StagedOutput::create(out, &content)?;
         match format {
             Format::Csv => output.write(PATH_HEADER.as_bytes())?,
             Format::Npy if !output.is_direct() => output.write(&npy::header(0, PATH_COLUMNS))?,
@@ -390,11 +398,12 @@ pub fn rows(
     }
 }
 
-/// A name as a CSV field, quoted if necessary.
+/// A name as a CSV field: no formula, and quoted if necessary.
 pub fn field(name: &str) -> String {
+    let name = defused(name);
     if name.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", name.replace('"', "\"\""))
     } else {
-        name.to_owned()
+        name.into_owned()
     }
 }

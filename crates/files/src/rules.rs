@@ -2,7 +2,7 @@
 //!
 //! The limits of single numbers stand at their fields, in the schemas of the types.
 
-use super::door::{Content, schema_of};
+use super::door::{Readable, schema_of};
 #[cfg(feature = "recording")]
 use super::manifest::Manifest;
 use catoptric_model::place::{KeyPath, Problem};
@@ -157,7 +157,7 @@ impl Found {
     }
 }
 
-impl Content for Session {
+impl Readable for Session {
     made_once!();
 
     fn problems(&self) -> Vec<Problem> {
@@ -226,7 +226,7 @@ impl Content for Session {
 
 /// Well formed is all that is asked of a calibration here: how plausible it is, and which mistake was made where it is
 /// not, is up to `validate`, which every verdict begins with.
-impl Content for Calibration {
+impl Readable for Calibration {
     made_once!();
 
     fn problems(&self) -> Vec<Problem> {
@@ -250,7 +250,7 @@ impl Content for Calibration {
     }
 }
 
-impl Content for Characterization {
+impl Readable for Characterization {
     made_once!();
 
     fn problems(&self) -> Vec<Problem> {
@@ -275,7 +275,7 @@ impl Content for Characterization {
 }
 
 #[cfg(feature = "recording")]
-impl Content for Manifest {
+impl Readable for Manifest {
     made_once!();
 
     fn problems(&self) -> Vec<Problem> {
@@ -298,7 +298,7 @@ impl Content for Manifest {
 }
 
 #[cfg(feature = "scene")]
-impl Content for catoptric_sim::Truth {
+impl Readable for catoptric_sim::Truth {
     made_once!();
 
     fn problems(&self) -> Vec<Problem> {

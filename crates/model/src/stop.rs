@@ -15,7 +15,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// assert!(worker.check().is_err());
 /// ```
 #[derive(Debug, Clone, Default)]
-pub struct Stop(Arc<AtomicBool>);
+pub struct Stop {
+    own: Arc<AtomicBool>,
+    above: Option<Arc<Stop>>,
+}
 
 /// The work was stopped on request; it has no result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -23,14 +26,33 @@ pub struct Stop(Arc<AtomicBool>);
 pub struct Stopped;
 
 impl Stop {
+    /// A request for a part of the work: made along with this one, and by itself without it.
+    ///
+    /// ```
+    /// # use catoptric_model::Stop;
+    /// let whole = Stop::default();
+    /// let part = whole.part();
+    /// part.request();
+    /// assert!(whole.check().is_ok() && part.check().is_err());
+    /// whole.request();
+    /// assert!(whole.part().check().is_err());
+    /// ```
+    #[must_use]
+    pub fn part(&self) -> Self {
+        Self {
+            own: Arc::default(),
+            above: Some(Arc::new(self.clone())),
+        }
+    }
+
     /// Requests a stop.
     pub fn request(&self) {
-        self.0.store(true, Ordering::SeqCst);
+        self.own.store(true, Ordering::SeqCst);
     }
 
     /// Whether a stop was requested.
     pub fn is_requested(&self) -> bool {
-        self.0.load(Ordering::SeqCst)
+        self.own.load(Ordering::SeqCst) || self.above.as_ref().is_some_and(|above| above.is_requested())
     }
 
     /// Returns an error once a stop was requested.

@@ -1,5 +1,7 @@
 //! Angles of every element of every run, and their table `elements.csv`, which preserves every number exactly.
 
+use catoptric_files::names::{defused, original};
+
 /// Header of `elements.csv`. Angles are in degrees.
 pub const ELEMENTS_HEADER: [&str; 8] = [
     "cell",
@@ -51,7 +53,7 @@ pub fn elements_to_csv(elements: &[ElementAngles]) -> String {
         let _ = writer.write_record([
             e.cell.to_string(),
             e.seed.to_string(),
-            e.method.clone(),
+            defused(&e.method).into_owned(),
             e.beam.to_string(),
             azimuth,
             elevation,
@@ -89,7 +91,7 @@ fn parsed(record: &csv::StringRecord) -> Option<ElementAngles> {
     Some(ElementAngles {
         cell: record.get(0)?.parse().ok()?,
         seed: record.get(1)?.parse().ok()?,
-        method: record.get(2)?.to_owned(),
+        method: original(record.get(2)?).to_owned(),
         beam: record.get(3)?.parse().ok()?,
         estimate: [angle(4)?, angle(5)?],
         truth: [angle(6)?, angle(7)?],
@@ -105,7 +107,7 @@ mod tests {
         let element = ElementAngles {
             cell: 2,
             seed: 3,
-            method: "mine, with \"words\"".to_owned(),
+            method: "=mine, with \"words\"".to_owned(),
             beam: 700,
             estimate: [179.9, 0.1 + 0.2],
             truth: [-179.9, 1.0 / 3.0],

@@ -1,21 +1,19 @@
 //! A study in a folder: tables of its runs, by chunks during the study, of all runs at the end. Existing results are not
 //! computed again, so an interrupted study resumes.
 
+pub use super::names::{PAGE, PLAN, RESULT, SPREAD};
 use super::plan::Plan;
 use super::{
     ElementAngles, Job, Part, Run, Study, StudyError, Summary, elements_from_csv, elements_to_csv, from_csv,
     in_order, merge, run_with_elements, spread, spread_to_csv, to_csv,
 };
-use catoptric_files::{IoError, write_file, write_json};
+use catoptric_files::json::to_json;
+use catoptric_files::names::{defused, original};
+use catoptric_files::{IoError, Output, write_files};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-
-/// File name of the result.
-pub const RESULT: &str = "study.json";
-/// File name of the table of the scatter of elements.
-pub const SPREAD: &str = "spread.csv";
 
 /// Number of experiments between two files on disk: the most that an interruption can cost.
 const CHUNK: usize = 32;
@@ -97,16 +95,21 @@ impl Tables {
         }
     }
 
-    /// Writes the tables, the runs last.
+    /// Writes the tables, all or none, the runs last.
     ///
     /// # Errors
     /// [`StudyError::File`] if writing fails.
     pub fn write(&self, found: &Found) -> Result<(), StudyError> {
-        write_file(&self.times, times_to_csv(&found.times)?.as_bytes())?;
+        Ok(write_files(&self.files(found)?)?)
+    }
+
+    fn files(&self, found: &Found) -> Result<Vec<(Output, Vec<u8>)>, StudyError> {
+        let mut files = vec![((&self.times).into(), times_to_csv(&found.times)?.into_bytes())];
         if let Some(elements) = &found.elements {
-            write_file(&self.elements, elements_to_csv(elements).as_bytes())?;
+            files.push(((&self.elements).into(), elements_to_csv(elements).into_bytes()));
         }
-        Ok(write_file(&self.runs, to_csv(&found.runs).as_bytes())?)
+        files.push(((&self.runs).into(), to_csv(&found.runs).into_bytes()));
+        Ok(files)
     }
 
     /// Reads the tables and checks that the runs are exactly those of the given experiments.
@@ -179,6 +182,10 @@ fn times_to_csv(times: &[Time]) -> Result<String, StudyError> {
     };
     let mut writer = csv::Writer::from_writer(Vec::new());
     for time in times {
+        let time = Time {
+            method: defused(&time.method).into_owned(),
+            ..time.clone()
+        };
         writer.serialize(time).map_err(failed)?;
     }
     let bytes = writer.into_inner().unwrap_or_default();
@@ -186,10 +193,17 @@ fn times_to_csv(times: &[Time]) -> Result<String, StudyError> {
 }
 
 fn times_from_csv(text: &str) -> Result<Vec<Time>, String> {
+    let read = |time: Result<Time, csv::Error>| {
+        let time = time.map_err(|e| e.to_string())?;
+        Ok(Time {
+            method: original(&time.method).to_owned(),
+            ..time
+        })
+    };
     csv::Reader::from_reader(text.as_bytes())
         .deserialize()
-        .collect::<Result<_, _>>()
-        .map_err(|e| e.to_string())
+        .map(read)
+        .collect()
 }
 
 /// Runs a part of a study in a folder that is new or contains the same part; existing runs are not repeated.
@@ -200,14 +214,15 @@ fn times_from_csv(text: &str) -> Result<Vec<Time>, String> {
 /// # Errors
 /// [`StudyError`]; after [`Stopped`](StudyError::Stopped) the folder keeps the finished experiments.
 pub fn run_in(
-    folder: &Path,
+    out: &Output,
     study: &Study,
     part: Part,
     with_elements: bool,
     done: &dyn Fn(usize, usize),
 ) -> Result<(Plan, Found), StudyError> {
     let plan = Plan::of(study, part)?;
-    plan.claim(folder)?;
+    plan.claim(out)?;
+    let folder = out.path();
     let jobs = study.jobs_of_part(part);
     let tables = Tables::of(folder);
     // Once requested, they belong to the study.
@@ -233,19 +248,34 @@ pub fn run_in(
 }
 
 /// Runs a chunk of experiments. None of its results are kept if the study is stopped meanwhile: programs are terminated
-/// then, which must not count as their failure.
+/// then, which must not count as their failure. An experiment that fails stops the others.
 fn experiments(study: &Study, chunk: &[Job], with_elements: bool) -> Result<Found, StudyError> {
-    let one = |job: &Job| {
-        study.stop.check()?;
-        Ok::<(Vec<Run>, Vec<ElementAngles>), StudyError>(run_with_elements(study, *job)?)
+    let part = Study {
+        stop: study.stop.part(),
+        ..study.clone()
     };
-    let (runs, elements): (Vec<_>, Vec<_>) = chunk
-        .par_iter()
-        .map(one)
+    let one = |job: &Job| {
+        let ended = part
+            .stop
+            .check()
+            .map_err(StudyError::from)
+            .and_then(|()| Ok(run_with_elements(&part, *job)?));
+        if ended.is_err() {
+            part.stop.request();
+        }
+        ended
+    };
+    let ended: Vec<Result<_, StudyError>> = chunk.par_iter().map(one).collect();
+    study.stop.check()?;
+    let stopped = |ended: &Result<_, StudyError>| matches!(ended, Err(StudyError::Stopped(_)));
+    // What was stopped was stopped by the failure of another.
+    let (stopped, ended): (Vec<_>, Vec<_>) = ended.into_iter().partition(stopped);
+    let (runs, elements): (Vec<_>, Vec<_>) = ended
+        .into_iter()
+        .chain(stopped)
         .collect::<Result<Vec<_>, StudyError>>()?
         .into_iter()
         .unzip();
-    study.stop.check()?;
     let runs = runs.concat();
     Ok(Found {
         times: times(&runs),
@@ -254,8 +284,8 @@ fn experiments(study: &Study, chunk: &[Job], with_elements: bool) -> Result<Foun
     })
 }
 
-/// Writes the tables and the result, the summary of the runs found, and removes the tables of chunks; the returned summary
-/// includes the durations.
+/// Writes the tables and the result, the summary of the runs found, together with some other files, all or none, and
+/// removes the tables of chunks; the returned summary includes the durations.
 ///
 /// # Errors
 /// [`StudyError::File`] if writing fails.
@@ -264,12 +294,17 @@ pub fn finish(
     study: &Study,
     found: &Found,
     mut summary: Summary,
+    mut files: Vec<(Output, Vec<u8>)>,
 ) -> Result<Summary, StudyError> {
     if let Some(elements) = &found.elements {
-        write_file(folder.join(SPREAD), spread_to_csv(&spread(elements)).as_bytes())?;
+        let table = spread_to_csv(&spread(elements)).into_bytes();
+        files.push((folder.join(SPREAD).into(), table));
     }
-    Tables::of(folder).write(found)?;
-    write_json(folder.join(RESULT), &summary)?;
+    files.extend(Tables::of(folder).files(found)?);
+    let result = folder.join(RESULT);
+    let bytes = to_json(&result, &summary)?;
+    files.push((result.into(), bytes));
+    write_files(&files)?;
     let chunks = found.runs.len().div_ceil(CHUNK);
     for number in 0..chunks {
         Tables::of_chunk(folder, number).remove()?;

@@ -32,10 +32,14 @@ mod error;
 pub mod folder;
 mod grid;
 mod merge;
+#[cfg(feature = "recording")]
+mod names;
 mod oracle;
 mod part;
 #[cfg(feature = "recording")]
 mod plan;
+#[cfg(feature = "recording")]
+mod process;
 #[cfg(feature = "recording")]
 mod program;
 mod run;
@@ -54,6 +58,8 @@ pub use oracle::Oracle;
 pub use part::Part;
 #[cfg(feature = "recording")]
 pub use plan::Plan;
+#[cfg(feature = "recording")]
+pub use process::end_programs;
 #[cfg(feature = "recording")]
 pub use program::Program;
 #[cfg(feature = "testing")]

@@ -1,13 +1,13 @@
 //! The plan of a study, written to its folder: what was requested, by which folders are recognized as parts of one study.
 
+use super::names::{PLAN as FILE, remove_study};
 use super::{Cell, Contestant, Part, Program, SCHEMA_VERSION, Study, StudyError};
+use catoptric_files::folder::clear_leftovers;
 use catoptric_files::scene::{self, Template};
-use catoptric_files::{IoError, file, read_json, write_json};
+use catoptric_files::{IoError, Output, file, read_json, write_json};
 use catoptric_model::Stop;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-
-const FILE: &str = "plan.json";
 
 /// A study and a part of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -77,23 +77,28 @@ impl Plan {
         Ok(read_json(folder.join(FILE))?)
     }
 
-    /// Claims a folder that is new, or belongs to the same part of the same study.
+    /// Claims a folder that is new, or belongs to the same part of the same study; on request also one of another study,
+    /// which is removed.
     ///
     /// # Errors
     /// [`StudyError::Invalid`] if the folder contains something else, [`StudyError::File`] if writing fails.
-    pub fn claim(&self, out: &Path) -> Result<(), StudyError> {
+    pub fn claim(&self, place: &Output) -> Result<(), StudyError> {
+        let out = place.path();
+        clear_leftovers(out);
         if out.join(FILE).exists() {
-            let there = Self::read(out)?;
-            if there == *self {
+            let there = Self::read(out);
+            if matches!(&there, Ok(there) if there == self) {
                 return Ok(());
             }
-            let what = there.difference(self);
-            return Err(StudyError::invalid(
-                format!("{} contains another study: {what}", out.display()),
-                "choose another --out, or give the same arguments to resume it",
-            ));
-        }
-        if out.read_dir().is_ok_and(|mut entries| entries.next().is_some()) {
+            if !place.replaces() {
+                let what = there?.difference(self);
+                return Err(StudyError::invalid(
+                    format!("{} contains another study: {what}", out.display()),
+                    "choose another --out, give the same arguments to resume it, or --replace to begin anew",
+                ));
+            }
+            remove_study(out)?;
+        } else if out.read_dir().is_ok_and(|mut entries| entries.next().is_some()) {
             return Err(StudyError::invalid(
                 format!("{} is not empty and contains no study", out.display()),
                 "choose another --out",

@@ -1,19 +1,17 @@
 //! Third-party calibrators as programs: each is given the folder of a blind dataset and writes `calibration.json`.
 
+use super::process::{self, Ended};
 use crate::validate::{Severity, validate};
-use catoptric_files::{dataset::DatasetWriter, manifest::Provenance};
+use catoptric_files::{dataset::DatasetWriter, folder::WorkFolder, manifest::Provenance};
 use catoptric_model::{Calibration, Stop};
 use catoptric_sim::{Laboratory, noise};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
 /// Maximum number of characters quoted from a program's output.
 const QUOTED: usize = 300;
-
-/// Interval at which a program is polled for its end.
-const POLL: Duration = Duration::from_millis(20);
 
 /// A calibration program and its command line.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -24,16 +22,34 @@ pub struct Program {
     /// Words of the command; `{dataset}` and `{out}` are replaced by the folder and by the file to write, and appended
     /// if no word contains them.
     pub command: Vec<String>,
-    /// Time limit, in seconds. The program is killed then, on Unix along with its child processes.
+    /// Time limit, in seconds. The program is ended then, on Unix along with its child processes: it is asked to end, and
+    /// killed soon after.
     pub timeout_s: u64,
 }
 
 impl Program {
-    /// Parses `NAME=COMMAND`, splitting the command at spaces; `None` without a name or a command.
-    pub fn parse(text: &str, timeout_s: u64) -> Option<Self> {
-        let (name, command) = text.split_once('=')?;
-        let command: Vec<String> = command.split_whitespace().map(str::to_owned).collect();
-        (!name.is_empty() && !command.is_empty()).then(|| Self {
+    /// Parses `NAME=COMMAND`. The command is split into words as a shell does, with quotes and backslashes, but nothing in
+    /// it is expanded.
+    ///
+    /// ```
+    /// use catoptric_assess::study::Program;
+    /// let program = Program::parse("mine='my python' my\\ script.py {dataset}", 60)?;
+    /// assert_eq!(program.command, ["my python", "my script.py", "{dataset}"]);
+    /// # Ok::<(), String>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As text: there is no name or no command, or a quote does not end.
+    pub fn parse(text: &str, timeout_s: u64) -> Result<Self, String> {
+        let (name, command) = match text.split_once('=') {
+            Some((name, command)) if !name.is_empty() => (name, command),
+            _ => return Err("expected NAME=COMMAND".to_owned()),
+        };
+        let command = shlex::split(command).ok_or("a quote in the command does not end")?;
+        if command.first().is_none_or(String::is_empty) {
+            return Err("expected NAME=COMMAND, and there is no command".to_owned());
+        }
+        Ok(Self {
             name: name.to_owned(),
             command,
             timeout_s,
@@ -41,13 +57,14 @@ impl Program {
     }
 
     /// Records an experiment into a temporary folder, without its truth, and runs the program on it. Once `stop` is
-    /// requested, the program is killed.
+    /// requested, the program is ended.
     ///
     /// # Errors
     /// As text independent of the path of the folder: the program cannot be started, fails, exceeds its time limit, or
     /// does not write a valid calibration.
     pub fn calibrate(&self, laboratory: &Laboratory, stop: &Stop) -> Result<Calibration, String> {
-        let folder = tempfile::tempdir().map_err(|e| format!("no folder can be created for it: {e}"))?;
+        let folder =
+            WorkFolder::create("study").map_err(|e| format!("no folder can be created for it: {e}"))?;
         self.calibrate_in(folder.path(), laboratory, stop)
             .map_err(|words| shortened(&anywhere(folder.path(), words)))
     }
@@ -99,53 +116,16 @@ impl Program {
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(errors);
-        let mut child = spawn(&mut command).map_err(|e| format!("{:?} cannot be started: {e}", words[0]))?;
-        let begin = Instant::now();
-        let status = loop {
-            match child.try_wait() {
-                Ok(Some(status)) => break status,
-                Ok(None) if stop.is_requested() => {
-                    end(&mut child);
-                    return Err("it was stopped".to_owned());
-                }
-                Ok(None) if begin.elapsed() > Duration::from_secs(self.timeout_s) => {
-                    end(&mut child);
-                    return Err(format!("it did not end within {} s", self.timeout_s));
-                }
-                Ok(None) => std::thread::sleep(POLL),
-                Err(e) => return Err(format!("it cannot be waited for: {e}")),
-            }
-        };
-        if status.success() {
-            return Ok(());
+        let limit = Duration::from_secs(self.timeout_s);
+        let ended = process::run(&mut command, limit, stop)
+            .map_err(|e| format!("{:?} cannot be started: {e}", self.command[0]))?;
+        match ended {
+            Ended::Alone(status) if status.success() => Ok(()),
+            Ended::Alone(status) => Err(format!("it ended with {status}{}", last_words(said))),
+            Ended::Stopped => Err("it was stopped".to_owned()),
+            Ended::TimedOut => Err(format!("it did not end within {} s", self.timeout_s)),
         }
-        Err(format!("it ended with {status}{}", last_words(said)))
     }
-}
-
-/// Starts a program as the leader of a new process group, so that its child processes can be killed with it.
-#[cfg(unix)]
-fn spawn(command: &mut Command) -> std::io::Result<Child> {
-    use std::os::unix::process::CommandExt;
-    command.process_group(0).spawn()
-}
-
-#[cfg(not(unix))]
-fn spawn(command: &mut Command) -> std::io::Result<Child> {
-    command.spawn()
-}
-
-/// Kills a program and its process group. It has not been waited for, so its process ID is still valid.
-fn end(child: &mut Child) {
-    #[cfg(unix)]
-    if let Ok(group) = i32::try_from(child.id()) {
-        use nix::sys::signal::{Signal, killpg};
-        // The group may be empty already.
-        let _ = killpg(nix::unistd::Pid::from_raw(group), Signal::SIGKILL);
-    }
-    // It may just have ended on its own.
-    let _ = child.kill();
-    let _ = child.wait();
 }
 
 /// Returns what a program wrote to standard error.
@@ -162,15 +142,17 @@ fn last_words(mut said: std::fs::File) -> String {
     }
 }
 
-/// Replaces the path of the temporary folder in a text, so that the same failure reads the same in every run.
+/// Takes the path of the temporary folder out of a text, so that the same failure reads the same in every run: what is in
+/// it is named by its name.
 fn anywhere(folder: &Path, words: String) -> String {
     let real = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
     let mut words = words;
     for place in [real.as_path(), folder] {
-        for (file, key) in [("dataset", "{dataset}"), ("calibration.json", "{out}")] {
-            words = words.replace(place.join(file).to_string_lossy().as_ref(), key);
-        }
-        words = words.replace(place.to_string_lossy().as_ref(), "{folder}");
+        let place = place.to_string_lossy();
+        let inside = format!("{place}{}", std::path::MAIN_SEPARATOR);
+        words = words
+            .replace(&inside, "")
+            .replace(place.as_ref(), "its temporary folder");
     }
     words
 }
@@ -213,7 +195,7 @@ mod tests {
             "no /folder/of-random/dataset/x,\n no /folder/of-random/calibration.json, no /folder/of-random/y"
                 .to_owned();
         let said = shortened(&anywhere(folder, words));
-        assert_eq!(said, "no {dataset}/x, no {out}, no {folder}/y");
+        assert_eq!(said, "no dataset/x, no calibration.json, no y");
         let long = shortened(&format!("ended: {}why", "word ".repeat(200)));
         assert!(
             long.starts_with("ended: word")
@@ -238,10 +220,34 @@ mod tests {
     fn a_program_has_a_name_and_a_command() {
         let program = Program::parse("mine=python3 a.py --data={dataset}", 5).expect("it has both");
         assert_eq!((program.name.as_str(), program.command.len()), ("mine", 3));
-        assert!(
-            ["mine", "=true", "mine=", "mine=  "]
-                .iter()
-                .all(|t| Program::parse(t, 5).is_none())
+        for (text, why) in [
+            ("mine", "expected NAME=COMMAND"),
+            ("=true", "expected NAME=COMMAND"),
+            ("mine=", "no command"),
+            ("mine=  ", "no command"),
+            ("mine=''", "no command"),
+            ("mine=python3 'a b", "does not end"),
+        ] {
+            let error = Program::parse(text, 5).expect_err(text);
+            assert!(error.contains(why), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn words_are_split_as_a_shell_does_and_places_may_hold_spaces() {
+        let text = r#"mine="/opt/my python" -c 'print("a  b")' two\ words --data={dataset}"#;
+        let program = Program::parse(text, 5).expect("it has a command");
+        let words = program.words(Path::new("/my data"), Path::new("/my out"));
+        assert_eq!(
+            words,
+            [
+                "/opt/my python",
+                "-c",
+                "print(\"a  b\")",
+                "two words",
+                "--data=/my data",
+                "/my out"
+            ]
         );
     }
 }

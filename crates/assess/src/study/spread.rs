@@ -1,6 +1,7 @@
 //! Scatter of the angles of each element over the trials of a study, as in the paper's Figure 10.
 
 use super::ElementAngles;
+use catoptric_files::names::defused;
 use std::collections::BTreeMap;
 
 /// Header of `spread.csv`. Angles are in degrees.
@@ -87,7 +88,7 @@ pub fn spread_to_csv(spreads: &[Spread]) -> String {
     for s in spreads {
         let mut row = vec![
             s.cell.to_string(),
-            s.method.clone(),
+            defused(&s.method).into_owned(),
             s.beam.to_string(),
             s.trials.to_string(),
         ];

@@ -1,6 +1,7 @@
 //! Runs as rows of a CSV table, which preserves every number exactly.
 
 use super::Run;
+use catoptric_files::names::{defused, original};
 
 /// Header of `runs.csv`. Squares are in rad², errors in radians.
 pub const HEADER: [&str; 18] = [
@@ -41,7 +42,7 @@ fn row(r: &Run) -> [String; 18] {
     [
         r.cell.to_string(),
         r.seed.to_string(),
-        r.method.clone(),
+        defused(&r.method).into_owned(),
         r.solved.to_string(),
         r.abstained.to_string(),
         r.missed.to_string(),
@@ -55,8 +56,8 @@ fn row(r: &Run) -> [String; 18] {
         number(r.up),
         number(r.mahalanobis_squared),
         number(r.inside_95),
-        r.warnings.clone(),
-        r.failure.clone(),
+        defused(&r.warnings).into_owned(),
+        defused(&r.failure).into_owned(),
     ]
 }
 
@@ -88,7 +89,7 @@ fn parsed(record: &csv::StringRecord) -> Option<Run> {
     Some(Run {
         cell: count(0)?,
         seed: text(1)?.parse().ok()?,
-        method: text(2)?.to_owned(),
+        method: original(text(2)?).to_owned(),
         solved: count(3)?,
         abstained: count(4)?,
         missed: count(5)?,
@@ -102,8 +103,8 @@ fn parsed(record: &csv::StringRecord) -> Option<Run> {
         up: number(13)?,
         mahalanobis_squared: number(14)?,
         inside_95: number(15)?,
-        warnings: text(16)?.to_owned(),
-        failure: text(17)?.to_owned(),
+        warnings: original(text(16)?).to_owned(),
+        failure: original(text(17)?).to_owned(),
         milliseconds: f64::NAN,
     })
 }

@@ -2,8 +2,9 @@
 
 use crate::{Control, Error, Scene};
 use catoptric_design::layout::{self, Analysis, Detail};
+#[cfg(feature = "report")]
+use catoptric_files::{Content, Output, folder::FolderKind};
 use serde::Serialize;
-use std::path::Path;
 
 /// Options of the analysis of a layout.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -93,19 +94,32 @@ pub fn distinct_names(layouts: &[(&Scene, &Analysis)]) -> Vec<String> {
 /// File name of the page about layouts.
 pub const LAYOUT_PAGE: &str = "report.html";
 
-/// Writes analyses of layouts to a folder: `layout.json`, the pictures and a page.
+/// The folder that [`write_layouts`] writes.
+#[cfg(feature = "report")]
+pub const LAYOUT_FOLDER: FolderKind = FolderKind {
+    what: "a layout",
+    result: ("layout.json", Content::Layout),
+    owns: |name, content| match content {
+        Content::Layout => name == "layout.json",
+        Content::Page => name == LAYOUT_PAGE,
+        Content::Svg => name.ends_with(".svg"),
+        Content::Png => name.ends_with("perspective.png"),
+        _ => false,
+    },
+};
+
+/// Writes analyses of layouts as a folder: `layout.json`, the pictures and a page. An earlier one is replaced as a whole.
 ///
 /// # Errors
 /// [`Error::Setup`] if a scene cannot be set up, [`Error::File`] if writing fails, [`Error::Stopped`].
 #[cfg(feature = "report")]
 pub fn write_layouts(
     layouts: &[(&Scene, &Analysis)],
-    out: impl AsRef<Path>,
+    out: impl Into<Output>,
     control: &Control,
 ) -> Result<(), Error> {
-    use catoptric_files::{IoError, write_file};
     use catoptric_report::Drawn;
-    let out = out.as_ref();
+    let out = out.into();
     let draw = |(scene, analysis): &(&Scene, &Analysis)| {
         control.check()?;
         Ok(Drawn::new(scene.resolved(), analysis)?)
@@ -125,11 +139,11 @@ pub fn write_layouts(
     let page = catoptric_report::layout(&drawn);
     // From here on, everything is written.
     control.check()?;
-    std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
+    let folder = LAYOUT_FOLDER.create(&out)?;
     for (name, bytes) in pictures {
-        write_file(out.join(name), &bytes)?;
+        folder.write(&name, &bytes)?;
     }
-    write_file(out.join(LAYOUT_PAGE), page.as_bytes())?;
-    write_file(out.join("layout.json"), json.as_bytes())?;
-    Ok(())
+    folder.write(LAYOUT_PAGE, page.as_bytes())?;
+    folder.write("layout.json", json.as_bytes())?;
+    Ok(folder.publish()?)
 }

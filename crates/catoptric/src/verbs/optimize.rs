@@ -3,8 +3,13 @@
 use crate::{Control, Error, Scene};
 use catoptric_design::optimize::{LayoutCandidate, Optimum, SearchOptions};
 use catoptric_files::parametric::ParametricScene;
-use catoptric_files::{IoError, scene as scenes, write_file};
-use std::path::Path;
+#[cfg(feature = "report")]
+use catoptric_files::{
+    Content, IoError, Output,
+    folder::{FolderKind, StagedFolder},
+    names::defused,
+    scene as scenes,
+};
 
 /// Maximum number of layouts of the front that are shown and written.
 const SHOWN: usize = 12;
@@ -55,35 +60,50 @@ pub const OPTIMUM_PAGE: &str = "report.html";
 /// File name of the scene of the best layout.
 pub const BEST_SCENE: &str = "best.toml";
 
-/// Writes the result of a search to a folder: `optimum.json`, the front as a table and a picture, a page, and the best
-/// layouts as scenes.
+/// The folder that [`write_optimum`] writes.
+#[cfg(feature = "report")]
+pub const OPTIMUM_FOLDER: FolderKind = FolderKind {
+    what: "the result of a search",
+    result: ("optimum.json", Content::Optimum),
+    owns: |name, content| match content {
+        Content::Optimum => name == "optimum.json",
+        Content::Page => name == OPTIMUM_PAGE,
+        Content::Svg => name == "front.svg",
+        Content::Table(_) => name == "front.csv",
+        Content::Scene => name == BEST_SCENE || name.starts_with("front-"),
+        Content::Mesh => name.starts_with("meshes/"),
+        _ => false,
+    },
+};
+
+/// Writes the result of a search as a folder: `optimum.json`, the front as a table and a picture, a page, and the best
+/// layouts as scenes. An earlier one is replaced as a whole, on request only: its scenes may have been changed.
 ///
 /// # Errors
 /// [`Error::File`] if writing fails.
 #[cfg(feature = "report")]
-pub fn write_optimum(scene: &Scene, found: &Optimum, out: impl AsRef<Path>) -> Result<(), Error> {
-    let out = out.as_ref();
+pub fn write_optimum(scene: &Scene, found: &Optimum, out: impl Into<Output>) -> Result<(), Error> {
     let template = parametric(scene)?;
     let layouts = before_and_after(&template, found)?;
     let json = serde_json::to_string(found).map_err(|e| Error::invalid(e.to_string(), None))? + "\n";
-    std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
+    let folder = OPTIMUM_FOLDER.create(&out.into())?;
     if let Some(best) = &found.best {
-        write_scene(&out.join(BEST_SCENE), &template, best)?;
+        write_scene(&folder, BEST_SCENE, &template, best)?;
     }
     for (number, candidate) in shown_of_front(found).into_iter().enumerate() {
         let name = format!("front-{:02}.toml", number + 1);
-        write_scene(&out.join(name), &template, candidate)?;
+        write_scene(&folder, &name, &template, candidate)?;
     }
-    write_file(out.join("front.csv"), table(found)?.as_slice())?;
+    folder.write("front.csv", table(found)?.as_slice())?;
     if let Some(picture) = catoptric_report::front_picture(found) {
-        write_file(out.join("front.svg"), picture.as_bytes())?;
+        folder.write("front.svg", picture.as_bytes())?;
     }
-    write_file(
-        out.join(OPTIMUM_PAGE),
+    folder.write(
+        OPTIMUM_PAGE,
         catoptric_report::optimum(found, layouts.as_ref()).as_bytes(),
     )?;
-    write_file(out.join("optimum.json"), json.as_bytes())?;
-    Ok(())
+    folder.write("optimum.json", json.as_bytes())?;
+    Ok(folder.publish()?)
 }
 
 /// The layout as drawn and the best one, to be drawn; `None` if there is none, or if it is the drawing.
@@ -107,19 +127,23 @@ fn before_and_after(
     Ok(Some([draw(template.scene(), "as drawn")?, draw(&after, "best")?]))
 }
 
-/// Writes a layout as a scene, along with the meshes it refers to.
-fn write_scene(path: &Path, template: &ParametricScene, candidate: &LayoutCandidate) -> Result<(), Error> {
+/// Writes a layout as a scene, along with the meshes it refers to, which scenes share.
+#[cfg(feature = "report")]
+fn write_scene(
+    folder: &StagedFolder,
+    name: &str,
+    template: &ParametricScene,
+    candidate: &LayoutCandidate,
+) -> Result<(), Error> {
+    let path = folder.shown(name);
     let choice = candidate.choice();
-    let refused = |problems: Vec<String>| IoError::content(path, problems.join("; "));
+    let refused = |problems: Vec<String>| IoError::content(&path, problems.join("; "));
     let found = template.with(&choice).map_err(refused)?;
     let (kept, meshes) = scenes::kept(&found);
-    let folder = path.parent().unwrap_or(Path::new("."));
-    for (name, bytes) in meshes {
-        let mesh = folder.join(name);
-        if let Some(parent) = mesh.parent() {
-            std::fs::create_dir_all(parent).map_err(|e| IoError::write(parent, e))?;
+    for (mesh, bytes) in meshes {
+        if !folder.has(&mesh) {
+            folder.write(&mesh, &bytes)?;
         }
-        write_file(mesh, &bytes)?;
     }
     let text = template
         .text_with(&choice, &kept)
@@ -134,11 +158,11 @@ fn write_scene(path: &Path, template: &ParametricScene, candidate: &LayoutCandid
         template.name(),
         goals.join(", ")
     );
-    write_file(path, text.as_bytes())?;
-    Ok(())
+    Ok(folder.write(name, text.as_bytes())?)
 }
 
 /// Returns the whole front as CSV.
+#[cfg(feature = "report")]
 fn table(found: &Optimum) -> Result<Vec<u8>, Error> {
     let failed = |e: csv::Error| Error::invalid(format!("the front cannot be written: {e}"), None);
     let mut writer = csv::Writer::from_writer(Vec::new());
@@ -147,6 +171,7 @@ fn table(found: &Optimum) -> Result<Vec<u8>, Error> {
     let heading: Vec<String> = std::iter::once("number".to_owned())
         .chain(goals())
         .chain(parameters())
+        .map(|name| defused(&name).into_owned())
         .collect();
     writer.write_record(heading).map_err(failed)?;
     for candidate in &found.front {

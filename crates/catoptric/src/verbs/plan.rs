@@ -145,13 +145,26 @@ pub fn completed_scene(scene: &Scene, dataset: &Dataset, plan: &Plan) -> catoptr
 /// Writes a planned scene; if it moves to another folder, its meshes are referred to by their absolute paths.
 ///
 /// # Errors
-/// [`Error::File`] if it has no TOML form or writing fails.
-pub fn write_planned(mut planned: catoptric_sim::Scene, from: &Path, out: &Path) -> Result<(), Error> {
-    use catoptric_files::{IoError, write_file};
+/// [`Error::File`] if it has no TOML form, a file is there already, or writing fails.
+pub fn write_planned(
+    planned: catoptric_sim::Scene,
+    from: &Path,
+    out: impl Into<catoptric_files::Output>,
+) -> Result<(), Error> {
+    let out = out.into();
+    let text = planned_text(planned, from, out.path())?;
+    Ok(catoptric_files::write_file(out, text.as_bytes())?)
+}
+
+/// The text that [`write_planned`] writes.
+///
+/// # Errors
+/// [`Error::File`] if it has no TOML form.
+pub fn planned_text(mut planned: catoptric_sim::Scene, from: &Path, out: &Path) -> Result<String, Error> {
+    use catoptric_files::IoError;
     let folder = out.parent().filter(|p| !p.as_os_str().is_empty());
     move_meshes(&mut planned, from, folder.unwrap_or(Path::new(".")))?;
-    let text = scenes::to_toml(&planned).map_err(|e| IoError::content(out, e.to_string()))?;
-    Ok(write_file(out, text.as_bytes())?)
+    Ok(scenes::to_toml(&planned).map_err(|e| IoError::content(out, e.to_string()))?)
 }
 
 fn move_meshes(scene: &mut catoptric_sim::Scene, from: &Path, to: &Path) -> Result<(), Error> {

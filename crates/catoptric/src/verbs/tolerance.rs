@@ -3,9 +3,10 @@
 use crate::{Control, Error, Scene};
 use catoptric_design::layout::{self, Requirement};
 use catoptric_design::tolerance::{self, Bounds, Calibrated, Tolerance, Workshop};
+#[cfg(feature = "report")]
+use catoptric_files::{Content, Output, folder::FolderKind};
 use catoptric_sim::SimError;
 use rayon::prelude::*;
-use std::path::Path;
 
 /// Number of structures between two progress reports.
 const CHUNK: usize = 16;
@@ -113,22 +114,30 @@ fn each<T: Send>(
 /// File name of the page about tolerances.
 pub const TOLERANCE_PAGE: &str = "report.html";
 
-/// Writes an analysis to a folder: `tolerance.json`, the plot and a page.
+/// The folder that [`write_tolerance`] writes.
+#[cfg(feature = "report")]
+pub const TOLERANCE_FOLDER: FolderKind = FolderKind {
+    what: "an analysis of tolerances",
+    result: ("tolerance.json", Content::Tolerance),
+    owns: |name, content| match content {
+        Content::Tolerance => name == "tolerance.json",
+        Content::Page => name == TOLERANCE_PAGE,
+        Content::Svg => name == "directions.svg",
+        _ => false,
+    },
+};
+
+/// Writes an analysis as a folder: `tolerance.json`, the plot and a page. An earlier one is replaced as a whole.
 ///
 /// # Errors
 /// [`Error::File`] if writing fails.
 #[cfg(feature = "report")]
-pub fn write_tolerance(found: &Tolerance, out: impl AsRef<Path>) -> Result<(), Error> {
-    use catoptric_files::{IoError, write_file};
-    let out = out.as_ref();
+pub fn write_tolerance(found: &Tolerance, out: impl Into<Output>) -> Result<(), Error> {
     let json = serde_json::to_string(found).map_err(|e| Error::invalid(e.to_string(), None))? + "\n";
-    std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
+    let folder = TOLERANCE_FOLDER.create(&out.into())?;
     let plot = catoptric_report::tolerance_plot(found);
-    write_file(out.join("directions.svg"), plot.as_bytes())?;
-    write_file(
-        out.join(TOLERANCE_PAGE),
-        catoptric_report::tolerance(found).as_bytes(),
-    )?;
-    write_file(out.join("tolerance.json"), json.as_bytes())?;
-    Ok(())
+    folder.write("directions.svg", plot.as_bytes())?;
+    folder.write(TOLERANCE_PAGE, catoptric_report::tolerance(found).as_bytes())?;
+    folder.write("tolerance.json", json.as_bytes())?;
+    Ok(folder.publish()?)
 }

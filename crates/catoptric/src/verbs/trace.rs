@@ -1,6 +1,7 @@
 //! Tracing of arbitrary rays through a scene, from a file of rays to a file of paths.
 
 use crate::{Control, Error, Scene};
+use catoptric_files::Output;
 use catoptric_files::rays::{PathWriter, RayReader, field, rows};
 use catoptric_sim::trace::{Fate, Scenery};
 use rayon::prelude::*;
@@ -53,18 +54,18 @@ struct Traced {
 pub fn trace(
     scene: &Scene,
     rays: impl AsRef<Path>,
-    out: impl AsRef<Path>,
+    out: impl Into<Output>,
     max_bounces: u16,
     control: &Control,
 ) -> Result<TraceFigures, Error> {
-    let (rays, out) = (rays.as_ref(), out.as_ref());
+    let (rays, out) = (rays.as_ref(), out.into().sparing([rays.as_ref()]));
     control.run(|| trace_files(scene, rays, out, max_bounces, control))
 }
 
 fn trace_files(
     scene: &Scene,
     rays: &Path,
-    out: &Path,
+    out: catoptric_files::Output,
     max_bounces: u16,
     control: &Control,
 ) -> Result<TraceFigures, Error> {

@@ -5,6 +5,7 @@
 //! corrected, selected or omitted: the statistics are over all readings that are ranges.
 
 use catoptric_calib::observations::{BoardInSensor, azimuth};
+use catoptric_files::names::defused;
 use catoptric_model::beam::direction;
 use catoptric_model::{Dataset, Pose, PoseKind, PoseRecord};
 use nalgebra::{Point3, Unit, Vector3};
@@ -117,9 +118,9 @@ fn write_board(
         let row = [
             kind.to_owned(),
             label.pose.to_string(),
-            label.board.clone().unwrap_or_default(),
-            board.color.clone(),
-            label.facet.clone().unwrap_or_default(),
+            defused(label.board.as_deref().unwrap_or_default()).into_owned(),
+            defused(&board.color).into_owned(),
+            defused(label.facet.as_deref().unwrap_or_default()).into_owned(),
             beam.to_string(),
             u8::from(scan.holds(own, beam)).to_string(),
             azimuth(session, beam).to_string(),

@@ -2,6 +2,7 @@
 
 use crate::layout::{Drawing, plate_thickness};
 use catoptric_cast::area_vector;
+use catoptric_files::names::defused;
 use catoptric_sim::Scene;
 
 /// Columns of the table; tolerances are 1σ.
@@ -68,7 +69,7 @@ pub fn drawing_table(scene: &Scene, drawing: &Drawing) -> Result<Vec<u8>, csv::E
                 as_built.slope_rms_mrad,
                 superstructure.mirror.reflectivity,
             ];
-            let mut row = vec![facet.name.clone(), (number + 1).to_string()];
+            let mut row = vec![defused(&facet.name).into_owned(), (number + 1).to_string()];
             row.extend(numbers.map(|n| rounded(n).to_string()));
             writer.write_record(&row)?;
         }

@@ -177,7 +177,7 @@ fn only_datasets_are_replaced_and_only_on_request() {
         fs::write(theirs.join(MANIFEST), content).expect("a manifest of another kind");
         let error = write_dataset(&theirs, true, &session, &first).expect_err("foreign");
         assert!(matches!(error, IoError::Foreign { .. }), "{error}");
-        assert_eq!(error.exit_code(), 3);
+        assert_eq!(error.exit_code(), 2);
         assert_eq!(tree(&theirs), [PathBuf::from(MANIFEST)]);
     }
     let file = theirs.join(MANIFEST);

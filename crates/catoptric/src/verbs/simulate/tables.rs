@@ -2,6 +2,7 @@
 //! `truth/readings.csv`.
 
 use crate::Error;
+use catoptric_files::names::defused;
 use catoptric_sim::laboratory::Returns;
 use catoptric_sim::light::Role;
 use catoptric_sim::receive::{RandomEffects, Return};
@@ -37,9 +38,9 @@ pub(crate) fn role_name(role: Role) -> &'static str {
     }
 }
 
-/// Quotes a field of free text, since a name may contain commas and quotes.
+/// Quotes a field of free text, since a name may contain commas and quotes, or begin like a formula.
 pub(crate) fn field(text: &str) -> String {
-    format!("\"{}\"", text.replace('"', "\"\""))
+    format!("\"{}\"", defused(text).replace('"', "\"\""))
 }
 
 /// Returns the names of the mirrors on a path, as one field.

@@ -4,14 +4,15 @@ use super::stoppable;
 use crate::{Control, Error};
 use catoptric_assess::study::folder::{self, Found};
 use catoptric_assess::study::{Part, Plan, Study, Summary, gather, summarize};
+use catoptric_files::Output;
 use std::path::{Path, PathBuf};
 
 /// Name of the page of a study.
-pub const STUDY_PAGE: &str = "report.html";
+pub const STUDY_PAGE: &str = folder::PAGE;
 
 /// Runs a part of a study in a folder; called again, it resumes where it was stopped.
 ///
-/// With `elements`, the angles of every element are listed as well. The folder contains the tables, `study.json` and a
+/// A folder of another study is refused, or begun anew if its [`Output`] replaces. With `elements`, the angles of every element are listed as well. The folder contains the tables, `study.json` and a
 /// page.
 ///
 /// # Errors
@@ -21,14 +22,14 @@ pub fn study_into(
     study: &Study,
     part: Part,
     elements: bool,
-    out: impl AsRef<Path>,
+    out: impl Into<Output>,
     control: &Control,
 ) -> Result<Summary, Error> {
-    let (study, out) = (stoppable(study, control), out.as_ref());
+    let (study, out) = (stoppable(study, control), out.into());
     control.run(|| {
         let done = |more, of| control.report("experiments", more, of);
-        let (plan, found) = folder::run_in(out, &study, part, elements, &done)?;
-        finish(out, &plan, &study, &found)
+        let (plan, found) = folder::run_in(&out, &study, part, elements, &done)?;
+        finish(out.path(), &plan, &study, &found)
     })
 }
 
@@ -37,21 +38,25 @@ pub fn study_into(
 /// # Errors
 /// [`Error::Study`] if the folders are not all the shards of one study, each finished; [`Error::File`] if reading or
 /// writing fails.
-pub fn merge_studies(shards: &[PathBuf], out: impl AsRef<Path>) -> Result<Summary, Error> {
+pub fn merge_studies(shards: &[PathBuf], out: impl Into<Output>) -> Result<Summary, Error> {
+    let out = out.into();
     let (plan, study, found) = gather(shards)?;
-    plan.claim(out.as_ref())?;
-    finish(out.as_ref(), &plan, &study, &found)
+    plan.claim(&out)?;
+    finish(out.path(), &plan, &study, &found)
 }
 
 fn finish(out: &Path, plan: &Plan, study: &Study, found: &Found) -> Result<Summary, Error> {
     let summary = summarize(study, &found.runs);
     #[cfg(feature = "report")]
-    {
+    let page = {
         let elements = found.elements.as_deref().unwrap_or_default();
         let page = catoptric_report::study(&plan.name, study, &summary, elements);
-        catoptric_files::write_file(out.join(STUDY_PAGE), page.as_bytes())?;
-    }
+        vec![(out.join(STUDY_PAGE).into(), page.into_bytes())]
+    };
     #[cfg(not(feature = "report"))]
-    let _ = plan;
-    Ok(folder::finish(out, study, found, summary)?)
+    let page = {
+        let _ = plan;
+        Vec::new()
+    };
+    Ok(folder::finish(out, study, found, summary, page)?)
 }
