@@ -35,7 +35,7 @@ pub(super) const READERS: [Reader; 14] = [
     ("message", message),
 ];
 
-/// What was read, and what was wrong with it, in words: writing them must work as well.
+/// Ends a reading: an error must have a message.
 fn done<T, E: std::fmt::Display>(read: Result<T, E>) {
     if let Err(error) = read {
         assert!(!error.to_string().is_empty());
@@ -55,7 +55,7 @@ fn scene_text(bytes: &[u8]) {
     done(scene::parse(text, name, &[]));
 }
 
-/// An expression in the place of a number of a scene; its parameters are `a` to `d`.
+/// An expression instead of a number of a scene; its parameters are `a` to `d`.
 fn expression(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else {
         return;

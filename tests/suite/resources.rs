@@ -1,5 +1,5 @@
-//! Files that claim more than they hold, many problems at once, and a machine without threads: the answer comes soon, in
-//! bounded memory, and in words.
+//! Files that claim more than they hold, many problems at once, and a machine without threads: the answer comes soon and
+//! in bounded memory, and states the reason.
 
 use crate::common::{VALID, catoptric, folder_with, stderr};
 use crate::corpus::corpus;

@@ -67,7 +67,7 @@ pub enum IoError {
     Faults {
         /// The file.
         path: PathBuf,
-        /// The first of them, in their order in the file.
+        /// The first of them, in the order of the file.
         faults: Vec<TextFault>,
         /// Number of all.
         count: usize,

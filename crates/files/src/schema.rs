@@ -45,7 +45,7 @@ impl FileKind {
             Self::Scene => "A scene, for editors: numbers may be expressions",
             Self::Session => "What the experimenter knows: session.toml of a dataset",
             Self::Truth => "What was simulated: truth/truth.json of a dataset",
-            Self::Calibration => "The result for every beam: calibration.json, by anybody's program",
+            Self::Calibration => "The result for every beam: calibration.json, ours or third-party",
             Self::Characterization => "The bare sensor's errors: characterization.json",
             Self::Manifest => "Provenance and hashes of a dataset: manifest.json",
         }

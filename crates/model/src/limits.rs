@@ -23,8 +23,8 @@ pub const ANY: f64 = 1e15;
 /// A turn, in degrees.
 pub const TURN_DEG: f64 = 360.0;
 
-/// A turn, in radians, rounded up.
-pub const TURN_RAD: f64 = 6.2832;
+/// Somewhat more than a turn, in radians: files round it.
+pub const TURN_RAD: f64 = 6.29;
 
 /// Smallest angle between neighboring beams, in degrees.
 pub const STEP_DEG: f64 = 1e-4;
@@ -41,10 +41,10 @@ pub const INDEX: f64 = 4.0;
 /// Largest divergence of a beam, in milliradians.
 pub const DIVERGENCE_MRAD: f64 = 1e3;
 
-/// Fewest scans in a second.
+/// Minimum number of scans in a second.
 pub const SLOWEST_HZ: f64 = 1e-3;
 
-/// Most scans in a second.
+/// Maximum number of scans in a second.
 pub const FASTEST_HZ: f64 = 1e5;
 
 /// Shortest and longest time from beam to beam, in microseconds.

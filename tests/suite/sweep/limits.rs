@@ -1,4 +1,4 @@
-//! Numbers in texts, and what a schema says of them: written for the test alone, apart from the readers.
+//! Numbers in texts, and their limits in a schema: written for the test alone, apart from the readers.
 
 use serde_json::{Map, Value, json};
 use std::ops::Range;
@@ -34,7 +34,7 @@ pub(super) fn numbers(text: &str) -> Vec<Range<usize>> {
                 {
                     end = last + 1;
                 }
-                // A key of an inline table, such as `{ 1a = 2 }`, is none.
+                // A key of an inline table, such as `{ 1a = 2 }`, is not a number.
                 if text[at..end].parse::<f64>().is_ok() {
                     found.push(at..end);
                 }

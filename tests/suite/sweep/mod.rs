@@ -22,7 +22,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// What is put in the place of a number, in TOML and in JSON.
+/// What replaces a number, in TOML and in JSON.
 const VALUES: [(&str, &str); 8] = [
     ("nan", "NaN"),
     ("inf", "Infinity"),
@@ -34,7 +34,7 @@ const VALUES: [(&str, &str); 8] = [
     ("1000000000000000000", "1e999"),
 ];
 
-/// Reads a file of a kind; the error in words.
+/// Reads a file of a kind; the error as text.
 fn read(kind: FileKind, name: &str, text: &str) -> Result<(), String> {
     let (bytes, path) = (text.as_bytes(), Path::new(name));
     let said = |e: catoptric::files::IoError| e.to_string();
@@ -107,7 +107,7 @@ struct Number {
     list: String,
     /// Its own key.
     key: String,
-    /// What the schema says of it.
+    /// Its schema.
     limits: Value,
 }
 
@@ -348,14 +348,14 @@ fn every_number_of_an_experiment_through_the_program() {
             }
         }
         let slowest = count.slowest;
-        println!(
+        eprintln!(
             "{name}: {} numbers, exit codes {codes:?}, slowest {slowest:.1?}",
             count.numbers
         );
         std::fs::write(at.join(name), text).unwrap();
         total.numbers += count.numbers;
     }
-    println!("{} numbers", total.numbers);
+    eprintln!("{} numbers", total.numbers);
     assert!(
         faults.is_empty(),
         "{} faults:\n{}",
