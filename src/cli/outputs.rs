@@ -54,7 +54,7 @@ impl Outputs {
         Ok(out)
     }
 
-    /// The place of something; what is there is looked at when it is written.
+    /// The place of something; what is there is examined when it is written.
     pub(crate) fn place(&self, path: &Path) -> Result<Output, CliError> {
         let real = real(path);
         let mut taken = self.taken.borrow_mut();

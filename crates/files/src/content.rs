@@ -1,13 +1,13 @@
-//! What a file holds, by its beginning: by this a file that may be written over is told from one that may not.
+//! What a file holds, by its beginning: this decides whether it may be written over.
 
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Bytes of a file that are looked at.
+/// Bytes of a file that are read for that.
 const HEAD: usize = 1 << 16;
 
-/// What a file holds, as far as its beginning tells.
+/// What a file holds, as far as its beginning shows.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Content {
     /// Nothing.

@@ -238,7 +238,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("a.json");
         write_json(&path, &[1.0, f64::NAN]).expect("written");
-        let error = write_json(&path, &[2.5]).expect_err("it is nothing that can be told");
+        let error = write_json(&path, &[2.5]).expect_err("it is no result of ours");
         assert!(matches!(error, IoError::Exists { .. }), "{error}");
         write_json(Output::new(&path).replacing(true), &[2.5, f64::INFINITY]).expect("written again");
         let back: Vec<Option<f64>> = read_json(&path).expect("read");

@@ -9,7 +9,7 @@ use std::fs::{self, Metadata};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Where a result is written, and what may be written over there. A path is one by itself: with the cautious rule.
+/// Where a result is written, and what may be written over there. A path is one, with the cautious rule.
 ///
 /// ```
 /// use catoptric_files::{Output, write_file};

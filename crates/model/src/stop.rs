@@ -26,7 +26,7 @@ pub struct Stop {
 pub struct Stopped;
 
 impl Stop {
-    /// A request for a part of the work: made along with this one, and by itself without it.
+    /// A request for a part of the work: made along with this one, or on its own without it.
     ///
     /// ```
     /// # use catoptric_model::Stop;

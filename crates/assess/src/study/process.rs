@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 /// Interval at which a program is polled for its end.
 const POLL: Duration = Duration::from_millis(20);
 
-/// Time that a program is given to end by itself, once it is asked to.
+/// Time that a program is given to end on its own, once it is asked to.
 const GRACE: Duration = Duration::from_millis(250);
 
 /// The process groups that were started and are not over. Their leaders have not been waited for, so that their numbers
@@ -30,7 +30,7 @@ static RUNNING: Mutex<Running> = Mutex::new(Running {
 
 /// How a program ended.
 pub(super) enum Ended {
-    /// By itself.
+    /// On its own.
     Alone(ExitStatus),
     /// Because a stop was requested.
     Stopped,
@@ -76,7 +76,7 @@ pub(super) fn run(command: &mut Command, limit: Duration, stop: &Stop) -> io::Re
         signal(child.id(), Signal::Kill);
         running.groups.remove(&child.id());
     }
-    // It may have ended by itself.
+    // It may have ended on its own.
     let _ = child.kill();
     let status = child.wait()?;
     Ok(ended?.unwrap_or(Ended::Alone(status)))
