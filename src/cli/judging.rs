@@ -49,6 +49,13 @@ impl Limits {
     }
 }
 
+/// The help of `--require`, with a requirement that the verb knows.
+pub(crate) fn require_help(example: &str) -> String {
+    format!(
+        "Fail (exit code 1) unless a figure meets a limit, in quotes: '{example}'. May be given more than once"
+    )
+}
+
 /// The error for a requirement that names no figure.
 pub(crate) fn unknown(error: &RequirementError) -> CliError {
     CliError::invalid(format!("a limit: {error}"), error.help())

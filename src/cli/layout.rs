@@ -2,8 +2,7 @@
 
 use super::context::Context;
 use super::error::CliError;
-use super::judging::{Limits, junit_place, write_junit};
-use super::optimize::REQUIRE;
+use super::judging::{Limits, junit_place, require_help, write_junit};
 use super::output::{print, quoted};
 use super::outputs::Replacing;
 use catoptric::files::names::printable_name;
@@ -18,7 +17,7 @@ use std::time::Instant;
 
 /// Arguments of `layout`.
 #[derive(Debug, Args)]
-#[command(mut_arg("require", |option| option.help(REQUIRE)))]
+#[command(mut_arg("require", |option| option.help(require_help(EXAMPLE))))]
 pub(crate) struct Arguments {
     /// The scene, TOML or JSON; several are compared side by side.
     #[arg(required = true, value_name = "SCENE")]

@@ -2,7 +2,7 @@
 
 use super::context::Context;
 use super::error::CliError;
-use super::judging::Limits;
+use super::judging::{Limits, require_help};
 use super::output::{counted, grouped, print, print_json, quoted};
 use super::outputs::Replacing;
 use catoptric::files::names::printable_name;
@@ -20,7 +20,7 @@ use std::time::Instant;
 
 /// Arguments of `optimize`.
 #[derive(Debug, Args)]
-#[command(mut_arg("require", |option| option.help(REQUIRE)))]
+#[command(mut_arg("require", |option| option.help(require_help(EXAMPLE))))]
 pub(crate) struct Arguments {
     /// The scene, TOML or JSON, with parameters that have `low` and `high`.
     scene: PathBuf,
@@ -177,10 +177,6 @@ fn why_none(found: &Optimum, coarse: bool) -> String {
     }
     text
 }
-
-/// The help of `--require`, whose example is a figure of layouts.
-pub(super) const REQUIRE: &str = "Fail (exit code 1) unless a figure meets a limit, in quotes: 'field_of_regard>=0.004'. May be \
-                                  given more than once";
 
 fn refused(error: OptimizeError) -> CliError {
     let help = match &error {

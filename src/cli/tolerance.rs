@@ -2,9 +2,8 @@
 
 use super::context::Context;
 use super::error::CliError;
-use super::judging::Limits;
+use super::judging::{Limits, require_help};
 use super::layout::refused;
-use super::optimize::REQUIRE;
 use super::output::{print, print_json, quoted};
 use super::outputs::Replacing;
 use catoptric::files::names::printable_name;
@@ -17,7 +16,7 @@ use std::path::PathBuf;
 
 /// Arguments of `tolerance`.
 #[derive(Debug, Args)]
-#[command(mut_arg("require", |option| option.help(REQUIRE)))]
+#[command(mut_arg("require", |option| option.help(require_help(EXAMPLE))))]
 pub(crate) struct Arguments {
     /// The scene, TOML or JSON; its `superstructure.as_built` and `scanner.mount` specify the errors.
     scene: PathBuf,

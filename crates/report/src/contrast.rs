@@ -1,7 +1,7 @@
 //! Colors that can be seen: the style sheet's rules that darken the colors of plots on a light page and lighten them on a
 //! dark one, as far as marks (3 : 1) and text (4.5 : 1) need (WCAG 2.1, 1.4.11 and 1.4.3).
 
-use super::figure::color;
+use catoptric_assess::palette::facet_color;
 use plotters::style::RGBColor;
 
 /// Least contrast of marks and of text against the page.
@@ -32,13 +32,21 @@ pub(super) fn style() -> String {
 }
 
 fn colors() -> Vec<RGBColor> {
-    (0..FACETS).map(color).chain(OTHERS).collect()
+    let facets = (0..FACETS)
+        .map(facet_color)
+        .map(|[red, green, blue]| RGBColor(red, green, blue));
+    facets.chain(OTHERS).collect()
+}
+
+/// A color as plots write it.
+fn css(color: RGBColor) -> String {
+    format!("#{:02X}{:02X}{:02X}", color.0, color.1, color.2)
 }
 
 fn rules(drawn: RGBColor, paper: RGBColor) -> String {
-    let name = super::figure::css(drawn);
-    let mark = super::figure::css(readable(drawn, paper, MARKS));
-    let text = super::figure::css(readable(drawn, paper, TEXT));
+    let name = css(drawn);
+    let mark = css(readable(drawn, paper, MARKS));
+    let text = css(readable(drawn, paper, TEXT));
     format!(
         "svg [fill=\"{name}\"] {{ fill: {mark}; }}\nsvg [stroke=\"{name}\"] {{ stroke: {mark}; }}\n\
          svg text[fill=\"{name}\"] {{ fill: {text}; }}\n\

@@ -29,14 +29,23 @@ pub(super) fn count(value: Option<usize>) -> String {
     value.map_or_else(|| "–".to_owned(), |c| c.to_string())
 }
 
+/// Number of letters beyond which a cell needs the width of a line of text.
+const SENTENCE: usize = 24;
+
 /// Returns a table; columns of text are aligned left, columns of numbers right.
 pub(super) fn table(headings: &[&str], rows: &[Vec<String>]) -> String {
     // A number may have a unit, or "of" between two: words have three letters.
     let word = |text: &str| text.chars().filter(|c| c.is_alphabetic()).count() >= 3;
     let is_word = |cell: &String| cell.starts_with(char::is_alphabetic) || cell.split(' ').any(word);
     let class = |column: usize| {
-        let has_words = rows.iter().filter_map(|row| row.get(column)).any(is_word);
-        if has_words { " class=\"words\"" } else { "" }
+        let cells = || rows.iter().filter_map(|row| row.get(column));
+        match cells().any(is_word) {
+            true if column > 0 && cells().any(|c| c.chars().count() > SENTENCE) => {
+                " class=\"words sentences\""
+            }
+            true => " class=\"words\"",
+            false => "",
+        }
     };
     let mut html = "<div class=\"scroll\"><table>\n<thead><tr>".to_owned();
     for (column, heading) in headings.iter().enumerate() {

@@ -54,7 +54,7 @@ impl fmt::Debug for RandomScene {
         )?;
         for facet in &scene.superstructure.facet {
             // Never over several lines, whatever the formatter asks for.
-            write!(f, "\n    {}: {}", facet.name, format!("{:?}", facet.shape))?;
+            write!(f, "\n    {}: {:?}", facet.name, facet.shape)?;
         }
         Ok(())
     }

@@ -16,6 +16,7 @@ const CLEARANCE_M: f64 = 1e-4;
 pub(super) fn check(scene: &Scene, obstacles: &Obstacles, found: &mut Findings) {
     let drawn = &scene.superstructure;
     let housing = scene.scanner.housing_boxes();
+    let balls: Vec<Ball> = obstacles.facets.iter().map(Ball::around).collect();
     let boxes: Vec<HousingBox> = housing.iter().copied().chain(windows(housing)).collect();
     for (i, face) in obstacles.facets.iter().enumerate() {
         let Some(face) = face else { continue };
@@ -34,7 +35,7 @@ pub(super) fn check(scene: &Scene, obstacles: &Obstacles, found: &mut Findings) 
         };
         // One other mirror is enough: a row of mirrors that is too close is one mistake, not a mistake for each pair.
         let other = obstacles.facets[..i].iter().enumerate().find_map(|(k, other)| {
-            let other = other.as_ref()?;
+            let other = other.as_ref().filter(|_| balls[i].touches(&balls[k]))?;
             Some((k, face.meets(other).or_else(|| other.meets(face))?))
         });
         if let Some((k, at)) = other {
@@ -43,6 +44,27 @@ pub(super) fn check(scene: &Scene, obstacles: &Obstacles, found: &mut Findings) 
         if let Some(at) = boxes.iter().find_map(|part| face.inside(part)) {
             add("the scanner's housing", at);
         }
+    }
+}
+
+/// A ball around a face, since most faces are far from each other.
+struct Ball {
+    center: Point3<f64>,
+    radius: f64,
+}
+
+impl Ball {
+    /// Around nothing, it touches nothing.
+    fn around(face: &Option<Face>) -> Self {
+        let corners: &[Point3<f64>] = face.as_ref().map_or(&[], |face| &face.corners);
+        let center = middle(corners);
+        let radius = corners.iter().map(|c| (c - center).norm()).fold(0.0, f64::max);
+        Self { center, radius }
+    }
+
+    fn touches(&self, other: &Self) -> bool {
+        let reach = self.radius + other.radius;
+        (self.center - other.center).norm_squared() <= reach * reach
     }
 }
 

@@ -1,3 +1,5 @@
+//! Mirrors that touch, meet, cover each other, or stand in the housing.
+
 use crate::check::problems;
 use crate::scene::{Facet, FacetShape, PolygonShape, Scene};
 use nalgebra::Point3;
