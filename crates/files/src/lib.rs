@@ -49,9 +49,12 @@ mod source;
 mod survey;
 
 pub mod diagnostic;
+// Scenes use more of these three than other files do, and the session alone is TOML.
+#[cfg_attr(not(all(feature = "recording", feature = "scene")), allow(dead_code))]
 mod door;
 #[cfg(feature = "scene")]
 mod expression;
+#[cfg_attr(not(all(feature = "recording", feature = "scene")), allow(dead_code))]
 mod format;
 #[cfg(feature = "scene")]
 mod parameters;
@@ -60,6 +63,7 @@ pub mod parametric;
 mod rules;
 #[cfg(feature = "scene")]
 pub mod scene;
+#[cfg_attr(not(all(feature = "recording", feature = "scene")), allow(dead_code))]
 mod tree;
 #[cfg(all(feature = "recording", feature = "scene"))]
 mod truth;
