@@ -58,9 +58,12 @@ mod survey;
 mod topics;
 
 pub mod diagnostic;
+// Scenes use more of these three than other files do, and the session alone is TOML.
+#[cfg_attr(not(all(feature = "recording", feature = "scene")), allow(dead_code))]
 mod door;
 #[cfg(feature = "scene")]
 mod expression;
+#[cfg_attr(not(all(feature = "recording", feature = "scene")), allow(dead_code))]
 mod format;
 #[cfg(feature = "scene")]
 mod parameters;
@@ -69,6 +72,7 @@ pub mod parametric;
 mod rules;
 #[cfg(feature = "scene")]
 pub mod scene;
+#[cfg_attr(not(all(feature = "recording", feature = "scene")), allow(dead_code))]
 mod tree;
 #[cfg(all(feature = "recording", feature = "scene"))]
 mod truth;
