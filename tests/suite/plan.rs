@@ -368,7 +368,7 @@ fn the_program_plans_the_same_on_any_number_of_threads() {
     assert!(stdout(&output).contains("4 poses"), "{}", stdout(&output));
     std::fs::remove_dir_all(folder.path().join("data/truth")).unwrap();
     assert_eq!(at(&["plan", "data", "--poses", "1", "-q"]).status.code(), Some(0));
-    let output = at(&["plan", "data", "--poses", "1", "--out", "more.toml"]);
+    let output = at(&["plan", "data", "--poses", "1", "--out", "blind.toml"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("blind"));
 }
