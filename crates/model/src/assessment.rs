@@ -96,7 +96,7 @@ pub struct ComponentTest {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Doubt {
-    /// What is wrong; of several causes the readings do not tell which.
+    /// What is wrong; of several causes the readings do not determine which one.
     pub causes: Vec<Cause>,
     /// Numbers of the poses concerned, if it is not all of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -105,7 +105,7 @@ pub struct Doubt {
     pub statistic: f64,
     /// Its degrees of freedom.
     pub degrees_of_freedom: f64,
-    /// The doubt in words.
+    /// The doubt as a sentence.
     pub message: String,
 }
 

@@ -23,7 +23,7 @@ pub(super) fn doubt(
         }
     }
     let cannot = if phrases.len() > 1 {
-        "; the readings do not tell which"
+        "; the readings do not determine which"
     } else {
         ""
     };
