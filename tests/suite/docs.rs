@@ -9,7 +9,7 @@ use catoptric::model::assessment::{
     Assessment, Cause, ComponentTest, Doubt, HeldOut, SharedParameter, VarianceComponent,
 };
 use catoptric::model::calibration::{FacetEstimate, MountEstimate};
-use catoptric::model::session::GlassSheet;
+use catoptric::model::glass::GlassSheet;
 use catoptric::model::{AngleTable, BeamEstimate, Calibration, RangeBias, ScanGeometry, Status};
 use catoptric::{calib, score, sim};
 use serde_json::Value;

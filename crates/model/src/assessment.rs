@@ -105,7 +105,7 @@ pub struct ComponentTest {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Doubt {
-    /// What is wrong; of several causes the readings do not tell which.
+    /// What is wrong; of several causes the readings do not determine which one.
     pub causes: Vec<Cause>,
     /// Numbers of the poses concerned, if it is not all of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -117,7 +117,7 @@ pub struct Doubt {
     /// Its degrees of freedom.
     #[schemars(range(min = 0.0, max = limits::ANY))]
     pub degrees_of_freedom: f64,
-    /// The doubt in words.
+    /// The doubt as a sentence.
     pub message: String,
 }
 

@@ -3,11 +3,13 @@
 //! This is `session.toml`. It holds the nominal design, not the structure as built, and the assumed noise and biases,
 //! not the actual ones. The truth is never here.
 
-use crate::bias::{DistanceBias, RangeBias, interpolate};
+use crate::bias::{DistanceBias, RangeBias};
 use crate::board::{BoardPlane, Rectangle};
 use crate::characterization::{Characterization, NoiseRow};
 use crate::frame::{Pose, PoseData};
+use crate::glass::GlassSheet;
 use crate::limits;
+use crate::noise::Noise;
 use crate::scan::{ScanAngles, ScanDirection, ScanError, ScanGeometry};
 use nalgebra::{Point3, Translation3, Unit, Vector3};
 use schemars::JsonSchema;
@@ -16,9 +18,6 @@ use std::collections::BTreeMap;
 
 /// Version of `session.toml`.
 pub const SCHEMA_VERSION: u32 = 2;
-
-/// Largest difference between two distances at which noise was measured that counts as none, in meters.
-const SAME_DISTANCE: f64 = 1e-3;
 
 /// Everything known before the first reading is analyzed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -172,44 +171,6 @@ pub struct Beliefs {
     pub color_bias_sd_mm: f64,
 }
 
-/// White noise of a reading over distance, linearly interpolated and constant outside (Cooper, Tables 2 and 4).
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Noise {
-    /// Distances in meters, strictly increasing.
-    #[schemars(length(min = 1), inner(range(min = 0.0, max = limits::FAR_M)))]
-    pub range_m: Vec<f64>,
-    /// Standard deviations at those distances, in millimeters.
-    #[schemars(inner(range(min = 0.0, max = limits::ERROR_MM)))]
-    pub sd_mm: Vec<f64>,
-}
-
-impl Noise {
-    /// The table of some measured rows; those at one distance, to the millimeter, are pooled.
-    fn of<'r>(rows: impl IntoIterator<Item = &'r NoiseRow>) -> Self {
-        let mut rows: Vec<&NoiseRow> = rows.into_iter().collect();
-        rows.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
-        let mut table = Self::default();
-        for near in rows.chunk_by(|a, b| b.distance_m - a.distance_m < SAME_DISTANCE) {
-            let freedom: f64 = near.iter().map(|r| r.degrees_of_freedom as f64).sum();
-            let weighted = |value: fn(&NoiseRow) -> f64| {
-                near.iter()
-                    .map(|r| r.degrees_of_freedom as f64 * value(r))
-                    .sum::<f64>()
-                    / freedom
-            };
-            table.range_m.push(weighted(|r| r.distance_m));
-            table.sd_mm.push(weighted(|r| r.sd_mm * r.sd_mm).sqrt());
-        }
-        table
-    }
-
-    /// Standard deviation of a reading of a target at a distance, both in meters.
-    pub fn sd(&self, range: f64) -> f64 {
-        interpolate(&self.range_m, &self.sd_mm, range) * 1e-3
-    }
-}
-
 /// Zero uncertainties are omitted from files.
 fn is_zero(sd: &f64) -> bool {
     *sd == 0.0
@@ -292,74 +253,6 @@ pub struct BareStructure {
     /// Mean bias-corrected range of each beam to the bare structure, in meters; 0 if there is none.
     #[schemars(inner(range(min = 0.0, max = limits::FAR_M)))]
     pub distance_m: Vec<f64>,
-}
-
-/// Glass in front of a mirror's reflecting face, as its data sheet states. The drawing shows the front of the glass.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct GlassSheet {
-    /// Thickness, in millimeters.
-    #[schemars(range(min = 0.0, max = limits::THICKNESS_MM))]
-    pub thickness_mm: f64,
-    /// Uncertainty of the thickness, 1σ, in millimeters; the same glass is in front of all mirrors.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    #[schemars(range(min = 0.0, max = limits::THICKNESS_MM))]
-    pub thickness_sd_mm: f64,
-    /// Refractive index.
-    #[serde(default = "float_glass")]
-    #[schemars(range(min = 1.0, max = limits::INDEX))]
-    pub index: f64,
-}
-
-/// What a plate of glass does to a range, per meter of its thickness. See [`GlassSheet::effect`].
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct GlassEffect {
-    /// How much farther along the beam a front-surface mirror would have to be that sends it off along the same line.
-    pub setback: f64,
-    /// How much longer the range is than that mirror's.
-    pub delay: f64,
-}
-
-impl GlassSheet {
-    /// The effect of one meter of this glass on a beam that is deflected into a direction.
-    ///
-    /// Light enters at incidence α, travels t/cos α′ twice, n times slower, with sin α′ = sin α/n, and leaves t·2·tan α′
-    /// aside in the direction of an ordinary reflection. A front-surface mirror t/(n·cos α′) farther along the beam sends
-    /// it off along the same line; the range is longer by 2·t·(n − 1/n)/cos α′ than with that mirror.
-    pub fn effect(&self, beam: &Unit<Vector3<f64>>, exit: &Unit<Vector3<f64>>) -> GlassEffect {
-        let n = self.index;
-        let sin_squared = 0.5 * (1.0 + beam.dot(exit));
-        let cos_inside = (1.0 - sin_squared / (n * n)).sqrt();
-        GlassEffect {
-            setback: 1.0 / (n * cos_inside),
-            delay: 2.0 * (n - 1.0 / n) / cos_inside,
-        }
-    }
-
-    /// The effect of the glass at its stated thickness, in meters.
-    pub fn stated(&self, beam: &Unit<Vector3<f64>>, exit: &Unit<Vector3<f64>>) -> GlassEffect {
-        let one = self.effect(beam, exit);
-        let thickness = 1e-3 * self.thickness_mm;
-        GlassEffect {
-            setback: thickness * one.setback,
-            delay: thickness * one.delay,
-        }
-    }
-}
-
-/// Float glass at 905 nm.
-fn float_glass() -> f64 {
-    1.51
-}
-
-impl Default for GlassSheet {
-    fn default() -> Self {
-        Self {
-            thickness_mm: 0.0,
-            thickness_sd_mm: 0.0,
-            index: float_glass(),
-        }
-    }
 }
 
 /// A labeled marker.

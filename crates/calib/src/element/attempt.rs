@@ -9,7 +9,8 @@ use crate::readings::columns::Columns;
 use crate::readings::locate;
 use crate::readings::observations::{BoardInSensor, BoardView, Observation, azimuth};
 use crate::readings::spread;
-use catoptric_model::session::{GlassEffect, NominalFacet};
+use catoptric_model::glass::GlassEffect;
+use catoptric_model::session::NominalFacet;
 use catoptric_model::{
     Dataset, Deflection, Pose, PoseKind, PoseRecord, Session, Status, Stop, Summary, beam,
 };

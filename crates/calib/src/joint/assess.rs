@@ -31,7 +31,7 @@ impl Joint<'_> {
     /// The assessment of a solution.
     pub(super) fn assess(&self, dataset: &Dataset, fit: &JointFit, answers: &[Answer]) -> Assessment {
         let (session, solution) = (&dataset.session, &fit.solution);
-        let (tests, doubts) = self.doubts(dataset, solution);
+        let (tests, doubts) = self.doubts(dataset, solution, answers);
         let freedom = solution.degrees_of_freedom();
         let global_test = ChiSquaredTest {
             chi_squared: solution.sum_of_squares,

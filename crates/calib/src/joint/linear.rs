@@ -6,7 +6,7 @@ use super::placed::{Boards, Placed};
 use super::problem::Joint;
 use crate::lsq::{GroupJacobian, Point};
 use crate::readings::jacobian;
-use catoptric_model::session::{GlassEffect, GlassSheet};
+use catoptric_model::glass::{GlassEffect, GlassSheet};
 use catoptric_model::{BoardPlane, frame};
 use nalgebra::{DVector, Dyn, Matrix2, OMatrix, Point3, U2, Unit, Vector2, Vector3};
 
@@ -28,8 +28,9 @@ pub(super) struct Linear {
     pub(super) v: Unit<Vector3<f64>>,
     /// The facet's deflection of the beam.
     pub(super) fan: Fan,
-    /// How far glass sets the mirror back along the beam, in meters.
-    setback: f64,
+    /// What glass does to the range, in meters, and its relative change per change of the cosine of the deflection.
+    glass: GlassEffect,
+    glass_change: f64,
     sightlines: Vec<Sightline>,
 }
 
@@ -62,6 +63,13 @@ impl Linear {
         self.sightlines.iter().map(|line| (line.range, line.closing))
     }
 
+    /// Change of each biased range per tilt of the mirror's normal about one of its two axes.
+    pub(super) fn by_tilt(&self, axis: usize, planes: &[BoardPlane]) -> impl Iterator<Item = f64> {
+        let turned = self.fan.turned[axis];
+        let lines = self.sightlines.iter().zip(planes);
+        lines.map(move |(line, plane)| line.lever() * plane.normal.dot(&turned))
+    }
+
     /// Change of the range to a plane per thickness of a glass.
     pub(super) fn through_glass(
         &self,
@@ -69,7 +77,7 @@ impl Linear {
         plane: &BoardPlane,
         glass: &GlassSheet,
     ) -> f64 {
-        let effect = glass.effect(u, &self.v);
+        let effect = glass.effect(u, &self.fan.v);
         effect.delay + effect.setback * (1.0 - plane.normal.dot(u) / plane.normal.dot(&self.v))
     }
 
@@ -205,8 +213,9 @@ impl Joint<'_> {
             delta,
             axes,
             v,
+            glass_change: self.glass.map_or(0.0, |sheet| sheet.change(&element.u, &fan.v)),
+            glass,
             fan,
-            setback: glass.setback,
             sightlines,
         })
     }
@@ -223,7 +232,7 @@ impl Joint<'_> {
         first_row: usize,
     ) {
         let Linear { fan, v, .. } = linear;
-        let origin = Point3::from(element.u.into_inner() * (fan.distance + linear.setback));
+        let origin = Point3::from(element.u.into_inner() * (fan.distance + linear.glass.setback));
         for (i, (sight, line)) in element.sights.iter().zip(&linear.sightlines).enumerate() {
             let row = first_row + i;
             let board = &boards.placed[sight.board];
@@ -248,10 +257,13 @@ impl Joint<'_> {
             if let Some(facet) = element.facet {
                 let first = facet * FACET_PARAMETERS;
                 let lever = line.lever();
-                for (column, dv) in fan.directions() {
-                    into.own[(row, first + column)] = lever * n.dot(&dv) * weight;
-                }
                 let by_distance = line.by_range * (1.0 - n.dot(&element.u) / line.closing);
+                // A tilt also changes the path in the glass.
+                let in_glass = by_distance * linear.glass.setback + line.by_range * linear.glass.delay;
+                for (column, dv) in fan.directions() {
+                    let turned = lever * n.dot(&dv) + in_glass * linear.glass_change * element.u.dot(&dv);
+                    into.own[(row, first + column)] = turned * weight;
+                }
                 for (column, moved) in fan.moved.iter().enumerate() {
                     into.own[(row, first + column)] += by_distance * moved * weight;
                 }

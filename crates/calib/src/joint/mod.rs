@@ -208,9 +208,13 @@ fn solve(
     })
 }
 
+/// Slope along a parameter, in its standard deviations, that does no harm: the derivatives omit that weights change too.
+const HARMLESS: f64 = 0.1;
+
 /// A warning about a solution that is no minimum.
 fn unconverged(solution: &Solution) -> Option<String> {
-    (!solution.stop.converged()).then(|| {
+    let slope = solution.gradient_cosine * solution.sum_of_squares.sqrt();
+    (!solution.stop.converged() && slope > HARMLESS).then(|| {
         format!(
             "the elements solved together have not converged after {} iterations: their directions and covariances may be \
              wrong",

@@ -14,7 +14,7 @@ use super::fan::{Flatness, Shape};
 use super::group::{BOARD_ERRORS, FACET_BLOCKS, FIGURE, Group, JointElement};
 use crate::judge::common::CommonErrors;
 use crate::lsq::{ParameterBlock, Point};
-use catoptric_model::session::GlassSheet;
+use catoptric_model::glass::GlassSheet;
 use catoptric_model::{MirrorPlane, Pose, RangeBias, Stop};
 use nalgebra::{DVector, Dyn, OMatrix, U6};
 

@@ -27,7 +27,7 @@ const NO_SLOPE_AFAR: f64 = 1e-7;
 const AFAR: f64 = 1e3;
 
 /// ‖f‖ relative to the scaled parameters, in roundings, below which f is rounding and its direction means nothing.
-const ROUNDINGS: f64 = 100.0;
+const ROUNDINGS: f64 = 1000.0;
 
 /// When to stop, and what counts as dependent.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -300,13 +300,16 @@ impl Slope {
     /// Whether a point is stationary, given the lengths of the columns of J and the size of each parameter at the start
     /// and there.
     fn is_none(&self, lengths: &DVector<f64>, [first, sizes]: [&DVector<f64>; 2], norm: f64) -> bool {
-        if norm <= ROUNDINGS * f64::EPSILON * lengths.component_mul(sizes).norm() {
+        // A parameter that has run away says nothing of the size of f.
+        let afar = |first: f64, size: f64| first > 0.0 && size > AFAR * first;
+        let near = sizes.zip_map(first, |size, first| if afar(first, size) { first } else { size });
+        if norm <= ROUNDINGS * f64::EPSILON * lengths.component_mul(&near).norm() {
             return true;
         }
         (0..self.0.len()).all(|i| {
             let slope = self.0[i].abs();
-            let afar = first[i] > 0.0 && sizes[i] > AFAR * first[i];
-            slope <= NO_SLOPE * lengths[i] * norm || (afar && slope * sizes[i] <= NO_SLOPE_AFAR * norm * norm)
+            let flat_afar = afar(first[i], sizes[i]) && slope * sizes[i] <= NO_SLOPE_AFAR * norm * norm;
+            slope <= NO_SLOPE * lengths[i] * norm || flat_afar
         })
     }
 

@@ -143,20 +143,18 @@ fn mean_square(method: Method, deviation_deg: f64) -> f64 {
     sum / count
 }
 
-/// However far beams deviate from their planes, the joint solution is never worse.
+/// However far beams deviate from their planes, solving them together is never worse.
 #[test]
 fn joint_is_never_worse_than_each_element_individually() {
-    let mut last = 0.0;
     for deviation_deg in [0.0, 0.005, 0.01, 0.02, 0.05, 0.1, 0.3] {
         let (joint, alone) = (
             mean_square(Method::Joint, deviation_deg).sqrt(),
             mean_square(Method::BeamGls, deviation_deg).sqrt(),
         );
-        let rigid = mean_square(Method::Facet, deviation_deg).sqrt();
+        let facet = mean_square(Method::Facet, deviation_deg).sqrt();
         // A thousand errors each, of which those of one run are correlated: one percent is statistical fluctuation.
         assert!(joint < 1.01 * alone, "{deviation_deg}°: {joint} against {alone}");
-        last = joint / rigid;
+        // Facet by facet, with the mounting as found, a little is lost.
+        assert!(facet < 1.1 * alone, "{deviation_deg}°: {facet} against {alone}");
     }
-    // The rigid facet suffers if its facet is not flat.
-    assert!(last < 0.5, "{last}");
 }

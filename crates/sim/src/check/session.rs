@@ -7,7 +7,7 @@ use crate::scene::{BeliefsOverlay, MarkerOverlay, NoiseOverlay, RangeBiasOverlay
 use catoptric_model::ScanGeometry;
 use catoptric_model::place::KeyPath;
 
-/// Largest departure of a quaternion's length from 1 that counts as rounding.
+/// Largest deviation of a quaternion's length from 1 that counts as rounding.
 const ROUNDED_QUATERNION: f64 = 1e-3;
 
 pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
@@ -101,7 +101,7 @@ fn known<'a>(
         if !names.contains(&name) {
             found.add(
                 &path.index(i).key("name"),
-                format_args!("is {name:?}, which is none of the session's {what}"),
+                format_args!("is {name:?}, which is not among the session's {what}"),
                 suggestion(name, what, names.iter().copied()),
             );
         }

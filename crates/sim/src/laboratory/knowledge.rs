@@ -9,6 +9,8 @@ use crate::laboratory::placement;
 use crate::light::optics::{Mirrors, Setting};
 use crate::noise::{Draws, Purpose};
 use crate::scene::{ErrorModel, Marker, NoiseTable};
+use catoptric_model::glass::GlassSheet;
+use catoptric_model::noise::Noise;
 use catoptric_model::session::{self, Session};
 use catoptric_model::{PoseData, PoseKind, PoseRecord, Summary, beam};
 use nalgebra::{Unit, Vector3};
@@ -55,15 +57,11 @@ impl Laboratory {
             }),
             believed: self.beliefs(),
             bare_structure: self.bare_structure()?,
-            glass: scene
-                .superstructure
-                .mirror
-                .glass
-                .map(|glass| session::GlassSheet {
-                    thickness_mm: glass.thickness_mm,
-                    thickness_sd_mm: 0.0,
-                    index: glass.index,
-                }),
+            glass: scene.superstructure.mirror.glass.map(|glass| GlassSheet {
+                thickness_mm: glass.thickness_mm,
+                thickness_sd_mm: 0.0,
+                index: glass.index,
+            }),
             rig_markers: known_markers(&scene.superstructure.marker),
             facets: self.nominal_facets()?,
             boards: scene
@@ -110,18 +108,18 @@ impl Laboratory {
     }
 
     /// A table of noise as the readings show it, with their rounding.
-    fn stated(&self, table: &NoiseTable) -> session::Noise {
+    fn stated(&self, table: &NoiseTable) -> Noise {
         // The standard deviation of a rounded value is its step over √12.
         let rounding = self.scene.errors.quantization_mm / 12.0_f64.sqrt();
         let sd = table.sd_mm.iter().map(|sd| libm::hypot(*sd, rounding));
-        session::Noise {
+        Noise {
             range_m: table.range_m.clone(),
             sd_mm: sd.collect(),
         }
     }
 
     /// Noise on the boards and the walls whose color has a table of its own.
-    fn noise_of_colors(&self) -> BTreeMap<String, session::Noise> {
+    fn noise_of_colors(&self) -> BTreeMap<String, Noise> {
         let boards = self.scene.board.iter().map(|b| &b.color);
         let names = boards.chain([&self.scene.room.color]);
         let own = names.filter_map(|name| {

@@ -10,9 +10,10 @@ mod shapes;
 mod tail;
 mod words;
 
+use super::answer::Answer;
 use super::group::BOARD_ERRORS;
 use super::problem::Joint;
-use crate::lsq::Solution;
+use crate::lsq::{self, Solution};
 use catoptric_model::assessment::{Cause, ComponentTest, Doubt};
 use catoptric_model::{Dataset, Session};
 use evidence::{Evidence, Statistic};
@@ -22,13 +23,26 @@ use shapes::Shapes;
 const FALSE_ALARM: f64 = 1e-3;
 
 /// Maximum number of doubts that are followed up.
-const ROUNDS: usize = 6;
+const ROUNDS: usize = 3;
 
 /// Share of the best explanation's evidence, in logarithms, that another one needs to be named with it.
 const NEARLY: f64 = 0.7;
 
 /// Smallest spread of a kind of error, relative to the believed one, that is worth a doubt.
 const WORTH: f64 = 1.1;
+
+/// Number of elements at either edge of a facet that are left out of the tests, and the share of its elements that is the
+/// most.
+const EDGE: usize = 4;
+const EDGE_SHARE: usize = 8;
+
+/// Studentized residual above which an element is left out too, and the maximum number of such elements: more are not
+/// single ones.
+const STRANGE: f64 = 4.0;
+const MOST_STRANGE: usize = 10;
+
+/// Factor on the standard deviation of a reading that is left out.
+const LEFT_OUT: f64 = 1e6;
 
 /// How a hypothesis is tested.
 enum Kind {
@@ -45,6 +59,8 @@ struct Hypothesis {
     columns: Vec<usize>,
     /// Number of the pose, if the hypothesis is about one.
     pose: Option<usize>,
+    /// Unit of its errors, in millimeters.
+    unit_mm: f64,
     /// Number of hypotheses of its kind, each about another pose.
     among: usize,
 }
@@ -56,6 +72,7 @@ impl Hypothesis {
             kind: Kind::Shift,
             columns,
             pose: None,
+            unit_mm: 1.0,
             among: 1,
         }
     }
@@ -83,12 +100,22 @@ impl Hypothesis {
     }
 }
 
+impl Hypothesis {
+    /// The same, once some errors are estimated: nothing if its own are among them.
+    fn test_beside(&self, estimated: &[usize], evidence: &Evidence) -> (Statistic, f64) {
+        if self.columns.iter().all(|column| estimated.contains(column)) {
+            return (Statistic::default(), 0.0);
+        }
+        self.test(evidence)
+    }
+}
+
 /// All hypotheses about a solution.
 fn hypotheses(joint: &Joint, shapes: &Shapes) -> Vec<Hypothesis> {
     let boards = shapes.poses.len();
     let shared = |from: usize, to: usize| (shapes.shared + from..shapes.shared + to).collect::<Vec<_>>();
     let first = joint.first_common;
-    let glass = joint.glass_column();
+    let glass = joint.glass_column().zip(joint.glass);
     let mut all = vec![
         Hypothesis::spread(Cause::Drift, shapes.of_boards(0..1)),
         Hypothesis::spread(Cause::Markers, shapes.of_boards(1..BOARD_ERRORS)),
@@ -105,8 +132,11 @@ fn hypotheses(joint: &Joint, shapes: &Shapes) -> Vec<Hypothesis> {
         Hypothesis::shift(Cause::Mounting, shared(0, first)),
         Hypothesis::shift(Cause::Characterization, shared(first, first + joint.common.len())),
     ];
-    if let Some(column) = glass {
-        all.push(Hypothesis::shift(Cause::Glass, shared(column, column + 1)));
+    if let Some((column, sheet)) = glass {
+        all.push(Hypothesis {
+            unit_mm: sheet.thickness_sd_mm,
+            ..Hypothesis::shift(Cause::Glass, shared(column, column + 1))
+        });
     }
     all.extend((0..boards).map(|board| Hypothesis {
         pose: Some(shapes.poses[board]),
@@ -118,30 +148,50 @@ fn hypotheses(joint: &Joint, shapes: &Shapes) -> Vec<Hypothesis> {
 
 impl Joint<'_> {
     /// Tests of the beliefs, and what is doubtful about them.
-    pub(super) fn doubts(&self, dataset: &Dataset, solution: &Solution) -> (Vec<ComponentTest>, Vec<Doubt>) {
+    pub(super) fn doubts(
+        &self,
+        dataset: &Dataset,
+        solution: &Solution,
+        answers: &[Answer],
+    ) -> (Vec<ComponentTest>, Vec<Doubt>) {
         let session = &dataset.session;
-        let glass = session.glass.unwrap_or_default();
-        let Some((shapes, evidence)) = self.evidence(solution, &glass) else {
+        if session.believed.range_noise_sd_mm == 0.0 {
+            // Where nothing is believed to be in the way there is no scale for a test.
+            return (Vec::new(), Vec::new());
+        }
+        let (inner, left_out) = self.without_edges(answers);
+        let Ok(solution) = inner.solve(solution.state.clone(), &lsq::SolverOptions::default()) else {
             return (Vec::new(), Vec::new());
         };
+        let Some((shapes, whole)) = inner.evidence(dataset, &solution) else {
+            return (Vec::new(), Vec::new());
+        };
+        // Mirrors may be of any figure.
+        let mut estimated = shapes.of_figures();
+        let mut left = whole.given(&estimated);
         let all = hypotheses(self, &shapes);
         let kinds = all.iter().filter(|h| h.pose.is_none()).count() + 3;
         let limit = libm::log(FALSE_ALARM / kinds as f64);
         let tests = all
             .iter()
             .filter(|h| h.pose.is_none())
-            .map(|h| component(h, &evidence));
+            .map(|h| component(h, &left));
         let mut tests: Vec<ComponentTest> = tests.collect();
-        tests.extend(worst_board(&all, &evidence));
+        tests.extend(worst_board(&all, &left));
         let mut doubts = Vec::new();
+        let residuals = Statistic {
+            chi_squared: solution.sum_of_squares,
+            freedom: solution.degrees_of_freedom() as f64 - left_out as f64,
+        };
         let halves = halves::correlated(self, dataset);
         tests.extend(halves.as_ref().map(|h| h.test()));
         let correlated = halves.filter(|h| h.statistic.ln_p() < limit && h.inflation > WORTH * WORTH);
-        doubts.extend(correlated.as_ref().map(|h| words::correlated(h)));
-        let mut estimated: Vec<usize> = Vec::new();
-        let mut left = evidence.clone();
+        if let Some(halves) = correlated {
+            // All other tests take noise for white.
+            return (tests, vec![words::correlated(&halves)]);
+        }
         for _ in 0..ROUNDS {
-            let tested: Vec<_> = all.iter().map(|h| h.test(&left)).collect();
+            let tested: Vec<_> = all.iter().map(|h| h.test_beside(&estimated, &left)).collect();
             let best = (0..all.len()).min_by(|a, b| tested[*a].1.total_cmp(&tested[*b].1));
             let Some(best) = best.filter(|b| tested[*b].1 < limit) else {
                 break;
@@ -153,39 +203,73 @@ impl Joint<'_> {
                     && all[best].test(&left.given(&all[*other].columns)).1 > limit
             });
             let named: Vec<&Hypothesis> = [best].into_iter().chain(others).map(|i| &all[i]).collect();
-            doubts.push(words::doubt(self, session, &named, &left, &tested[best].0));
+            doubts.push(words::doubt(session, &named, &left, &tested[best].0));
             estimated.extend(&all[best].columns);
-            left = evidence.given(&estimated);
+            left = whole.given(&estimated);
         }
-        if correlated.is_none() {
-            doubts.extend(self.unexplained(session, solution, &evidence, &estimated, limit, &mut tests));
-        }
+        doubts.extend(unexplained(
+            session, &residuals, &whole, &estimated, limit, &mut tests,
+        ));
         (tests, words::merged(doubts))
     }
 
-    /// Whether the residuals are larger than expected, whatever else is estimated.
-    fn unexplained(
-        &self,
-        session: &Session,
-        solution: &Solution,
-        evidence: &Evidence,
-        estimated: &[usize],
-        limit: f64,
-        tests: &mut Vec<ComponentTest>,
-    ) -> Option<Doubt> {
-        let explained = evidence.shift(estimated);
-        let statistic = Statistic {
-            chi_squared: solution.sum_of_squares - explained.chi_squared,
-            freedom: solution.degrees_of_freedom() as f64 - explained.freedom,
-        };
-        tests.push(ComponentTest {
-            cause: Cause::Noise,
-            statistic: statistic.chi_squared,
-            degrees_of_freedom: statistic.freedom,
-            p_value: libm::exp(statistic.ln_p()),
-        });
-        (statistic.ln_p() < limit).then(|| words::noise(session, &statistic))
+    /// The problem without what may not be a whole beam: elements at the edges of facets, which may lose part of their
+    /// light there, and those with residuals that are hardly noise; and the number of readings left out.
+    fn without_edges(&self, answers: &[Answer]) -> (Self, usize) {
+        let mut inner = self.clone();
+        let strange = strange(answers);
+        let mut left_out = 0;
+        for group in &mut inner.groups {
+            for facet in 0..group.facets.len() {
+                let mut own: Vec<_> = group
+                    .elements
+                    .iter_mut()
+                    .filter(|e| e.facet == Some(facet))
+                    .collect();
+                own.sort_by(|a, b| a.along.total_cmp(&b.along));
+                let (count, edge) = (own.len(), EDGE.min(own.len() / EDGE_SHARE));
+                for (place, element) in own.into_iter().enumerate() {
+                    if place < edge || place + edge >= count || strange.contains(&element.beam) {
+                        left_out += element.sights.len();
+                        element.sights.iter_mut().for_each(|sight| sight.sd *= LEFT_OUT);
+                    }
+                }
+            }
+        }
+        (inner, left_out)
     }
+}
+
+/// Whether the residuals are larger than expected, whatever else is estimated.
+fn unexplained(
+    session: &Session,
+    residuals: &Statistic,
+    evidence: &Evidence,
+    estimated: &[usize],
+    limit: f64,
+    tests: &mut Vec<ComponentTest>,
+) -> Option<Doubt> {
+    let explained = evidence.shift(estimated);
+    let statistic = Statistic {
+        chi_squared: residuals.chi_squared - explained.chi_squared,
+        freedom: residuals.freedom - explained.freedom,
+    };
+    tests.push(ComponentTest {
+        cause: Cause::Noise,
+        statistic: statistic.chi_squared,
+        degrees_of_freedom: statistic.freedom,
+        p_value: libm::exp(statistic.ln_p()),
+    });
+    (statistic.ln_p() < limit).then(|| words::noise(session, &statistic))
+}
+
+/// Beams of the elements with the largest residuals, if these are hardly noise.
+fn strange(answers: &[Answer]) -> Vec<usize> {
+    let largest = |a: &Answer| a.seen.iter().map(|s| s.studentized().abs()).fold(0.0, f64::max);
+    let mut all: Vec<(f64, usize)> = answers.iter().map(|a| (largest(a), a.beam)).collect();
+    all.retain(|(studentized, _)| *studentized > STRANGE);
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    all.into_iter().take(MOST_STRANGE).map(|(_, beam)| beam).collect()
 }
 
 fn component(hypothesis: &Hypothesis, evidence: &Evidence) -> ComponentTest {

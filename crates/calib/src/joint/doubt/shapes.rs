@@ -3,13 +3,13 @@
 //! A shape is the change of each predicted reading per millimeter of the error. Parameters with a prior are tested by the
 //! prior's own row.
 
-use super::super::group::{BOARD_ERRORS, FACET_PARAMETERS};
+use super::super::group::{BOARD_ERRORS, FACET_PARAMETERS, FIGURE_ORDERS};
 use super::super::linear::Linear;
 use super::super::placed::Boards;
 use super::super::problem::Joint;
 use super::evidence::Evidence;
 use crate::lsq::Solution;
-use catoptric_model::session::GlassSheet;
+use catoptric_model::{Dataset, PoseKind};
 use nalgebra::{DMatrix, DVector};
 
 /// One millimeter.
@@ -25,6 +25,9 @@ const MOST_NODES: usize = 12;
 /// Time constants of a warm-up that are tested, as shares of the recording.
 const WARMING: [f64; 3] = [0.06, 0.2, 0.6];
 
+/// Orders of the figure of a mirror that the model lacks, which are taken out of every test.
+const FINER: std::ops::Range<usize> = FIGURE_ORDERS + 1..FIGURE_ORDERS + 6;
+
 /// Where each shape is among the columns.
 pub(super) struct Shapes {
     pub(super) distance: Nodes,
@@ -36,6 +39,8 @@ pub(super) struct Shapes {
     /// First of the facets' own bare distances, and their number.
     pub(super) bare_of_facets: usize,
     pub(super) facets: usize,
+    /// First of the finer orders of the facets' figures: all orders about one axis, then about the other.
+    pub(super) finer: usize,
     /// First of the parameters with priors: the shared ones, then each board's drift and three errors of its plane.
     pub(super) shared: usize,
     pub(super) boards: usize,
@@ -114,7 +119,8 @@ impl Shapes {
         let thickness = warming + WARMING.len();
         let (glass, bare) = (thickness + 1, thickness + 2);
         let facets = joint.groups.iter().map(|g| g.facets.len()).sum::<usize>();
-        let shared = bare + 1 + facets;
+        let finer = bare + 1 + facets;
+        let shared = finer + 2 * FINER.len() * facets;
         let boards = shared + joint.shared_dimension();
         let of_boards = || joint.groups.iter().flat_map(|g| &g.boards);
         let poses: Vec<usize> = of_boards().map(|b| b.number).collect();
@@ -127,6 +133,7 @@ impl Shapes {
             bare,
             bare_of_facets: bare + 1,
             facets,
+            finer,
             shared,
             boards,
             count: boards + BOARD_ERRORS * poses.len(),
@@ -143,10 +150,21 @@ impl Shapes {
         of_kind.map(|i| self.boards + i).collect()
     }
 
+    /// Columns of the finer figures, which are taken out of every test.
+    pub(super) fn of_figures(&self) -> Vec<usize> {
+        (self.finer..self.shared).collect()
+    }
+
     /// Columns of one board's errors.
     pub(super) fn of_board(&self, board: usize) -> Vec<usize> {
         let first = self.boards + BOARD_ERRORS * board;
         (first..first + BOARD_ERRORS).collect()
+    }
+
+    /// The changes of a range by each warm-up, in meters.
+    fn warmed(&self, pose: usize) -> [f64; WARMING.len()] {
+        let elapsed = (pose as f64 - self.from as f64) / self.to.saturating_sub(self.from).max(1) as f64;
+        WARMING.map(|constant| libm::exp(-elapsed / constant) * UNIT)
     }
 
     /// The changes of one reading, in meters.
@@ -158,13 +176,23 @@ impl Shapes {
         for (column, weight) in self.incidence.weights(incidence) {
             into[column] += weight * UNIT;
         }
-        let elapsed = (pose - self.from) as f64 / (self.to - self.from).max(1) as f64;
-        for (i, constant) in WARMING.iter().enumerate() {
-            into[self.warming + i] = libm::exp(-elapsed / constant) * UNIT;
+        for (i, change) in self.warmed(pose).into_iter().enumerate() {
+            into[self.warming + i] = change;
         }
         into[self.thickness] = -UNIT / closing.abs();
         into[self.glass] = glass * UNIT;
     }
+}
+
+/// Legendre polynomials of the finer orders.
+fn finer(t: f64) -> [f64; FINER.end - FINER.start] {
+    let mut values = [0.0; FINER.end];
+    (values[0], values[1]) = (1.0, t);
+    for k in 2..FINER.end {
+        let n = k as f64;
+        values[k] = ((2.0 * n - 1.0) * t * values[k - 1] - (n - 1.0) * values[k - 2]) / n;
+    }
+    std::array::from_fn(|i| values[FINER.start + i])
 }
 
 impl Joint<'_> {
@@ -189,7 +217,13 @@ impl Joint<'_> {
     }
 
     /// The shapes, and the evidence for each.
-    pub(super) fn evidence(&self, solution: &Solution, glass: &GlassSheet) -> Option<(Shapes, Evidence)> {
+    pub(super) fn evidence(&self, dataset: &Dataset, solution: &Solution) -> Option<(Shapes, Evidence)> {
+        let glass = dataset.session.glass.unwrap_or_default();
+        let firsts: Vec<usize> = self
+            .groups
+            .iter()
+            .scan(0, |next, g| Some(std::mem::replace(next, *next + g.facets.len())))
+            .collect();
         let shapes = Shapes::of(self, solution);
         let width = self.shared_dimension();
         let count = shapes.shared;
@@ -218,9 +252,27 @@ impl Joint<'_> {
                 let plane = &boards.placed[sight.board].plane;
                 let path = element
                     .facet
-                    .map_or(0.0, |_| linear.through_glass(&element.u, plane, glass));
+                    .map_or(0.0, |_| linear.through_glass(&element.u, plane, &glass));
                 shapes.of_reading(range, closing, group.boards[sight.board].pose, path, &mut one);
                 z.row_mut(row).tr_copy_from(&(&one / sight.sd));
+            }
+            if let Some(facet) = element.facet {
+                let first = shapes.finer + 2 * FINER.len() * (firsts[number] + facet);
+                let planes: Vec<_> = element
+                    .sights
+                    .iter()
+                    .map(|s| boards.placed[s.board].plane)
+                    .collect();
+                let orders = finer(element.along);
+                for axis in 0..2 {
+                    for (row, by) in linear.by_tilt(axis, &planes).enumerate() {
+                        for (k, order) in orders.iter().enumerate() {
+                            // A milliradian.
+                            z[(row, first + axis * FINER.len() + k)] =
+                                by * order * UNIT / element.sights[row].sd;
+                        }
+                    }
+                }
             }
             let mut jacobian = self.derivatives(group, element, boards, linear);
             let mut f = -&linear.y;
@@ -234,7 +286,7 @@ impl Joint<'_> {
             }
             add(&z, &f, &jacobian.shared, &jacobian.own, self.offset(number));
         });
-        self.add_bare(solution, &shapes, &mut add)?;
+        self.add_bare(dataset, solution, &shapes, &mut add)?;
         self.add_priors(solution, &shapes, &mut scores, &mut products, &mut by)?;
         Some((
             Evidence::new(scores, &products, &by, &solution.information)?,
@@ -246,11 +298,15 @@ impl Joint<'_> {
     /// The rows of the bare distances.
     fn add_bare(
         &self,
+        dataset: &Dataset,
         solution: &Solution,
         shapes: &Shapes,
         add: &mut impl FnMut(&DMatrix<f64>, &DVector<f64>, &DMatrix<f64>, &DMatrix<f64>, usize),
     ) -> Option<()> {
         let w = solution.state.shared.numbers(0)?;
+        let bare = &dataset.session.bare_structure;
+        let ranged = dataset.poses.iter().position(|p| p.label.kind == PoseKind::Bare);
+        let ranged = ranged.filter(|_| bare.scanned);
         let mut place = 0;
         for (number, group) in self.groups.iter().enumerate() {
             for (i, facet) in group.facets.iter().enumerate() {
@@ -264,6 +320,11 @@ impl Joint<'_> {
                 let mut z = DMatrix::zeros(1, shapes.shared);
                 z[(0, shapes.bare)] = UNIT / facet.bare.sd;
                 z[(0, column)] = UNIT / facet.bare.sd;
+                if let Some(pose) = ranged {
+                    for (k, change) in shapes.warmed(pose).into_iter().enumerate() {
+                        z[(0, shapes.warming + k)] = change / facet.bare.sd;
+                    }
+                }
                 let mut shared = DMatrix::zeros(1, self.shared_dimension());
                 shared
                     .view_mut((0, self.first_common), (1, self.common.len()))

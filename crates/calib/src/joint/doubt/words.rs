@@ -1,6 +1,5 @@
 //! Doubts as sentences.
 
-use super::super::problem::Joint;
 use super::evidence::{Evidence, Statistic};
 use super::halves::Halves;
 use super::{Hypothesis, Kind};
@@ -9,7 +8,6 @@ use catoptric_model::assessment::{Cause, Doubt};
 
 /// A doubt about the first of some hypotheses, which the others would explain as well.
 pub(super) fn doubt(
-    joint: &Joint,
     session: &Session,
     named: &[&Hypothesis],
     evidence: &Evidence,
@@ -19,13 +17,13 @@ pub(super) fn doubt(
     causes.dedup();
     let mut phrases: Vec<String> = Vec::new();
     for hypothesis in named {
-        let words = phrase(joint, session, hypothesis, evidence);
+        let words = phrase(session, hypothesis, evidence);
         if !phrases.contains(&words) {
             phrases.push(words);
         }
     }
     let cannot = if phrases.len() > 1 {
-        "; the readings do not tell which"
+        "; the readings do not determine which"
     } else {
         ""
     };
@@ -39,10 +37,10 @@ pub(super) fn doubt(
 }
 
 /// What is wrong if a hypothesis holds.
-fn phrase(joint: &Joint, session: &Session, hypothesis: &Hypothesis, evidence: &Evidence) -> String {
+fn phrase(session: &Session, hypothesis: &Hypothesis, evidence: &Evidence) -> String {
     let believed = &session.believed;
     let sizes = || evidence.sizes(&hypothesis.columns);
-    let largest = || sizes().amax();
+    let largest = || hypothesis.unit_mm * sizes().amax();
     let ratio = match hypothesis.kind {
         Kind::Spread => evidence.spread(&hypothesis.columns).1.sqrt(),
         Kind::Shift => 1.0,
@@ -73,7 +71,7 @@ fn phrase(joint: &Joint, session: &Session, hypothesis: &Hypothesis, evidence: &
         ),
         Cause::Glass => format!(
             "the path in the mirrors is longer or shorter than stated, by that in about {:.1} mm of glass",
-            largest() * joint.glass_column().map_or(1.0, |_| 1.0)
+            largest()
         ),
         Cause::BareDistances => format!(
             "the distances to the bare structure, or mirror_thickness_mm, are off by about {:.1} mm",

@@ -2,7 +2,8 @@
 
 use super::{LieOver, overlay};
 use catoptric_model::bias::{AngleBias, AngleTable, ColorBias, DistanceBias, RangeBias};
-use catoptric_model::session::{Beliefs, Noise};
+use catoptric_model::noise::Noise;
+use catoptric_model::session::Beliefs;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -1,8 +1,9 @@
 //! Scanner, room, structure and boards, laid over those of the written session.
 
 use super::{LieOver, overlay};
+use catoptric_model::glass::GlassSheet;
 use catoptric_model::session::{
-    BareStructure, BoardSheet, GlassSheet, Marker, MountTolerance, NominalFacet, RoomSurvey, ScannerSheet,
+    BareStructure, BoardSheet, Marker, MountTolerance, NominalFacet, RoomSurvey, ScannerSheet,
 };
 use catoptric_model::{PoseData, ScanAngles, ScanDirection, ScanError, ScanGeometry};
 use schemars::JsonSchema;
