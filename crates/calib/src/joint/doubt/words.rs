@@ -2,7 +2,7 @@
 
 use super::evidence::{Evidence, Statistic};
 use super::halves::Halves;
-use super::{Hypothesis, Kind};
+use super::hypothesis::{Hypothesis, Kind};
 use catoptric_model::Session;
 use catoptric_model::assessment::{Cause, Doubt};
 

@@ -1,6 +1,6 @@
 //! The believed errors, laid over those of the written session.
 
-use super::{LieOver, overlay};
+use super::over::{LieOver, overlay};
 use catoptric_model::bias::{AngleBias, AngleTable, ColorBias, DistanceBias, RangeBias};
 use catoptric_model::noise::Noise;
 use catoptric_model::session::Beliefs;

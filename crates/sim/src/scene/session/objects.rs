@@ -1,6 +1,6 @@
 //! Scanner, room, structure and boards, laid over those of the written session.
 
-use super::{LieOver, overlay};
+use super::over::{LieOver, overlay};
 use catoptric_model::glass::GlassSheet;
 use catoptric_model::session::{
     BareStructure, BoardSheet, Marker, MountTolerance, NominalFacet, RoomSurvey, ScannerSheet,
