@@ -159,22 +159,6 @@ fn difference(first: &str, second: &str) -> String {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::difference;
-
-    #[test]
-    fn differences_are_those_of_what_is_printed() {
-        assert_eq!(difference("453", "362"), "−91");
-        assert_eq!(difference("0.402", "0.415"), "+0.013");
-        assert_eq!(difference("3.25", "3.25"), "0");
-        assert_eq!(difference("−65.2 … 65.2", "−70.0 … 0.0"), "−4.8 … −65.2");
-        assert_eq!(difference("180 × 62", "180 × 70"), "0 × +8");
-        assert_eq!(difference("39.8, 120", "39.8, 120"), "0");
-        assert_eq!(difference("–", "3.1"), "–");
-    }
-}
-
 /// Returns the ranges in the room of every facet's elements, and of the undeflected ones.
 pub(super) fn ranges(drawn: &Drawn) -> (Headings, Rows) {
     let own = |facet: Option<usize>| {
@@ -370,4 +354,20 @@ pub(super) fn facets(drawn: &Drawn) -> (Headings, Rows) {
         "Elements left open",
     ];
     (headings, drawn.analysis.facets.iter().map(row).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::difference;
+
+    #[test]
+    fn differences_are_those_of_what_is_printed() {
+        assert_eq!(difference("453", "362"), "−91");
+        assert_eq!(difference("0.402", "0.415"), "+0.013");
+        assert_eq!(difference("3.25", "3.25"), "0");
+        assert_eq!(difference("−65.2 … 65.2", "−70.0 … 0.0"), "−4.8 … −65.2");
+        assert_eq!(difference("180 × 62", "180 × 70"), "0 × +8");
+        assert_eq!(difference("39.8, 120", "39.8, 120"), "0");
+        assert_eq!(difference("–", "3.1"), "–");
+    }
 }
