@@ -40,7 +40,7 @@ impl Formula for Chebyquad {
             }
         }
         let integral = |i: usize| {
-            if i % 2 == 0 {
+            if i.is_multiple_of(2) {
                 -1.0 / (i * i - 1) as f64
             } else {
                 0.0
