@@ -300,7 +300,7 @@ impl Slope {
     /// Whether a point is stationary, given the lengths of the columns of J and the size of each parameter at the start
     /// and there.
     fn is_none(&self, lengths: &DVector<f64>, [first, sizes]: [&DVector<f64>; 2], norm: f64) -> bool {
-        // A parameter that has run away no longer shows the size of f.
+        // The size of a parameter that has run away does not show how large f may be by rounding.
         let afar = |first: f64, size: f64| first > 0.0 && size > AFAR * first;
         let near = sizes.zip_map(first, |size, first| if afar(first, size) { first } else { size });
         if norm <= ROUNDINGS * f64::EPSILON * lengths.component_mul(&near).norm() {
