@@ -65,17 +65,23 @@ fn is_obeyed(c: char) -> bool {
     }
 }
 
+/// Walls, whose names begin like formulas and are known to programs that read the tables.
+const WALLS: [&str; 4] = ["-x wall", "+x wall", "-y wall", "+y wall"];
+
 /// A name as it stands in a table: one that a spreadsheet would take for a formula gets an apostrophe in front, which
-/// spreadsheets take for the sign of a text. Numbers stay numbers. [`original`] takes it off again.
+/// spreadsheets take for the sign of a text. Numbers stay numbers, and the walls of the room keep their names. [`original`]
+/// takes it off again.
 ///
 /// ```
 /// use catoptric_files::names::defused;
 /// assert_eq!(defused("=HYPERLINK(\"x\")"), "'=HYPERLINK(\"x\")");
 /// assert_eq!(defused("-0.5"), "-0.5");
 /// assert_eq!(defused("left"), "left");
+/// assert_eq!(defused("-y wall"), "-y wall");
 /// ```
 pub fn defused(name: &str) -> Cow<'_, str> {
-    if begins_formula(name.trim_start_matches('\'')) && name.parse::<f64>().is_err() {
+    let is_ours = WALLS.contains(&name) || name.parse::<f64>().is_ok();
+    if begins_formula(name.trim_start_matches('\'')) && !is_ours {
         Cow::Owned(format!("'{name}"))
     } else {
         Cow::Borrowed(name)
