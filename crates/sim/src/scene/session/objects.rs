@@ -104,10 +104,10 @@ overlay! {
     /// A pose.
     PoseOverlay over PoseData {
         /// Origin, in meters.
-        #[schemars(inner(inner(range(min = -10000.0, max = 10000.0))))]
+        #[schemars(inner(range(min = -10000.0, max = 10000.0)))]
         translation_m: [f64; 3],
         /// Rotation as a unit quaternion (x, y, z, w).
-        #[schemars(inner(inner(range(min = -1.0, max = 1.0))))]
+        #[schemars(inner(range(min = -1.0, max = 1.0)))]
         rotation_xyzw: [f64; 4],
     }
 }
@@ -116,10 +116,10 @@ overlay! {
     /// Tolerance of the nominal pose, 1σ.
     MountToleranceOverlay over MountTolerance {
         /// Rotation about x, y and z, in degrees.
-        #[schemars(inner(inner(range(min = 0.0, max = 180.0))))]
+        #[schemars(inner(range(min = 0.0, max = 180.0)))]
         rotation_sd_deg: [f64; 3],
         /// Shift along x, y and z, in millimeters.
-        #[schemars(inner(inner(range(min = 0.0, max = 1000.0))))]
+        #[schemars(inner(range(min = 0.0, max = 1000.0)))]
         translation_sd_mm: [f64; 3],
     }
 }
@@ -128,10 +128,10 @@ overlay! {
     /// The room as surveyed.
     RoomOverlay over RoomSurvey {
         /// Corner with the smallest coordinates, in meters.
-        #[schemars(inner(inner(range(min = -10000.0, max = 10000.0))))]
+        #[schemars(inner(range(min = -10000.0, max = 10000.0)))]
         min_m: [f64; 3],
         /// Corner with the largest coordinates, in meters.
-        #[schemars(inner(inner(range(min = -10000.0, max = 10000.0))))]
+        #[schemars(inner(range(min = -10000.0, max = 10000.0)))]
         max_m: [f64; 3],
         /// Color of walls, floor and ceiling.
         color: String,
@@ -156,7 +156,7 @@ overlay! {
         #[schemars(range(min = 0, max = 65535))]
         first_beam: usize,
         /// Range of each beam to the bare structure, in meters; 0 if there is none.
-        #[schemars(inner(inner(range(min = 0.0, max = 10000.0))))]
+        #[schemars(inner(range(min = 0.0, max = 10000.0)))]
         distance_m: Vec<f64>,
     }
 }
@@ -180,7 +180,7 @@ overlay! {
     /// A marker.
     named MarkerOverlay over Marker {
         /// Position in its body's frame, in millimeters.
-        #[schemars(inner(inner(range(min = -100000.0, max = 100000.0))))]
+        #[schemars(inner(range(min = -100000.0, max = 100000.0)))]
         position_mm: [f64; 3],
     }
 }
@@ -189,10 +189,10 @@ overlay! {
     /// A mirror as drawn.
     named FacetOverlay over NominalFacet {
         /// Corners in the nominal sensor frame, in millimeters.
-        #[schemars(inner(length(min = 3), inner(inner(range(min = -100000.0, max = 100000.0)))))]
+        #[schemars(length(min = 3), inner(inner(range(min = -100000.0, max = 100000.0))))]
         corners_mm: Vec<[f64; 3]>,
         /// First and last beam that hit this facet, according to the drawing.
-        #[schemars(inner(inner(range(min = 0, max = 65535))))]
+        #[schemars(inner(range(min = 0, max = 65535)))]
         beams: [usize; 2],
     }
 }
