@@ -62,7 +62,7 @@ fn request(poses: usize, scene: &Scene) -> Request {
 
 /// Mean square error per axis over some beams, in deg², for each of 60 seeds; nearly all of them must be solved.
 fn square_errors(scene: &Scene, beams: &[usize]) -> Vec<f64> {
-    (1..=60)
+    (1..=200)
         .into_par_iter()
         .map(|seed| {
             let laboratory = Laboratory::new(scene, seed).expect("the scene is valid");

@@ -136,7 +136,7 @@ fn judged(name: &str, falsify: impl FnOnce(&mut Value), verdict: &str, code: i32
         assert!(
             page.contains(&format!(
                 "<span class=\"badge\">{}</span>",
-                verdict.to_uppercase()
+                verdict.replace('_', " ").to_uppercase()
             )),
             "{name}"
         );

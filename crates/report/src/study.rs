@@ -244,7 +244,7 @@ mod tests {
         let rows: String = errors
             .iter()
             .enumerate()
-            .map(|(i, e)| format!("{i},1,oracle,1,0,0,0,{},,1e-8,,0,,,,\n", e * e))
+            .map(|(i, e)| format!("{i},1,oracle,1,0,0,0,{},,1e-8,,0,,,,,,\n", e * e))
             .collect();
         let runs = from_csv(&(to_csv(&[]) + &rows)).expect("they are runs");
         let summary = summarize(&study, &runs);
