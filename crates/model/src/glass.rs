@@ -1,5 +1,6 @@
 //! Glass in front of mirrors: how far it sets a mirror back, and how much it delays the light.
 
+use crate::beam::{self, Deflection};
 use crate::limits;
 use nalgebra::{Unit, Vector3};
 use schemars::JsonSchema;
@@ -31,7 +32,33 @@ pub struct GlassEffect {
     pub delay: f64,
 }
 
+impl GlassEffect {
+    /// Change of the range to a plane with this normal, for a beam that is deflected into a direction.
+    pub fn on_plane(
+        &self,
+        beam: &Unit<Vector3<f64>>,
+        exit: &Unit<Vector3<f64>>,
+        normal: &Unit<Vector3<f64>>,
+    ) -> f64 {
+        self.delay + self.setback * (1.0 - normal.dot(beam) / normal.dot(exit))
+    }
+}
+
 impl GlassSheet {
+    /// The front-surface mirror that sends a beam off as one behind this glass does, whose front the beam meets at the
+    /// deflection's distance; and how much longer, in meters, the range is than that mirror's.
+    pub fn as_bare(&self, beam_azimuth: f64, deflection: &Deflection) -> (Deflection, f64) {
+        let effect = self.stated(
+            &beam::direction(beam_azimuth),
+            &deflection.exit_direction(beam_azimuth),
+        );
+        let set_back = Deflection {
+            distance: deflection.distance + effect.setback,
+            ..*deflection
+        };
+        (set_back, effect.delay)
+    }
+
     /// The effect of one meter of this glass on a beam that is deflected into a direction.
     ///
     /// Light enters at incidence α, travels t/cos α′ twice, n times slower, with sin α′ = sin α/n, and leaves t·2·tan α′
@@ -45,6 +72,13 @@ impl GlassSheet {
             setback: 1.0 / (n * cos_inside),
             delay: 2.0 * (n - 1.0 / n) / cos_inside,
         }
+    }
+
+    /// How far aside, per meter of this glass, a beam leaves from where it enters. Nearer to the edge its light is lost in
+    /// the rim.
+    pub fn walk(&self, beam: &Unit<Vector3<f64>>, exit: &Unit<Vector3<f64>>) -> f64 {
+        let sin_inside = (0.5 * (1.0 + beam.dot(exit))).sqrt() / self.index;
+        2.0 * sin_inside / (1.0 - sin_inside * sin_inside).sqrt()
     }
 
     /// Relative change of both effects per change of the cosine between beam and exit direction.
@@ -105,6 +139,7 @@ mod tests {
         let sin_inside = along.norm() / glass.index;
         let cos_inside = (1.0 - sin_inside * sin_inside).sqrt();
         let walk = along.normalize() * (2.0 * 3e-3 * sin_inside / cos_inside);
+        assert!((3e-3 * glass.walk(&beam, &exit) - walk.norm()).abs() < 1e-15);
         let path = 2.0 * glass.index * 3e-3 / cos_inside;
         let found = glass.stated(&beam, &exit);
         // From where the light enters: along the beam to the mirror set back, then along the exit direction.

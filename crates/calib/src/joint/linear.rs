@@ -77,8 +77,7 @@ impl Linear {
         plane: &BoardPlane,
         glass: &GlassSheet,
     ) -> f64 {
-        let effect = glass.effect(u, &self.fan.v);
-        effect.delay + effect.setback * (1.0 - plane.normal.dot(u) / plane.normal.dot(&self.v))
+        glass.effect(u, &self.fan.v).on_plane(u, &self.v, &plane.normal)
     }
 
     /// Prediction errors that remain after the deviation, divided by the standard deviations.

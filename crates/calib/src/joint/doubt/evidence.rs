@@ -8,15 +8,19 @@ use crate::lsq::Information;
 use nalgebra::{DMatrix, DVector};
 
 /// Part of a shape, as a share of its square, that the model must leave for it to be tested.
-const LEFT: f64 = 1e-7;
+pub(super) const LEFT: f64 = 1e-7;
+
+/// The same of a parameter's prior. Less means that the readings hardly determine it: what the linearization neglects,
+/// some thousandths of its standard deviation, would be taken for evidence.
+pub(super) const LEFT_OF_PRIOR: f64 = 1e-3;
 
 /// Scores of some omitted errors, with mean 0 and a known covariance if there are none.
 #[derive(Debug, Clone)]
 pub(super) struct Evidence {
     scores: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// zᵀz of each.
-    squares: DVector<f64>,
+    /// Variance of each below which it is not tested: a share of zᵀz.
+    least: DVector<f64>,
 }
 
 /// A test statistic and its degrees of freedom.
@@ -27,17 +31,19 @@ pub(super) struct Statistic {
 }
 
 impl Evidence {
-    /// From the scores zᵀf, the products ZᵀZ, and the rows zᵀJ; `None` if the solution leaves one of them open.
+    /// From the scores zᵀf, the products ZᵀZ, the share of each square that has to be left, and the rows zᵀJ; `None` if
+    /// the solution leaves one of them open.
     pub(super) fn new(
         scores: DVector<f64>,
         products: &DMatrix<f64>,
+        shares: &DVector<f64>,
         by_parameters: &DMatrix<f64>,
         information: &Information,
     ) -> Option<Self> {
         let absorbed = information.covariance_of(by_parameters)?;
         Some(Self {
             scores,
-            squares: products.diagonal(),
+            least: products.diagonal().component_mul(shares),
             covariance: products - absorbed,
         })
     }
@@ -58,8 +64,8 @@ impl Evidence {
         let scale = DVector::from_iterator(
             of.len(),
             of.iter().map(|i| {
-                let square = self.squares[*i];
-                if square > 0.0 { 1.0 / square.sqrt() } else { 0.0 }
+                let least = self.least[*i];
+                if least > 0.0 { 1.0 / least.sqrt() } else { 0.0 }
             }),
         );
         let scaled = DMatrix::from_fn(of.len(), of.len(), |i, j| {
@@ -68,7 +74,7 @@ impl Evidence {
         let eigen = ((&scaled + scaled.transpose()) * 0.5).symmetric_eigen();
         let mut rank = 0;
         let inverted = eigen.eigenvalues.map(|value| {
-            if value > LEFT {
+            if value > 1.0 {
                 rank += 1;
                 1.0 / value
             } else {
@@ -131,7 +137,7 @@ impl Evidence {
         Self {
             scores: &self.scores - &gain * scores,
             covariance: &self.covariance - gain * across.transpose(),
-            squares: self.squares.clone(),
+            least: self.least.clone(),
         }
     }
 }

@@ -12,12 +12,14 @@ mod tail;
 mod words;
 
 use super::answer::Answer;
+use super::group::JointElement;
 use super::problem::Joint;
 use crate::lsq::{self, Solution};
 use catoptric_model::assessment::{Cause, ComponentTest, Doubt};
 use catoptric_model::{Dataset, Session};
 use evidence::{Evidence, Statistic};
 use hypothesis::{Hypothesis, Kind, WORTH, hypotheses};
+use nalgebra::Point3;
 
 /// Probability of any doubt if all beliefs hold.
 const FALSE_ALARM: f64 = 1e-3;
@@ -109,7 +111,8 @@ impl Joint<'_> {
     }
 
     /// The problem without what may not be a whole beam: elements at the edges of facets, which may lose part of their
-    /// light there, and those with residuals that are hardly noise; and the number of readings left out.
+    /// light there or in the rim of the glass, and those with residuals that are hardly noise; and the number of readings
+    /// left out.
     fn without_edges(&self, answers: &[Answer]) -> (Self, usize) {
         let mut inner = self.clone();
         let strange = strange(answers);
@@ -122,9 +125,18 @@ impl Joint<'_> {
                     .filter(|e| e.facet == Some(facet))
                     .collect();
                 own.sort_by(|a, b| a.along.total_cmp(&b.along));
-                let (count, edge) = (own.len(), EDGE.min(own.len() / EDGE_SHARE));
+                let count = own.len();
+                let points: Vec<_> = own.iter().map(|e| self.in_rim(e, answers)).collect();
+                let within = |from: Option<(Point3<f64>, f64)>| {
+                    let near =
+                        |p: &&(Point3<f64>, f64)| from.is_some_and(|(from, _)| (p.0 - from).norm() < p.1);
+                    points.iter().flatten().filter(near).count()
+                };
+                let least = EDGE.min(count / EDGE_SHARE);
+                let first = within(points.first().copied().flatten()).max(least);
+                let last = within(points.last().copied().flatten()).max(least);
                 for (place, element) in own.into_iter().enumerate() {
-                    if place < edge || place + edge >= count || strange.contains(&element.beam) {
+                    if place < first || place + last >= count || strange.contains(&element.beam) {
                         left_out += element.sights.len();
                         element.sights.iter_mut().for_each(|sight| sight.sd *= LEFT_OUT);
                     }
@@ -132,6 +144,19 @@ impl Joint<'_> {
             }
         }
         (inner, left_out)
+    }
+
+    /// Where an element meets its mirror, and how near to the edge of the glass it loses light, in meters; nothing without
+    /// glass.
+    fn in_rim(&self, element: &JointElement, answers: &[Answer]) -> Option<(Point3<f64>, f64)> {
+        let glass = self.glass?;
+        let deflection = answers.iter().find(|a| a.beam == element.beam)?.deflection;
+        let thickness_mm = glass.thickness_mm + 2.0 * glass.thickness_sd_mm;
+        let walk = glass.walk(&element.u, &deflection.exit_direction(element.azimuth));
+        Some((
+            deflection.deflection_point(element.azimuth),
+            1e-3 * thickness_mm * walk,
+        ))
     }
 }
 

@@ -7,7 +7,7 @@ use super::super::group::{BOARD_ERRORS, FACET_PARAMETERS, FIGURE_ORDERS};
 use super::super::linear::Linear;
 use super::super::placed::Boards;
 use super::super::problem::Joint;
-use super::evidence::Evidence;
+use super::evidence::{Evidence, LEFT, LEFT_OF_PRIOR};
 use crate::lsq::Solution;
 use catoptric_model::{Dataset, PoseKind};
 use nalgebra::{DMatrix, DVector};
@@ -288,8 +288,16 @@ impl Joint<'_> {
         });
         self.add_bare(dataset, solution, &shapes, &mut add)?;
         self.add_priors(solution, &shapes, &mut scores, &mut products, &mut by)?;
+        let share = |column, _| {
+            if column < shapes.shared {
+                LEFT
+            } else {
+                LEFT_OF_PRIOR
+            }
+        };
+        let shares = DVector::from_fn(shapes.count, share);
         Some((
-            Evidence::new(scores, &products, &by, &solution.information)?,
+            Evidence::new(scores, &products, &shares, &by, &solution.information)?,
             shapes,
         ))
         .map(|(evidence, shapes)| (shapes, evidence))
