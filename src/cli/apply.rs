@@ -6,10 +6,10 @@ use super::one_of::one_of;
 use super::output::{counted, print};
 use super::outputs::Replacing;
 use super::validate::invalid;
+use catoptric::apply::ApplyError;
 use catoptric::files::Content;
 use catoptric::files::cloud::CloudFormat;
-use catoptric::validate::{Severity, validate_for};
-use catoptric::{CloudFrame, apply_into, read_calibration_for};
+use catoptric::{CloudFrame, Error, apply_into, read_calibration_for};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -51,11 +51,12 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let out = outputs.file(path, &content)?;
     let dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
     let calibration = read_calibration_for(&arguments.calibration, &dataset.session)?;
-    let problems = validate_for(&calibration, &dataset.session);
-    if problems.iter().any(|p| p.severity == Severity::Error) {
-        return Err(invalid(&arguments.calibration, &problems));
-    }
-    let cloud = apply_into(&dataset, &calibration, arguments.pose, arguments.frame, out)?;
+    let cloud = match apply_into(&dataset, &calibration, arguments.pose, arguments.frame, out) {
+        Err(Error::Apply(ApplyError::Invalid(problems))) => {
+            return Err(invalid(&arguments.calibration, &problems));
+        }
+        other => other?,
+    };
     if cloud.mount_is_nominal {
         context.say("the calibration has no mounting: using the one of the drawing");
     }

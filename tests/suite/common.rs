@@ -11,6 +11,27 @@ pub(crate) fn catoptric() -> Command {
     command
 }
 
+/// The program with all signals as by default, though these tests may have been started by `nohup` or in the background
+/// of a shell, which ignore some of them.
+pub(crate) fn heeding_signals() -> Command {
+    let program = catoptric();
+    let reset = "--default-signal=HUP,INT,TERM";
+    // GNU's; where there is none, the tests have to be started by a terminal.
+    let known = Command::new("env").args([reset, "true"]).output();
+    if !known.is_ok_and(|output| output.status.success()) {
+        return program;
+    }
+    let mut command = Command::new("env");
+    command.arg(reset).arg(program.get_program());
+    for (name, value) in program.get_envs() {
+        match value {
+            Some(value) => command.env(name, value),
+            None => command.env_remove(name),
+        };
+    }
+    command
+}
+
 /// Runs the program in a folder.
 pub(crate) fn run(folder: &Path, arguments: &[&str]) -> Output {
     catoptric().args(arguments).current_dir(folder).output().unwrap()

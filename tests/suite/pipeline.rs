@@ -1,6 +1,6 @@
 //! From scene to report through the program, on an experiment small enough to run in a second.
 
-use crate::common::{catoptric, run, stderr, stdout};
+use crate::common::{catoptric, heeding_signals, run, stderr, stdout};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -173,7 +173,7 @@ fn missing_and_broken_files() {
 fn ctrl_c_leaves_nothing_behind() {
     let folder = tempfile::tempdir().unwrap();
     succeeds(&run(folder.path(), &["new", "scene.toml"]));
-    let child = catoptric()
+    let child = heeding_signals()
         .args([
             "simulate",
             "scene.toml",

@@ -123,6 +123,17 @@ fn judged(name: &str, falsify: impl FnOnce(&mut Value), verdict: &str, code: i32
     assert_eq!(output.status.code(), Some(valid), "{name}: {}", stderr(&output));
     let validated: Value = serde_json::from_str(&stdout(&output)).unwrap();
     assert_eq!(validated["verdict"], if valid == 0 { "pass" } else { "invalid" });
+    // No cloud is made of what is refused.
+    let output = run(at, &["apply", "data", &file, "--out", "cloud.ply", "--replace"]);
+    assert_eq!(output.status.code(), Some(valid), "{name}: {}", stderr(&output));
+    if valid != 0 {
+        let first = &validated["problems"][0]["message"];
+        assert!(
+            stderr(&output).contains(first.as_str().unwrap()),
+            "{}",
+            stderr(&output)
+        );
+    }
     // The page agrees, or is not written.
     let output = run(at, &["report", "data", &file, "--out", "page.html"]);
     assert_eq!(

@@ -2,7 +2,7 @@
 //! left is removed by the next one, and nothing of one that lives.
 #![cfg(unix)]
 
-use crate::common::{catoptric, run, stderr};
+use crate::common::{catoptric, heeding_signals, run, stderr};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -30,7 +30,7 @@ fn workplace() -> tempfile::TempDir {
 
 /// Begins a simulation and waits until it writes beside `before` other temporary folders.
 fn simulate(folder: &Path, out: &str, scans: usize, before: usize) -> Child {
-    let mut command = catoptric();
+    let mut command = heeding_signals();
     command
         .args(["simulate", "scene.toml", "--quiet", "--out", out])
         .args(["--set", &format!("experiment.scans_per_pose={scans}")]);
@@ -145,7 +145,7 @@ fn programs_of_a_study_end_with_it() {
             "stubborn=sh 'a program.sh' '{}' {{dataset}} {{out}}",
             noted.display()
         );
-        let child = catoptric()
+        let child = heeding_signals()
             .args([
                 "study",
                 "scene.toml",
@@ -204,7 +204,7 @@ fn a_second_signal_ends_at_once() {
             .unwrap()
             .success()
     );
-    let mut child = catoptric()
+    let mut child = heeding_signals()
         .args(["trace", "scene.toml", "--rays", "rays.csv", "--out", "paths.csv"])
         .current_dir(at)
         .stderr(Stdio::piped())

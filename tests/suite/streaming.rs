@@ -4,7 +4,7 @@
 //! Memory is counted in readings in flight, as reported by the program. The overhead of the allocator is not measured
 //! here.
 
-use crate::common::{catoptric, run, stderr, stdout};
+use crate::common::{catoptric, heeding_signals, run, stderr, stdout};
 use crate::scenes::{PROTOTYPE, TWO_MIRROR, scene};
 use catoptric::files::scene::load;
 use catoptric::files::{DatasetWriter, Provenance};
@@ -250,7 +250,7 @@ fn ten_times_the_scans_need_no_more_memory() {
 fn a_run_stopped_within_a_stretch_leaves_no_files() {
     let folder = tempfile::tempdir().unwrap();
     let scene = file("static-10000");
-    let mut child = catoptric()
+    let mut child = heeding_signals()
         .args(["simulate", scene.to_str().unwrap(), "--out", "data", "--readings"])
         .args(["--set", "experiment.scans_per_pose=1000000"])
         .current_dir(folder.path())

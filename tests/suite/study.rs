@@ -2,7 +2,7 @@
 //!
 //! The formulas of the statistics are covered by their unit tests. The programs exist on any Unix.
 
-use crate::common::{catoptric, run, stderr, stdout};
+use crate::common::{catoptric, heeding_signals, run, stderr, stdout};
 use catoptric::calib::{CalibError, Calibrator, Method};
 use catoptric::files::scene as scenes;
 use catoptric::model::{Calibration, Dataset};
@@ -386,7 +386,7 @@ fn ctrl_c_ends_programs_and_keeps_none_of_their_failures() {
         ]
         .map(str::to_owned)
     };
-    let child = catoptric()
+    let child = heeding_signals()
         .args(arguments("s"))
         .current_dir(at)
         .stdout(std::process::Stdio::piped())

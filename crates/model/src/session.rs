@@ -3,6 +3,7 @@
 //! This is `session.toml`. It holds the nominal design, not the structure as built, and the assumed noise and biases,
 //! not the actual ones. The truth is never here.
 
+use crate::beam::Deflection;
 use crate::bias::{DistanceBias, RangeBias};
 use crate::board::{BoardPlane, Rectangle};
 use crate::characterization::{Characterization, NoiseRow};
@@ -421,5 +422,13 @@ impl Session {
     /// The board of that name.
     pub fn board(&self, name: &str) -> Option<&BoardSheet> {
         self.boards.iter().find(|b| b.name == name)
+    }
+
+    /// [`GlassSheet::as_bare`] for the glass in front of the mirrors, if there is any.
+    pub fn without_glass(&self, beam_azimuth: f64, deflection: &Deflection) -> (Deflection, f64) {
+        match &self.glass {
+            Some(glass) => glass.as_bare(beam_azimuth, deflection),
+            None => (*deflection, 0.0),
+        }
     }
 }

@@ -3,12 +3,13 @@
 mod sketch;
 
 use crate::score::residual;
+use crate::validate::{Problem, Severity, validate_for};
 #[cfg(doc)]
 use catoptric_model::Motion;
 use catoptric_model::cloud::{self, CloudFrame, CloudPoint, PointCloud};
 use catoptric_model::{
-    Calibration, Dataset, Deflection, ModelError, Pose, PoseKind, PoseRecord, RangeBias, ScanGeometry,
-    Status, Unreadable,
+    Calibration, Dataset, Deflection, Pose, PoseKind, PoseRecord, RangeBias, ScanGeometry, Session, Status,
+    Unreadable,
 };
 pub use sketch::{CloudSketch, Extent};
 
@@ -31,9 +32,17 @@ pub enum ApplyError {
     /// Readings that the dataset's recording gives no more.
     #[error(transparent)]
     Unreadable(#[from] Unreadable),
-    /// The calibration is of another scanner.
-    #[error(transparent)]
-    Scanner(#[from] ModelError),
+    /// The calibration is refused by [`validate_for`], or is of another scanner.
+    #[error("the calibration is invalid: {}{}", .0[0], more(.0))]
+    Invalid(Vec<Problem>),
+}
+
+/// How many problems follow the first.
+fn more(problems: &[Problem]) -> String {
+    match problems.len() {
+        0 | 1 => String::new(),
+        n => format!("; and {} more, which `catoptric validate` lists", n - 1),
+    }
 }
 
 /// Lifts every range of a stretch into space: of pose number `pose`, or by default of the first stretch of the empty
@@ -41,7 +50,8 @@ pub enum ApplyError {
 ///
 /// Solved elements follow Eq. (9), direct ones stay in the scan plane, the others are omitted and counted. Ranges are
 /// corrected by E_r and by E_c of the room's color (of the board's, in a stretch with a board), as calibrated or
-/// believed. Unlike the paper, Eq. (3), E_a is not subtracted: the incidence on an unknown scene is unknown.
+/// believed, and for glass in front of the mirrors, at its stated thickness. Unlike the paper, Eq. (3), E_a is not
+/// subtracted: the incidence on an unknown scene is unknown.
 ///
 /// In a flight, the pose of the rig is the one tracked by motion capture at the time of each reading (see
 /// [`Motion::room_from_rig`]); the sensor and rig frames are those of that time, too.
@@ -49,7 +59,8 @@ pub enum ApplyError {
 /// The cloud is in memory; [`Lift`] hands on point by point.
 ///
 /// # Errors
-/// [`ApplyError`] if there is no such stretch, its readings are there no more, or the calibration is of another scanner.
+/// [`ApplyError`] if there is no such stretch, its readings are there no more, or the calibration is invalid or of another
+/// scanner.
 pub fn apply(
     dataset: &Dataset,
     calibration: &Calibration,
@@ -107,7 +118,8 @@ pub struct Lift<'a> {
     /// What is known of the cloud.
     pub sheet: CloudSheet,
     record: &'a PoseRecord,
-    deflections: Vec<Option<Deflection>>,
+    /// Of every beam that has a direction, with the delay by glass, in meters.
+    deflections: Vec<Option<(Deflection, f64)>>,
     rig_from_sensor: Pose,
     scan: &'a ScanGeometry,
     bias: &'a RangeBias,
@@ -118,19 +130,24 @@ impl<'a> Lift<'a> {
     /// Prepares a stretch.
     ///
     /// # Errors
-    /// [`ApplyError`] if there is no such stretch, or the calibration is of another scanner.
+    /// [`ApplyError`] if there is no such stretch, or the calibration is invalid or of another scanner.
     pub fn new(
         dataset: &'a Dataset,
         calibration: &'a Calibration,
         pose: Option<usize>,
         frame: CloudFrame,
     ) -> Result<Self, ApplyError> {
-        calibration.check_scanner(&dataset.session)?;
+        let mut problems = validate_for(calibration, &dataset.session);
+        problems.retain(|p| p.severity == Severity::Error);
+        if !problems.is_empty() {
+            return Err(ApplyError::Invalid(problems));
+        }
         let record = find(dataset, pose)?;
         // Nothing is believed about a color without a name.
         let room_color = dataset.session.room.as_ref().map_or("", |room| &room.color);
-        let deflections: Vec<Option<Deflection>> =
-            (0..record.beams()).map(|b| deflection(calibration, b)).collect();
+        let deflections: Vec<Option<(Deflection, f64)>> = (0..record.beams())
+            .map(|b| deflection(calibration, &dataset.session, b))
+            .collect();
         let mut sheet = CloudSheet {
             frame,
             pose: record.label.pose,
@@ -168,12 +185,12 @@ impl<'a> Lift<'a> {
     ) -> Result<(), E> {
         for (scan, ranges) in self.record.scans().enumerate() {
             for (beam, (&range, deflection)) in ranges?.iter().zip(&self.deflections).enumerate() {
-                let Some(deflection) = deflection.as_ref().filter(|_| range.is_finite()) else {
+                let Some((deflection, delay)) = deflection.as_ref().filter(|_| range.is_finite()) else {
                     continue;
                 };
                 // E_a of whatever incidence is not added, so any will do here.
                 let terms = self.bias.terms(range, 1.0, self.color);
-                let corrected = range - terms.distance - terms.color;
+                let corrected = range - terms.distance - terms.color - delay;
                 let in_sensor = cloud::lift(deflection, self.scan.azimuth(beam), corrected);
                 // During a flight, the rig is nowhere known while motion capture has lost it.
                 let Some(frame_from_sensor) = self.frame_from_sensor(scan, beam) else {
@@ -218,12 +235,15 @@ fn find(dataset: &Dataset, pose: Option<usize>) -> Result<&PoseRecord, ApplyErro
     })
 }
 
-/// Returns the deflection of a beam according to the calibration; `None` if it has none.
-fn deflection(calibration: &Calibration, beam: usize) -> Option<Deflection> {
+/// Returns the deflection of a beam according to the calibration, as a front-surface mirror's, and the delay by glass;
+/// `None` if it has no direction.
+fn deflection(calibration: &Calibration, session: &Session, beam: usize) -> Option<(Deflection, f64)> {
     let estimate = calibration.beam(beam)?;
     match estimate.status {
-        Status::Solved => estimate.deflection(),
-        Status::Direct => Some(Deflection::NONE),
+        Status::Solved => {
+            Some(session.without_glass(session.scanner.scan.azimuth(beam), &estimate.deflection()?))
+        }
+        Status::Direct => Some((Deflection::NONE, 0.0)),
         Status::TooFewPoses | Status::Unobservable | Status::NotConverged | Status::Rejected => None,
     }
 }

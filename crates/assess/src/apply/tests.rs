@@ -3,8 +3,9 @@
 use super::*;
 use catoptric_fixtures::ust20lx;
 use catoptric_fixtures::{perfect, sample};
+use catoptric_model::glass::GlassSheet;
 use catoptric_model::{ColorBias, DistanceBias, RangeBias};
-use nalgebra::Point3;
+use nalgebra::{Point3, Unit};
 
 /// The first scan.
 fn scan(dataset: &Dataset) -> &[f64] {
@@ -142,4 +143,46 @@ fn without_a_mounting_the_drawing_is_used_and_reported() {
     calibration.rig_from_sensor = None;
     let cloud = apply(&s.dataset, &calibration, None, CloudFrame::Room).expect("there is a room");
     assert!(cloud.mount_is_nominal);
+}
+
+/// What glass adds to the range comes off again, and the mirror is as far behind its front as it seems.
+#[test]
+fn the_cloud_is_the_room_through_glass_too() {
+    let mut s = sample();
+    let session = &mut s.dataset.session;
+    session.glass = Some(GlassSheet {
+        thickness_mm: 3.0,
+        ..GlassSheet::default()
+    });
+    let calibration = perfect(&s.truth);
+    let scan = session.scanner.scan;
+    let room = session.room.clone().expect("the sample has walls");
+    let room_from_sensor = s.dataset.poses[0].room_from_rig * Pose::from(&s.truth.rig_from_sensor);
+    let beams = scan.beams();
+    let ranges = s.dataset.poses[0].readings.held_mut().expect("in memory");
+    let mut set_back = 0;
+    for estimate in &calibration.beams {
+        let Some(deflection) = estimate.deflection() else {
+            continue;
+        };
+        let azimuth = scan.azimuth(estimate.beam);
+        let (bare, delay) = session.without_glass(azimuth, &deflection);
+        let origin = room_from_sensor * bare.deflection_point(azimuth);
+        let exit = Unit::new_unchecked(room_from_sensor * deflection.exit_direction(azimuth).into_inner());
+        let (beyond, _) = room.cast(&origin, &exit).expect("walls all around");
+        for range in ranges.iter_mut().skip(estimate.beam).step_by(beams) {
+            if range.is_finite() {
+                *range = bare.distance + beyond + delay;
+            }
+        }
+        // 3 mm at any incidence: more than the thickness over n, less than at grazing incidence.
+        let by = bare.distance - deflection.distance;
+        assert!((1.98e-3..2.66e-3).contains(&by) && delay > 4.0e-3, "{by} {delay}");
+        set_back += 1;
+    }
+    assert!(set_back > 300, "{set_back}");
+    let cloud = apply(&s.dataset, &calibration, None, CloudFrame::Room).expect("there is a room");
+    for p in &cloud.points {
+        assert!(off_wall(&s.dataset, &p.position) < 1e-9, "beam {}", p.beam);
+    }
 }

@@ -6,7 +6,7 @@
 
 use catoptric_calib::covariance::{MountUncertainty, budget};
 use catoptric_calib::observations::{self, BoardView};
-use catoptric_model::{BeamEstimate, BoardPlane, Calibration, Dataset, Deflection, Pose, Session};
+use catoptric_model::{BeamEstimate, BoardPlane, Calibration, Dataset, Deflection, Pose, Session, beam};
 use nalgebra::{Matrix2, Matrix6, Unit};
 
 /// The errors that a calibration leaves.
@@ -49,7 +49,14 @@ impl<'a> Allowance<'a> {
             let row = budget.jacobian.fixed_view::<1, 2>(0, 0);
             (row * c * row.transpose())[0]
         });
-        Some(budget.covariance[(0, 0)] + direction)
+        let glass = self.session.glass.map_or(0.0, |glass| {
+            let (beam, exit) = (beam::direction(azimuth), deflection.exit_direction(azimuth));
+            let by_thickness = glass
+                .effect(&beam, &exit)
+                .on_plane(&beam, &exit, &on.plane.normal);
+            (1e-3 * glass.thickness_sd_mm * by_thickness).powi(2)
+        });
+        Some(budget.covariance[(0, 0)] + direction + glass)
     }
 
     /// A wall of the surveyed room as a board without markers.

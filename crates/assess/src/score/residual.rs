@@ -59,8 +59,8 @@ struct Visit {
 /// Point-to-board residuals of the readings of the solved elements on the boards of their facets.
 ///
 /// An element is on a board if its outgoing ray, as calibrated, hits the board's face farther from the edge than its
-/// spot. A reading there is corrected by all terms of Eq. (3), since board and incidence are known, and its residual is
-/// the distance of the lifted point from the board's plane, cos θ_N·(r − d − s).
+/// spot. A reading there is corrected by all terms of Eq. (3), since board and incidence are known, and for glass in front
+/// of the mirror. Its residual is the distance of the lifted point from the board's plane, cos θ_N·(r − d − s).
 ///
 /// # Errors
 /// [`Unreadable`] if the recording can no longer be read.
@@ -86,8 +86,9 @@ pub(super) fn judged_boards(
             let board = board.as_ref()?;
             let azimuth = observations::azimuth(&dataset.session, estimate.beam);
             let exit = deflection.exit_direction(azimuth);
-            let hit = board.hit(&deflection.deflection_point(azimuth), &exit)?;
-            let predicted = deflection.distance + hit.distance;
+            let (bare, delay) = dataset.session.without_glass(azimuth, deflection);
+            let hit = board.hit(&bare.deflection_point(azimuth), &exit)?;
+            let predicted = bare.distance + hit.distance + delay;
             board.holds(&hit, cone * predicted, 0.0).then(|| Surface {
                 predicted,
                 cos_incidence: board.plane.cos_incidence(&exit),
@@ -119,12 +120,13 @@ pub(super) fn judged_walls(
         move |estimate: &BeamEstimate, deflection: &Deflection| {
             let room = dataset.session.room.as_ref()?;
             let azimuth = observations::azimuth(&dataset.session, estimate.beam);
-            let origin = room_from_sensor * deflection.deflection_point(azimuth);
+            let (bare, delay) = dataset.session.without_glass(azimuth, deflection);
+            let origin = room_from_sensor * bare.deflection_point(azimuth);
             let in_sensor = deflection.exit_direction(azimuth);
             let exit = Unit::new_unchecked(room_from_sensor * in_sensor.into_inner());
             let (s, wall) = room.cast(&origin, &exit)?;
             Some(Surface {
-                predicted: deflection.distance + s,
+                predicted: bare.distance + s + delay,
                 cos_incidence: wall.cos_incidence(&exit),
                 color: room.color.clone(),
                 allowed: allowance.and_then(|a| {
