@@ -194,6 +194,8 @@ fn facet(side: &str, index: usize, sign: f64, &(width, distance_mm, turn, elevat
     Facet {
         name: format!("{side}-{}", index + 1),
         two_sided: false,
+        reflectivity: None,
+        coating: None,
         shape: FacetShape::Wedge(Wedge {
             azimuth_deg: if sign > 0.0 {
                 [first, last]

@@ -7,6 +7,7 @@
 
 mod experiment;
 mod flight;
+mod mirror;
 mod mishap;
 mod outline;
 mod overlap;
@@ -35,6 +36,7 @@ pub fn problems(scene: &Scene) -> Vec<Problem> {
     let mut found = Findings(Vec::new());
     values::check(scene, &mut found);
     stage::check(scene, &mut found);
+    mirror::check(scene, &mut found);
     let scan = match scene.scanner.scan() {
         Ok(scan) => scan,
         Err(error) => {
