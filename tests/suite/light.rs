@@ -5,6 +5,9 @@ use catoptric::calib::{self, Method, Options};
 use catoptric::files::scene::parse;
 use catoptric::sim::{Laboratory, Scene};
 
+/// The empty room.
+const ROOM: usize = 1;
+
 fn with(sets: &[&str]) -> Scene {
     let sets: Vec<String> = sets.iter().map(|s| (*s).to_owned()).collect();
     parse(TWO_MIRROR, "two-mirror.toml", &sets).expect("the case is valid")
@@ -44,13 +47,13 @@ fn a_mirror_that_scatters_ends_a_calibration_only_in_the_receiver_s_view() {
 /// Powers of the deflected beams of a stretch, and those of the direct ones.
 fn powers(sets: &[&str]) -> [Vec<f64>; 2] {
     let laboratory = Laboratory::new(&with(sets), 1).expect("the scene is valid");
-    let sight = laboratory.sight(0).expect("the room");
+    let sight = laboratory.sight(ROOM).expect("the room");
     let returns = sight.returns(0);
     [true, false].map(|deflected| {
         let of_kind = returns
             .iter()
             .flatten()
-            .filter(|r| !r.facets.is_empty() == deflected);
+            .filter(|r| r.facets.is_empty() != deflected);
         of_kind.map(|r| r.power).collect()
     })
 }

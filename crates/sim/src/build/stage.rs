@@ -3,9 +3,9 @@
 //! They are exactly where the scene places them. Every ray cast into the room can hit them; the drawing of the
 //! structure, its beams and the truth about them do not include them.
 
+use crate::build::coating::Finish;
 use crate::build::structure::{BuiltFacet, OpaquePart, mesh_shape};
 use crate::error::SimError;
-use crate::light::coating::Finish;
 use crate::scene::facet::outline::rectangle;
 use crate::scene::{PlaneRectangle, PlaneShape, RoomMirror, RoomSurface, Scene, SurfaceShape};
 use catoptric_cast::{Block, Cylinder, Polygon, Shape};

@@ -4,8 +4,8 @@
 //! and the laser's own frame is slightly off in its housing: in the true sensor frame, everything bolted to the housing
 //! moves accordingly.
 
+use crate::build::coating::Finish;
 use crate::error::SimError;
-use crate::light::coating::Finish;
 use crate::noise::{Draws, Purpose};
 use crate::scene::{Facet, Glass, MeshShape, Post, PostShape, Scene};
 use catoptric_cast::{Block, Cylinder, Polygon, Shape, Triangles};

@@ -22,9 +22,10 @@ use crate::findings::Findings;
 use crate::scene::Scene;
 use catoptric_model::place::{KeyPath, Problem};
 
-/// What is probably not meant, and hinders nothing: mirrors that no beam reaches.
+/// What is probably not meant, and hinders nothing: mirrors that no beam reaches, and noise that holds for nothing.
 pub fn warnings(scene: &Scene) -> Vec<Problem> {
     let mut found = Findings(Vec::new());
+    values::warn(scene, &mut found);
     if let Ok(scan) = scene.scanner.scan() {
         structure::warn(scene, &scan, &mut found);
     }

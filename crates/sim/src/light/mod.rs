@@ -1,6 +1,5 @@
 //! Paths of light: the footprint of a beam, its path via mirrors and through glass, and the power that returns.
 
-pub(crate) mod coating;
 pub mod footprint;
 pub mod glass;
 pub(crate) mod optics;

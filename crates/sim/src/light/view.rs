@@ -56,7 +56,7 @@ impl Lens {
     }
 
     /// As a beam at an azimuth sees it; `None` if the detector takes everything.
-    pub(crate) fn from_beam(&self, shape: &BeamShape, azimuth: f64) -> Option<BeamView> {
+    pub(crate) fn seen_by(&self, shape: &BeamShape, azimuth: f64) -> Option<BeamView> {
         let half = |full: f64| 0.5e-3 * full;
         let (sin, cos) = if shape.turns {
             libm::sincos(azimuth)
@@ -305,7 +305,7 @@ mod tests {
         let shape = crate::scene::Preset::Ust20lx.beam_shape();
         for offset in [[0.0, 0.0], [0.0, 15.0], [-8.0, 3.0]] {
             let view = receiver(20.0, 20.0, offset)
-                .from_beam(&shape, 0.7)
+                .seen_by(&shape, 0.7)
                 .expect("it is limited");
             assert!(view.overlap(&CHIEF, 1e-9) < 1e-12);
             assert_eq!(view.overlap(&CHIEF, 20.0), 1.0);
@@ -316,7 +316,7 @@ mod tests {
         }
         // In front of the lens, as the square of the range: 1/R² of Eq. (1) is made up for.
         let view = receiver(20.0, 20.0, [0.0, 0.0])
-            .from_beam(&shape, 0.0)
+            .seen_by(&shape, 0.0)
             .expect("it is limited");
         for range in [0.03, 0.065, 0.5] {
             let exact = (range * libm::tan(0.010) / 0.010).powi(2);
@@ -326,7 +326,7 @@ mod tests {
             );
         }
         assert!(receiver(20.0, 20.0, [0.0, 0.0]).view.is_finite());
-        assert!(Lens::of(&Light::default()).from_beam(&shape, 0.0).is_none());
+        assert!(Lens::of(&Light::default()).seen_by(&shape, 0.0).is_none());
     }
 
     /// What is outside the view of a small lens far away is not seen: the third area of dA.
@@ -334,7 +334,7 @@ mod tests {
     fn sub_rays_beyond_the_view_are_lost() {
         let shape = crate::scene::Preset::Ust20lx.beam_shape();
         let view = receiver(0.01, 12.0, [0.0, 0.0])
-            .from_beam(&shape, 0.0)
+            .seen_by(&shape, 0.0)
             .expect("it is limited");
         let at = |wide| SubRay { wide, ..CHIEF };
         assert_eq!(view.overlap(&at(0.7), 5.0), 1.0);

@@ -28,7 +28,9 @@ pub use body::{
 };
 pub use coating::{Coating, CoatingTable, Dust, Film, Stack};
 pub use detection::{Detection, Detector, EchoChoice, Principle};
-pub use errors::{Characterization, Correlated, ErrorModel, Errors, Interference, NoiseTable, WarmUp};
+pub use errors::{
+    Characterization, Correlated, ErrorModel, Errors, IncidenceNoise, Interference, NoiseTable, WarmUp,
+};
 pub use facet::{Facet, FacetShape, Plate, PolygonShape, RectangleShape, Wedge};
 pub use flight::{Attitude, Flight, Waypoint};
 pub use meshes::Meshes;

@@ -143,13 +143,13 @@ pub struct Light {
     /// Angle of the laser's linear polarization from the long axis of the beam's ellipse, with which it turns, in degrees;
     /// without it, the light is not polarized (nobody publishes it).
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(inner(range(min = -180.0, max = 180.0)))]
+    #[schemars(range(min = -180.0, max = 180.0))]
     pub polarization_deg: Option<f64>,
     /// Full angle θ_V that the receiver's detector takes, in milliradians: the third of the areas that dA is the least of,
     /// and what makes near targets no brighter than far ones. Without it, the receiver sees every spot with all of its
     /// lens.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(inner(range(min = 0.01, max = 3000.0)))]
+    #[schemars(range(min = 0.01, max = 3000.0))]
     pub receiver_field_of_view_mrad: Option<f64>,
     /// Center of the receiver's lens from where the beam leaves, horizontally across the beam and up, in millimeters
     /// (assumed).

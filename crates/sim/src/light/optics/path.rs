@@ -39,6 +39,13 @@ pub struct Meeting {
     pub after: Unit<Vector3<f64>>,
 }
 
+impl Meeting {
+    /// The mirror whose coating counts, and where the light goes on.
+    pub(crate) fn hop(&self) -> (Option<usize>, Unit<Vector3<f64>>) {
+        (self.silver, self.after)
+    }
+}
+
 /// A reflection.
 #[derive(Debug, Clone, Copy)]
 pub struct Bounce {

@@ -7,7 +7,7 @@
 use super::path::{Course, End, Meeting};
 use super::setting::Setting;
 #[cfg(doc)]
-use crate::light::coating::Finishes;
+use crate::build::coating::Finishes;
 use catoptric_cast::Ray;
 use catoptric_cast::Rays;
 use nalgebra::Vector3;
@@ -202,7 +202,7 @@ impl Compiled {
             met = own.end;
             compiled.lengths.push(course.length);
             if let Some(finishes) = bare.finishes() {
-                let met = bounces[own.clone()].iter().map(|(.., meeting)| *meeting);
+                let met = bounces[own.clone()].iter().map(|(.., meeting)| meeting.hop());
                 compiled
                     .passed
                     .push(finishes.passed(&ray.direction, long_axis, met));

@@ -6,11 +6,11 @@
 
 use super::clearance::Extent;
 use super::path::MAX_BOUNCES;
+use crate::build::coating::{Finish, Finishes};
 use crate::build::color::{self, Paint};
 use crate::build::stage::Stage;
 use crate::build::structure::{Back, BuiltFacet, OpaquePart, Structure};
 use crate::error::SimError;
-use crate::light::coating::{Finish, Finishes};
 use crate::light::view::Lens;
 use crate::scene::Scene;
 use catoptric_cast::Ray;

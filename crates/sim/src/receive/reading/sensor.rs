@@ -175,7 +175,7 @@ impl Sensor {
     pub(super) fn beam_in<'a>(&self, setting: &'a Setting<'a>, beam: usize) -> BeamIn<'a> {
         BeamIn {
             setting,
-            view: self.lens.from_beam(&self.shape, self.scan.azimuth(beam)),
+            view: self.lens.seen_by(&self.shape, self.scan.azimuth(beam)),
             long_axis: self.long_axis(beam),
         }
     }
@@ -200,7 +200,7 @@ impl Sensor {
         silvered: usize,
     ) -> f64 {
         match within.setting.finishes() {
-            Some(finishes) => finishes.passed(&ray.direction, &within.long_axis, meetings),
+            Some(finishes) => finishes.passed(&ray.direction, &within.long_axis, meetings.map(|m| m.hop())),
             None => self.mirrors[silvered],
         }
     }

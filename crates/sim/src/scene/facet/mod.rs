@@ -48,7 +48,7 @@ pub struct Facet {
     pub two_sided: bool,
     /// Share of the light that it reflects, instead of `superstructure.mirror.reflectivity`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(inner(range(min = 0.0, max = 1.0)))]
+    #[schemars(range(min = 0.0, max = 1.0))]
     pub reflectivity: Option<f64>,
     /// What reflects on it, instead of `superstructure.mirror.coating`.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -11,7 +11,6 @@
 //! η = N·cos θ for s and N/cos θ for p, (B, C) = Π [[cos δ, i·sin δ/η], [i·η·sin δ, cos δ]]·(1, η_substrate) and
 //! r = (η₀B − C)/(η₀B + C).
 
-use crate::light::optics::Meeting;
 use crate::scene::{Coating, CoatingTable, Facet, Mirror, Stack};
 use nalgebra::{Complex, Unit, Vector3};
 
@@ -76,9 +75,8 @@ impl Finishes {
         &self,
         start: &Unit<Vector3<f64>>,
         wide: &Vector3<f64>,
-        meetings: impl Iterator<Item = Meeting>,
+        hops: impl Iterator<Item = (Option<usize>, Unit<Vector3<f64>>)>,
     ) -> f64 {
-        let hops = meetings.map(|meeting| (meeting.silver, meeting.after));
         let [there, back] = self.there_and_back(start, wide, hops);
         (there * back).sqrt()
     }
