@@ -70,7 +70,7 @@ impl Finish {
 }
 
 impl Finishes {
-    /// Share of the power, as an amplitude: its square is that of the light there and back, for a ray via some mirrors.
+    /// Share of the power, as an amplitude: its square is the share of the round trip, for a ray via some mirrors.
     pub(crate) fn passed(
         &self,
         start: &Unit<Vector3<f64>>,
@@ -228,7 +228,7 @@ mod tests {
             let normal = ((n - 1.0).powi(2) + k * k) / ((n + 1.0).powi(2) + k * k);
             assert!((shares(&finish, 0.0)[0] - normal).abs() < 1e-14);
         }
-        // Bare aluminum at the incidences of the prototype: s and p differ by 1.3 to 1.6 there and back.
+        // Bare aluminum at the incidences of the prototype: s and p differ by 1.3 to 1.6 over the round trip.
         let aluminum = stack(2.1, 8.4, Vec::new());
         for (incidence, low, high) in [(56.0, 1.2, 1.4), (69.0, 1.4, 1.7)] {
             let [s, p] = shares(&aluminum, incidence);
