@@ -69,12 +69,12 @@ fn losses_are_those_of_the_path() {
         [over(&deflected, &plain), over(&others, &direct)]
     };
     let [of_mirrors, of_others] = ratios(&["superstructure.facet.0.reflectivity=0.45"]);
-    // Half of 0.9, there and back, on one facet; the other keeps its own.
+    // Half of 0.9, out and home, on one facet; the other keeps its own.
     assert!(of_others.iter().all(|r| (r - 1.0).abs() < 1e-12));
     let quarter = of_mirrors.iter().filter(|r| (**r - 0.25).abs() < 1e-9).count();
     let whole = of_mirrors.iter().filter(|r| (**r - 1.0).abs() < 1e-9).count();
     assert!(quarter > 100 && whole > 100 && quarter + whole == of_mirrors.len());
-    // Dust takes its share on the way in and on the way out, there and back.
+    // Dust takes its share before and after the mirror, on both passes.
     let [dusty, clean] = ratios(&["superstructure.mirror.dust={cover=0.1}"]);
     assert!(
         dusty.iter().all(|r| (r - 0.9_f64.powi(4)).abs() < 1e-9),

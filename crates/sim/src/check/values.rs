@@ -143,7 +143,7 @@ fn colors(scene: &Scene, found: &mut Findings) {
     }
 }
 
-/// Warns of a table of noise that does not hold for what is looked at: boards and walls in colors with their own.
+/// Warns of a table of noise that does not hold for the boards and walls, whose colors have their own.
 pub(super) fn warn(scene: &Scene, found: &mut Findings) {
     if scene.errors.noise == Errors::default().noise {
         return;

@@ -64,7 +64,7 @@ pub struct CoatingTable {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Dust {
-    /// Share of a mirror's face that it covers; light crosses it on the way to the mirror and on the way back.
+    /// Share of a mirror's face that it covers; light crosses it before the mirror and after it.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub cover: f64,
     /// Share of the light on it that it scatters, as a Lambertian surface would (assumed).

@@ -185,8 +185,8 @@ impl Sensor {
         footprint::axes(&self.shape, self.scan.azimuth(beam))[0]
     }
 
-    /// Share of a ray's light that the mirrors on its path reflect, as an amplitude: its square is that of the light there
-    /// and back.
+    /// Share of a ray's light that the mirrors on its path reflect, as an amplitude: its square is the share of
+    /// the round trip.
     pub fn reflected(&self, setting: &Setting<'_>, beam: usize, ray: &Ray, path: &RayPath) -> f64 {
         self.passed(&self.beam_in(setting, beam), ray, path.meetings(), path.silvered)
     }
