@@ -1,6 +1,6 @@
 //! From scene to report through the program, on an experiment small enough to run in a second.
 
-use crate::common::{catoptric, heeding_signals, run, stderr, stdout};
+use crate::common::{heeding_signals, run, stderr, stdout};
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};

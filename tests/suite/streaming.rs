@@ -4,7 +4,7 @@
 //! Memory is counted in readings in flight, as reported by the program. The overhead of the allocator is not measured
 //! here.
 
-use crate::common::{catoptric, heeding_signals, run, stderr, stdout};
+use crate::common::{heeding_signals, run, stderr, stdout};
 use crate::scenes::{PROTOTYPE, TWO_MIRROR, scene};
 use catoptric::files::scene::load;
 use catoptric::files::{DatasetWriter, Provenance};
