@@ -61,7 +61,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         context.say("the calibration has no mounting: using the one of the drawing");
     }
     print(&format!(
-        "wrote {}: {} in the {} frame, pose {}; left out: {} without a range, {} of {} without a direction\n\
+        "wrote {}: {} in the {} frame, pose {}; left out: {} without a range, {} of {} without a direction{}\n\
          next: open {} in a viewer such as CloudCompare or Open3D\n",
         path.display(),
         counted(cloud.points, "point"),
@@ -70,6 +70,10 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         counted(cloud.without_range, "reading"),
         counted(cloud.without_direction, "reading"),
         counted(cloud.unsolved_elements, "element"),
+        match cloud.without_pose {
+            0 => String::new(),
+            n => format!(", {n} while the rig was not tracked"),
+        },
         path.display(),
     ))
 }

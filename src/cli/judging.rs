@@ -64,9 +64,10 @@ pub(crate) fn unknown(error: &RequirementError) -> CliError {
 /// The rules of `score` and `compare`.
 #[derive(Debug, Args)]
 pub(crate) struct Judging {
-    /// Share of the elements that the boards determine which must be solved.
-    #[arg(long, value_name = "SHARE", default_value_t = catoptric::score::MIN_SOLVED, value_parser = share)]
-    min_solved: f64,
+    /// Share of the elements that the boards determine which must be solved, 0.9 unless given; on blind data, and only if
+    /// given, of those that the calibration calls deflected.
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    min_solved: Option<f64>,
     #[command(flatten)]
     limits: Limits,
     /// Judge by boards and walls alone, as if there were no truth.

@@ -344,3 +344,31 @@ fn layout_shows_the_corners_it_uses() {
         "{table}"
     );
 }
+
+/// As many as 64 parameters may depend on one another in a row; one more is an error, not a full stack.
+#[test]
+fn a_chain_of_parameters_has_an_end() {
+    let chain = |length: usize| {
+        let link = |i: usize| {
+            let value = if i + 1 == length {
+                "1".to_owned()
+            } else {
+                format!("\"= p{} + 1\"", i + 1)
+            };
+            format!("[parameters.p{i}]\nvalue = {value}\n")
+        };
+        let links: String = (0..length).map(link).collect();
+        format!("{PARAMETRIC}\n{links}")
+    };
+    assert_eq!(parsed(&chain(64), &[]).parameters["p0"].value, 64.0);
+    for length in [65, 20_000] {
+        let problems = problems_with(&chain(length), &[]);
+        assert!(
+            problems.list[0]
+                .message
+                .contains("depends on more than 64 parameters in a row"),
+            "{}",
+            problems.list[0].message
+        );
+    }
+}

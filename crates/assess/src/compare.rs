@@ -12,7 +12,7 @@
 //! one of them is over-confident. This needs no truth.
 
 use crate::requirement::{Requirement, RequirementError};
-use crate::score::{Gate, Honesty, Knowable, MIN_SOLVED, Mistake, Score, Verdict, knowable, score_by};
+use crate::score::{Gate, Honesty, Knowable, Mistake, Score, Verdict, knowable, score_by};
 use catoptric_calib::observations;
 use catoptric_model::{BeamEstimate, Calibration, Dataset, Unreadable, beam};
 use catoptric_sim::Truth;
@@ -118,8 +118,9 @@ pub struct Pair {
 /// What every calibration of a comparison has to meet in addition to the gates of its score.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rules {
-    /// Share of the knowable elements that must be solved.
-    pub min_solved: f64,
+    /// Share of the knowable elements that must be solved, [`MIN_SOLVED`](crate::score::MIN_SOLVED) unless given. On blind data, where nobody knows
+    /// what is knowable, it is the share of the deflected elements of the calibration, if it is given.
+    pub min_solved: Option<f64>,
     /// Limits on the figures of a score.
     pub requirements: Vec<Requirement>,
 }
@@ -127,7 +128,7 @@ pub struct Rules {
 impl Default for Rules {
     fn default() -> Self {
         Self {
-            min_solved: MIN_SOLVED,
+            min_solved: None,
             requirements: Vec::new(),
         }
     }
@@ -175,7 +176,10 @@ impl Rules {
     /// # Errors
     /// [`RequirementError::Unknown`] if a requirement names no figure.
     pub fn applied(&self, score: Score) -> Result<Score, RequirementError> {
-        let score = score.with_min_solved(self.min_solved);
+        let score = match self.min_solved {
+            Some(share) => score.with_min_solved(share),
+            None => score,
+        };
         self.requirements.iter().try_fold(score, Score::with_requirement)
     }
 }

@@ -216,6 +216,7 @@ mod tests {
             points: vec![point(1.5, 0, 0), point(-3.125, 1080, 0), point(0.1, 540, 70_000)],
             without_range: 0,
             without_direction: 0,
+            without_pose: 0,
             unsolved_elements: 0,
         }
     }

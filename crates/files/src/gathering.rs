@@ -61,6 +61,9 @@ pub(super) struct Gathering<R> {
     pub(super) capture: Capture,
 }
 
+/// Largest azimuth of a first beam, in turns: of a larger one no digit is left to compare.
+const MOST_TURNS: f64 = 4.0;
+
 /// Keeps the whole stretch.
 #[derive(Default)]
 pub(super) struct Whole {
@@ -105,7 +108,7 @@ impl<R: Keep> Gathering<R> {
         // Azimuths a full turn apart are equivalent.
         let off = off - TAU * (off / TAU).round();
         // A quarter of a step separates 32-bit rounding from a different beam.
-        if drift + off.abs() > step.abs() / 4.0 {
+        if drift + off.abs() > step.abs() / 4.0 || scan.angle_min.abs() > MOST_TURNS * TAU {
             return Err(format!(
                 "beams from {} rad in steps of {} rad, session.toml has {first} and {step}",
                 scan.angle_min, scan.angle_increment

@@ -315,6 +315,14 @@ impl<'a, R: Keep> Playback<'a, R> {
         let label = label.map_err(|e| e.to_string());
         let label: Result<PoseLabel, String> =
             label.and_then(|label| serde_json::from_slice(label).map_err(|e| e.to_string()));
+        let beams = self.scanner.scan.beams();
+        let label = label.and_then(|label| match label.beams {
+            Some([first, last]) if first > last || last >= beams => Err(format!(
+                "beams is [{first}, {last}]; the first and the last of the beams 0 to {} are allowed",
+                beams - 1
+            )),
+            _ => Ok(label),
+        });
         let label = match label {
             Ok(label) => label,
             Err(what) => {

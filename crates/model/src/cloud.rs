@@ -63,6 +63,8 @@ pub struct PointCloud {
     pub without_range: usize,
     /// Number of ranges of elements for which the calibration has no direction.
     pub without_direction: usize,
+    /// Number of ranges of times for which motion capture gives the rig no pose.
+    pub without_pose: usize,
     /// Number of elements for which the calibration has no direction.
     pub unsolved_elements: usize,
 }

@@ -80,6 +80,7 @@ pub fn apply(
         points: _,
         without_range,
         without_direction,
+        without_pose,
         unsolved_elements,
     } = lift.sheet;
     Ok(PointCloud {
@@ -89,6 +90,7 @@ pub fn apply(
         points,
         without_range,
         without_direction,
+        without_pose,
         unsolved_elements,
     })
 }
@@ -108,6 +110,8 @@ pub struct CloudSheet {
     pub without_range: usize,
     /// Ranges of elements that the calibration gives no direction.
     pub without_direction: usize,
+    /// Ranges of times for which motion capture gives the rig no pose.
+    pub without_pose: usize,
     /// Elements that the calibration gives no direction.
     pub unsolved_elements: usize,
 }
@@ -155,6 +159,7 @@ impl<'a> Lift<'a> {
             points: 0,
             without_range: 0,
             without_direction: 0,
+            without_pose: 0,
             unsolved_elements: deflections.iter().filter(|d| d.is_none()).count(),
         };
         for (of, deflection) in record.readings.statistics().iter().zip(&deflections) {
@@ -164,7 +169,7 @@ impl<'a> Lift<'a> {
                 None => sheet.without_direction += of.all.count,
             }
         }
-        Ok(Self {
+        let mut lift = Self {
             sheet,
             record,
             deflections,
@@ -172,7 +177,17 @@ impl<'a> Lift<'a> {
             scan: &dataset.session.scanner.scan,
             bias: residual::bias(dataset, calibration),
             color: record.label.color.as_deref().unwrap_or(room_color),
-        })
+        };
+        if record.motion.is_some() && frame == CloudFrame::Room {
+            let mut points = 0;
+            lift.each(|_| {
+                points += 1;
+                Ok::<_, Unreadable>(())
+            })?;
+            lift.sheet.without_pose = lift.sheet.points - points;
+            lift.sheet.points = points;
+        }
+        Ok(lift)
     }
 
     /// Makes the points, scan after scan, and hands each on.

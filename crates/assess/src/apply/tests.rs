@@ -186,3 +186,31 @@ fn the_cloud_is_the_room_through_glass_too() {
         assert!(off_wall(&s.dataset, &p.position) < 1e-9, "beam {}", p.beam);
     }
 }
+
+/// The header of a file counts what follows it, though the tracker lost the rig.
+#[test]
+fn readings_without_a_pose_of_the_rig_are_counted_and_no_points() {
+    let mut s = sample();
+    let here = s.dataset.poses[0].room_from_rig;
+    let motion = |frames: &[f64]| catoptric_model::Motion {
+        start_s: 0.0,
+        scan_period_s: 1.0,
+        scan_starts_s: Vec::new(),
+        frames: frames.iter().map(|t| (*t, here)).collect(),
+    };
+    let calibration = perfect(&s.truth);
+    let whole = apply(&s.dataset, &calibration, None, CloudFrame::Room).expect("at rest");
+    for (frames, lost) in [(&[0.0, 0.01][..], 2), (&[][..], 1)] {
+        s.dataset.poses[0].motion = Some(motion(frames));
+        let lift = Lift::new(&s.dataset, &calibration, None, CloudFrame::Room).expect("it is there");
+        let mut points = 0;
+        lift.each(|_| {
+            points += 1;
+            Ok::<_, ApplyError>(())
+        })
+        .expect("in memory");
+        assert_eq!(lift.sheet.points, points);
+        assert_eq!(points + lift.sheet.without_pose, whole.points.len());
+        assert_eq!(lift.sheet.without_pose, whole.points.len() / lost);
+    }
+}

@@ -118,6 +118,16 @@ fn of_false(score: &Score) -> Option<Gate> {
 
 /// The gate on completeness: the share of what the boards make knowable that is solved.
 pub(super) fn solved(score: &Score, min_solved: f64) -> Gate {
+    if !score.has_truth {
+        let (solved, all) = (score.beams.solved, score.beams.solved + score.beams.abstained);
+        let share = solved as f64 / all.max(1) as f64;
+        let words = format!(
+            "{solved} of {all} elements that the calibration calls deflected are solved, {:.0} %; at least {:.0} % are required",
+            100.0 * share,
+            100.0 * min_solved
+        );
+        return Gate::at_least("solved", share, min_solved, words);
+    }
     let Some((knowable @ 1.., solved)) = score.knowable.zip(score.knowable_solved) else {
         return Gate::without("solved", Outcome::NotTested, "the boards determine no element");
     };

@@ -249,6 +249,8 @@ fn mistakes_of_invalid(
 
 /// Returns the tracked pose of the rig: the mean over the stretches, during which it did not move.
 fn tracked_rig(dataset: &Dataset) -> Option<Pose> {
+    // In a flight the rig is elsewhere.
+    let at_rest = dataset.poses.iter().filter(|pose| pose.motion.is_none());
     let frame = |pose: &PoseRecord| TrackedFrame {
         time_s: 0.0,
         pose: Some(pose.room_from_rig),
@@ -256,7 +258,7 @@ fn tracked_rig(dataset: &Dataset) -> Option<Pose> {
     };
     Track {
         subject: catoptric_model::dataset::RIG_SUBJECT.to_owned(),
-        frames: dataset.poses.iter().map(frame).collect(),
+        frames: at_rest.map(frame).collect(),
     }
     .mean_pose()
 }

@@ -849,3 +849,27 @@ fn an_index_beyond_the_scan_is_no_element() {
     let found = score(&s.dataset, &perfect(&s.truth), Some(&truth)).expect("in memory");
     assert!(found.verdict != Verdict::Invalid);
 }
+
+/// In a flight the rig is elsewhere, which is no error of the mounting.
+#[test]
+fn a_flight_does_not_count_for_the_mounting() {
+    let mut s = sample();
+    let calibration = perfect(&s.truth);
+    let mounting = |s: &catoptric_fixtures::Sample| {
+        let scored = score(&s.dataset, &calibration, Some(&s.truth)).expect("in memory");
+        scored.mounting.expect("it is known")
+    };
+    let before = mounting(&s);
+    let mut flight = s.dataset.poses[0].clone();
+    flight.label.kind = catoptric_model::PoseKind::Flight;
+    flight.label.pose = 1000;
+    flight.room_from_rig = Pose::translation(1.0, 0.5, 0.2) * flight.room_from_rig;
+    flight.motion = Some(catoptric_model::Motion {
+        start_s: 0.0,
+        scan_period_s: 0.025,
+        scan_starts_s: Vec::new(),
+        frames: Vec::new(),
+    });
+    s.dataset.poses.push(flight);
+    assert_eq!(mounting(&s), before);
+}

@@ -104,6 +104,12 @@ impl Plan {
                 "choose another --out",
             ));
         }
+        if out.exists() && !out.is_dir() {
+            return Err(StudyError::invalid(
+                format!("{} is a file, and a study is a folder", out.display()),
+                "choose another --out",
+            ));
+        }
         std::fs::create_dir_all(out).map_err(|e| IoError::write(out, e))?;
         Ok(write_json(out.join(FILE), self)?)
     }

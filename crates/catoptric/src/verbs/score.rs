@@ -16,7 +16,7 @@ use catoptric_sim::Truth;
 /// let (dataset, truth) = catoptric::simulate(&scene)?;
 /// let calibration = catoptric::calibrate(&dataset)?;
 /// let rules = Rules {
-///     min_solved: 0.95,
+///     min_solved: Some(0.95),
 ///     requirements: vec![Requirement::maximum("per_axis_rms_deg=0.0001")?],
 /// };
 /// let score = catoptric::score_with(&dataset, &calibration, &truth, &rules)?;

@@ -8,6 +8,9 @@ use nalgebra::{Point2, Point3, Vector3};
 /// text file leave of a plane face, with a margin.
 const FLATNESS: f64 = 1e-3;
 
+/// Area below which a polygon has none, as a fraction of its squared extent.
+const LITTLE: f64 = 1e-12;
+
 /// Largest number of corners of a concave polygon, whose edges are compared in pairs.
 const MOST_CORNERS: usize = 5000;
 
@@ -22,8 +25,25 @@ pub(super) fn triangles(corners: &[u32], vertices: &[Point3<f64>]) -> Result<Vec
         let pairs = corners.windows(2).skip(1);
         Ok(pairs.map(|pair| [corners[0], pair[0], pair[1]]).collect())
     };
-    // A polygon without area has no side to be hit.
-    if corners.len() == 3 || normal.norm() == 0.0 || !normal.norm().is_finite() {
+    if corners.len() == 3 {
+        return fan();
+    }
+    let extent = places.iter().map(|p| (p - places[0]).norm()).fold(0.0, f64::max);
+    // Without area, or next to none, it has no side to be hit, unless its parts have turned against each other.
+    if normal.norm() <= LITTLE * extent * extent {
+        let (_, of_part) = (2..places.len())
+            .map(|k| (places[k - 1] - places[0]).cross(&(places[k] - places[0])))
+            .map(|part| (part.norm(), part))
+            .fold(
+                (0.0, Vector3::zeros()),
+                |most, part| if part.0 > most.0 { part } else { most },
+            );
+        if of_part.norm() > LITTLE * extent * extent && crosses_itself(&projected(&places, &of_part)) {
+            return Err("a face crosses itself, so that its surface is undefined".to_owned());
+        }
+        return fan();
+    }
+    if !normal.norm().is_finite() {
         return fan();
     }
     let flat = projected(&places, &normal);
@@ -38,7 +58,6 @@ pub(super) fn triangles(corners: &[u32], vertices: &[Point3<f64>]) -> Result<Vec
     }
     let unit = normal.normalize();
     let off = |p: &Point3<f64>| unit.dot(&(p - places[0])).abs();
-    let extent = places.iter().map(|p| (p - places[0]).norm()).fold(0.0, f64::max);
     if places.iter().map(off).fold(0.0, f64::max) > FLATNESS * extent {
         return Err("a concave face is not flat, so that its surface is undefined".to_owned());
     }
@@ -239,6 +258,9 @@ mod tests {
 
     #[test]
     fn what_encloses_no_surface_is_refused() {
+        // The two halves of a bow tie cancel.
+        let tie = split(&[[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 2.0]]);
+        assert!(tie.is_err_and(|e| e.contains("crosses itself")));
         let bow = [[0.0, 0.0], [2.0, 2.0], [2.0, 0.0], [0.0, 2.5]];
         assert!(split(&bow).expect_err("refused").contains("crosses itself"));
         let bent = [

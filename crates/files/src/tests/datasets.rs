@@ -101,6 +101,9 @@ fn a_changed_file_is_named() {
     let session = session(3);
     write_dataset(&out, false, &session, &[stretch(&session, 0, 2, 3, 5)]).expect("written");
     let text = fs::read_to_string(out.join(SESSION)).expect("session");
+    // Ends of lines mean nothing.
+    fs::write(out.join(SESSION), text.replace('\n', "\r\n")).expect("saved by an editor");
+    assert!(read_dataset(&out).is_ok());
     fs::write(out.join(SESSION), text.replace("round trip", "round, trip")).expect("edited");
     let error = read_dataset(&out).expect_err("changed");
     assert!(

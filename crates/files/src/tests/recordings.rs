@@ -1,6 +1,7 @@
 //! Recordings: round trips, truncation, flipped bits, dropped writers, and a full disk.
 
 use super::*;
+use crate::messages::{decode_scan, encode_scan};
 use proptest::prelude::*;
 
 proptest! {
@@ -158,6 +159,25 @@ fn another_sessions_recording_is_rejected() {
     coarser.scanner.scan = scan(0.5, 5);
     let error = play(&coarser, &bytes).expect_err("other angles").to_string();
     assert!(error.contains("in steps of"), "{error}");
+}
+
+#[test]
+fn a_scan_without_angles_is_no_scan() {
+    let session = session(3);
+    let message = encode_scan(5, &session.scanner, 0.025, &[1.0, 2.0, 3.0]);
+    let read = decode_scan(&message).expect("a scan");
+    #[allow(clippy::cast_possible_truncation)]
+    let first = (read.angle_min as f32).to_le_bytes();
+    let at = message
+        .windows(4)
+        .position(|w| w == first)
+        .expect("it is in there");
+    for wrong in [f32::NAN, f32::INFINITY] {
+        let mut spoiled = message.clone();
+        spoiled[at..at + 4].copy_from_slice(&wrong.to_le_bytes());
+        let error = decode_scan(&spoiled).expect_err("no angle").to_string();
+        assert!(error.starts_with(&format!("angle_min is {wrong}")), "{error}");
+    }
 }
 
 /// Bodies that are never seen at the same time, and no markers: the recording of a laboratory without labeled markers.

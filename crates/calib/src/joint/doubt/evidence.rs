@@ -93,7 +93,7 @@ impl Evidence {
         let (scores, _) = self.part(of);
         let (inverse, rank) = self.inverse(of);
         Statistic {
-            chi_squared: scores.dot(&(inverse * &scores)),
+            chi_squared: scores.dot(&(inverse * &scores)).max(0.0),
             freedom: rank as f64,
         }
     }

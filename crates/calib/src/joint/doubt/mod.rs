@@ -171,7 +171,8 @@ fn unexplained(
 ) -> Option<Doubt> {
     let explained = evidence.shift(estimated);
     let statistic = Statistic {
-        chi_squared: residuals.chi_squared - explained.chi_squared,
+        // More than all is explained where the linearization no longer holds.
+        chi_squared: (residuals.chi_squared - explained.chi_squared).max(0.0),
         freedom: residuals.freedom - explained.freedom,
     };
     tests.push(ComponentTest {
