@@ -61,7 +61,7 @@ pub(super) struct Gathering<R> {
     pub(super) capture: Capture,
 }
 
-/// Largest azimuth of a first beam, in turns: of a larger one no digit is left to compare.
+/// Number of turns within which the azimuth of a first beam must be: of a larger one no digit is left to compare.
 const MOST_TURNS: f64 = 4.0;
 
 /// Keeps the whole stretch.
