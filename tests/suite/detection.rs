@@ -232,13 +232,15 @@ fn a_darker_color_walks_as_far_as_the_closed_form_says() {
     let p = pulse_sd(4.0);
     for detector in Detector::ALL {
         for (name, reflectivity) in [("white", 0.9), ("pencil_grey", 0.4), ("jet_black", 0.05)] {
-            for distance in [0.5, 1.0, 2.0, 4.0] {
+            // The device takes out none of it, most of it, all of it.
+            for (distance, taken_out) in [(0.5, 0.0), (1.0, 0.9), (2.0, 0.0), (4.0, 1.0)] {
                 let mut scene = physical();
                 scene.scanner.sub_rays = 1;
                 scene.detection.detector = detector;
+                scene.detection.walk_compensated = taken_out;
                 let found = forward(&scene, &[filling(distance, 0.0, name)]).expect("it is bright enough");
-                let expected =
-                    reference(detector, p) - lead(detector, p, height(reflectivity, distance, 0.0));
+                let walk = reference(detector, p) - lead(detector, p, height(reflectivity, distance, 0.0));
+                let expected = (1.0 - taken_out) * walk;
                 assert!(
                     (found.range() - distance - expected).abs() < 1e-9,
                     "{detector:?}, {name}: {found:?}"

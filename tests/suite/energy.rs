@@ -42,6 +42,8 @@ fn rectangle_facet(name: String, center_mm: Vector3<f64>, normal: Vector3<f64>, 
     Facet {
         name,
         two_sided: false,
+        reflectivity: None,
+        coating: None,
         shape: FacetShape::Rectangle(RectangleShape {
             center_mm: center_mm.into(),
             normal: normal.into(),
@@ -69,6 +71,8 @@ fn random_scene(draws: &mut Draws, round: usize) -> Scene {
             let center = Vector3::new(at.x, at.y, 0.1 * at.z);
             Facet {
                 two_sided: k % 2 == 0,
+                reflectivity: None,
+                coating: None,
                 ..rectangle_facet(format!("facet {k}"), center, facing, [30.0, 20.0])
             }
         })

@@ -170,6 +170,8 @@ fn one_facet() -> Scene {
         name: "mirror".to_owned(),
         shape: FacetShape::Polygon(PolygonShape { corners_mm }),
         two_sided: false,
+        reflectivity: None,
+        coating: None,
     });
     scene
 }

@@ -23,6 +23,7 @@ mod gates;
 mod hostile_names;
 mod house;
 mod layout;
+mod light;
 mod misfit;
 mod mishaps;
 mod motion;

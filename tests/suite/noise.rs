@@ -4,7 +4,7 @@
 
 use crate::scenes::{BARE, scene};
 use catoptric::sim::noise::{Draws, Purpose};
-use catoptric::sim::scene::{Correlated, ErrorModel, Interference};
+use catoptric::sim::scene::{Correlated, ErrorModel, IncidenceNoise, Interference};
 use catoptric::sim::{Laboratory, Scene};
 use catoptric_fixtures::ust20lx;
 use rand::SeedableRng;
@@ -138,6 +138,76 @@ fn correlated_noise_decays_as_specified_and_is_recomputed_alone() {
     let scan_5 = in_turn.nth(5).expect("endless");
     let alone = laboratory.effects(ROOM).skip_scans(5).next().expect("endless");
     assert_eq!(scan_5, alone);
+}
+
+/// What all beams of a scan share: the same number in each, AR(1) from scan to scan, beside what each has of its own.
+#[test]
+fn common_noise_is_shared_by_all_beams_and_decays_as_specified() {
+    const Z: f64 = 3.2905;
+    let scans: u32 = 3000;
+    let law = Correlated {
+        sd_mm: 2.0,
+        time_constant_s: 0.1,
+    };
+    let alone = noisy_room(scans, |scene| {
+        scene.errors.noise.sd_mm = vec![0.0; 3];
+        scene.errors.common = Some(law);
+    });
+    let all = errors(&alone);
+    let of_scans: Vec<f64> = all.chunks(ust20lx::COUNT).map(|scan| scan[0] / 2e-3).collect();
+    for scan in all.chunks(ust20lx::COUNT) {
+        assert!(scan.iter().all(|e| (e - scan[0]).abs() < 1e-12));
+    }
+    let memory = libm::exp(-0.25_f64);
+    let bound = Z * (2.0 * (1.0 + memory * memory) / (1.0 - memory * memory) / f64::from(scans)).sqrt();
+    for lag in [0, 1, 2, 8] {
+        let found = lagged(&of_scans, lag);
+        let expected = memory.powi(i32::try_from(lag).expect("small"));
+        assert!(
+            (found - expected).abs() < bound,
+            "{found} against {expected} after {lag}"
+        );
+    }
+    // Beside noise of each beam, it is what it is alone; and a scan is recomputed alone.
+    let both = noisy_room(3, |scene| {
+        scene.errors.noise.sd_mm = vec![0.0; 3];
+        scene.errors.common = Some(law);
+        scene.errors.correlated = Some(law);
+    });
+    let own = noisy_room(3, |scene| {
+        scene.errors.noise.sd_mm = vec![0.0; 3];
+        scene.errors.correlated = Some(law);
+    });
+    for ((both, own), common) in errors(&both).iter().zip(errors(&own)).zip(&all) {
+        assert!((both - own - common).abs() < 1e-12);
+    }
+    let scan_2 = both.effects(ROOM).nth(2).expect("endless");
+    assert_eq!(scan_2, both.effects(ROOM).skip_scans(2).next().expect("endless"));
+}
+
+#[test]
+fn noise_grows_with_the_incidence_as_its_table_says() {
+    let laboratory = |table| {
+        noisy_room(1, |scene| scene.errors.incidence = table)
+            .returns(ROOM)
+            .expect("colors are built in")
+    };
+    let table = IncidenceNoise {
+        incidence_deg: vec![0.0, 30.0],
+        factor: vec![1.0, 2.5],
+    };
+    let (plain, steep) = (laboratory(None), laboratory(Some(table)));
+    let mut most: f64 = 1.0;
+    for (plain, steep) in plain.iter().flatten().zip(steep.iter().flatten()) {
+        let incidence = libm::acos(plain.cos_incidence).to_degrees();
+        let factor = 1.0 + 0.05 * incidence.min(30.0);
+        assert!(
+            (steep.noise_sd / plain.noise_sd - factor).abs() < 1e-9,
+            "{incidence}"
+        );
+        most = most.max(factor);
+    }
+    assert!((most - 2.5).abs() < 1e-12);
 }
 
 #[test]

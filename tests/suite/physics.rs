@@ -136,6 +136,8 @@ fn traced(
         .map(|(i, corners)| Facet {
             name: format!("facet-{i}"),
             two_sided: false,
+            reflectivity: None,
+            coating: None,
             shape: FacetShape::Polygon(PolygonShape {
                 corners_mm: corners.iter().map(|c| (c.coords * 1e3).into()).collect(),
             }),
@@ -241,6 +243,8 @@ fn a_45_degree_mirror_and_a_wall_add_their_two_legs() {
     scene.superstructure.facet.push(Facet {
         name: "fold".to_owned(),
         two_sided: false,
+        reflectivity: None,
+        coating: None,
         shape: FacetShape::Polygon(PolygonShape {
             corners_mm: vec![
                 [1270.0, 20.0, -50.0],

@@ -49,6 +49,37 @@ const QUICK: [&str; 4] = [
 /// How far off a calibration may be without errors, in radians.
 const ALLOWED: f64 = 1e-9;
 
+/// Every preset from its scene to a score: two mirrors, without the housing, which may be larger than they allow.
+#[test]
+fn every_preset_is_simulated_calibrated_and_scored() {
+    for preset in Preset::ALL {
+        let mut scene = scene(TWO_MIRROR);
+        scene.scanner.preset = preset;
+        scene.scanner.housing = false;
+        scene.scanner.sub_rays = 7;
+        scene.experiment.scans_per_pose = 10;
+        let limits = preset.limits();
+        let laboratory = Laboratory::new(&scene, 1).unwrap_or_else(|e| panic!("{preset:?}: {e}"));
+        let (dataset, truth) = (laboratory.dataset().unwrap(), laboratory.truth().unwrap());
+        assert_eq!(dataset.session.scanner.scan.beams(), limits.beams as usize);
+        let found = calibrate(&dataset).unwrap();
+        let score = catoptric::score(&dataset, &found, Some(&truth)).unwrap();
+        let beams = &score.beams;
+        let deflected = truth
+            .beams
+            .iter()
+            .filter(|b| b.status == BeamClass::Deflected)
+            .count();
+        let least = deflected * 9 / 10;
+        assert!(
+            deflected > 100 && beams.solved >= least && score.per_axis_rms_deg < 0.2,
+            "{preset:?}: {} of {deflected} solved, {}°",
+            beams.solved,
+            score.per_axis_rms_deg
+        );
+    }
+}
+
 fn succeeds(output: &Output) -> String {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
     stdout(output)

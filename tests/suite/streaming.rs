@@ -12,7 +12,7 @@ use catoptric::model::{Excerpt, Pose};
 use catoptric::sim::build::Structure;
 use catoptric::sim::laboratory::Memory;
 use catoptric::sim::light::{Mirrors, Setting};
-use catoptric::sim::scene::{Correlated, EchoChoice, Interference};
+use catoptric::sim::scene::{Coating, Correlated, Dust, EchoChoice, Interference, Stack};
 use catoptric::sim::{Laboratory, Scene};
 use catoptric_fixtures::ust20lx;
 use std::path::{Path, PathBuf};
@@ -289,12 +289,34 @@ fn same_with_the_compiled_rig(laboratory: &Laboratory, number: usize) {
     }
 }
 
+/// Coated and dusty mirrors, seen by a lens with a view of its own.
+fn lossy() -> Scene {
+    let mut scene = scene(PROTOTYPE);
+    let mirror = &mut scene.superstructure.mirror;
+    mirror.coating = Some(Coating::Stack(Stack {
+        n: 2.1,
+        k: 8.4,
+        film: vec![],
+    }));
+    mirror.dust = Some(Dust {
+        cover: 0.01,
+        reflectivity: 0.3,
+    });
+    scene.superstructure.facet[0].coating = None;
+    scene.superstructure.facet[0].reflectivity = Some(0.5);
+    scene.light.polarization_deg = Some(20.0);
+    scene.light.receiver_field_of_view_mrad = Some(20.0);
+    scene.light.receiver_offset_mm = [0.0, 12.0];
+    scene.light.vignetting = true;
+    scene
+}
+
 #[test]
 fn the_compiled_rig_changes_no_bit() {
     let mut glass = scene(TWO_MIRROR);
     glass.superstructure.mirror.diffuse_reflectivity = 0.01;
     let mirrors = load(&file("traps/both-outputs"), &[]).unwrap();
-    for mut scene in [scene(PROTOTYPE), glass, mirrors] {
+    for mut scene in [scene(PROTOTYPE), glass, lossy(), mirrors] {
         scene.scanner.sub_rays = scene.scanner.sub_rays.min(6);
         let laboratory = Laboratory::new(&scene, 3).unwrap();
         for number in [0, 1, laboratory.stretches() - 1] {

@@ -137,6 +137,8 @@ fn ghosts_and_dust_are_listed_as_such() {
         "superstructure.mirror.thickness_mm=3",
         "superstructure.mirror.glass={index=1.51,thickness_mm=3,ghost=true}",
         "superstructure.mirror.diffuse_reflectivity=0.05",
+        "superstructure.mirror.coating.stack={n=2.1,k=8.4}",
+        "light.vignetting=true",
         "scanner.preset=utm-30lx-ew",
         "detection.echo=all",
     ];
@@ -198,6 +200,8 @@ fn light_that_hits_nothing_has_no_position() {
     let facet = |name: &str, center_mm: [f64; 3], normal: [f64; 3]| Facet {
         name: name.to_owned(),
         two_sided: false,
+        reflectivity: None,
+        coating: None,
         shape: FacetShape::Rectangle(RectangleShape {
             center_mm,
             normal,

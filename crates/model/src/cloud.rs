@@ -71,7 +71,9 @@ pub struct PointCloud {
 
 /// The rotation from the base beam's direction to the exit direction: Rz(θ_b + θ_a)·Ry(−φ)·Rz(−θ_b).
 ///
-/// The 3-2 sequence of Eq. (9), written for a right-handed frame in which positive elevation points up.
+/// The rotation of Eq. (9), written for a right-handed frame in which positive elevation points up. The paper calls it a
+/// 3-2 sequence, and it is built of three turns: the last one turns the base beam back to the x axis. A literal sequence of
+/// two, Rz(θ_b + θ_a)·Ry(−φ), would turn a beam that is not along x elsewhere.
 pub fn rotation(deflection: &Deflection, beam_azimuth: f64) -> Rotation3<f64> {
     Rotation3::from_axis_angle(&Vector3::z_axis(), beam_azimuth + deflection.azimuth)
         * Rotation3::from_axis_angle(&Vector3::y_axis(), -deflection.elevation)
@@ -119,5 +121,22 @@ mod tests {
                 + deflection.exit_direction(theta_b).into_inner() * (r - deflection.distance);
             assert!((lift(&deflection, theta_b, r) - along).norm() < 1e-14);
         }
+    }
+
+    /// Two turns alone would put the exit of a beam at the side in another place, by meters at the range of a room.
+    #[test]
+    fn a_literal_sequence_of_two_turns_is_another_rotation() {
+        let deflection = Deflection {
+            azimuth: 0.3,
+            elevation: 0.8,
+            distance: 0.07,
+        };
+        let theta_b = 1.4;
+        let beam = beam::direction(theta_b);
+        let exit = deflection.exit_direction(theta_b);
+        assert!((rotation(&deflection, theta_b) * beam.into_inner() - exit.into_inner()).norm() < 1e-15);
+        let two = Rotation3::from_axis_angle(&Vector3::z_axis(), theta_b + deflection.azimuth)
+            * Rotation3::from_axis_angle(&Vector3::y_axis(), -deflection.elevation);
+        assert!(4.0 * (two * beam.into_inner() - exit.into_inner()).norm() > 3.0);
     }
 }

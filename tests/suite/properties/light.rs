@@ -62,7 +62,7 @@ proptest! {
         share in 0.0..1.0_f64, k in 0.1..10.0_f64,
     ) {
         let light = Light::default();
-        let on = Illumination { reflectivity, cos_incidence: cos, share: 0.7, range, mirrors };
+        let on = Illumination { reflectivity, cos_incidence: cos, share: 0.7, range, mirrors, seen: 1.0 };
         let base = received(&light, &on);
         let ratio = |light: &Light, on: Illumination| received(light, &on) / base;
         let near = |found: f64, expected: f64| (found / expected - 1.0).abs() < 2e-15;

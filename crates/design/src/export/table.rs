@@ -4,6 +4,7 @@ use crate::layout::{Drawing, plate_thickness};
 use catoptric_cast::area_vector;
 use catoptric_files::names::defused;
 use catoptric_sim::Scene;
+use nalgebra::Vector3;
 
 /// Columns of the table; tolerances are 1σ.
 const HEADER: [&str; 20] = [
@@ -42,6 +43,8 @@ pub fn drawing_table(scene: &Scene, drawing: &Drawing) -> Result<Vec<u8>, csv::E
         let corners = &facet.face.corners;
         let m = facet.face.normal;
         let count = corners.len();
+        let middle = corners.iter().map(|c| c.coords).sum::<Vector3<f64>>();
+        let incidence = m.dot(&middle.normalize()).abs();
         for (number, corner) in corners.iter().enumerate() {
             let (next, before) = (
                 corners[(number + 1) % count],
@@ -67,7 +70,7 @@ pub fn drawing_table(scene: &Scene, drawing: &Drawing) -> Result<Vec<u8>, csv::E
                 as_built.shift_sd_mm,
                 as_built.thickness_sd_mm,
                 as_built.slope_rms_mrad,
-                superstructure.mirror.reflectivity,
+                facet.reflectivity(incidence, scene.light.wavelength_nm),
             ];
             let mut row = vec![defused(&facet.name).into_owned(), (number + 1).to_string()];
             row.extend(numbers.map(|n| rounded(n).to_string()));

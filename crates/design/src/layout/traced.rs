@@ -132,16 +132,18 @@ pub(crate) fn trace_one(sensor: &Sensor, bare: &Setting<'_>, scene: &Scene, beam
     let chief = paths[paths.len() - 1];
     let paths = || sensor.sub_ray_list().iter().zip(&paths);
     let (status, chief_energy) = class(&chief, paths());
-    let along = paths().filter(|(_, p)| exit(p).is_some() && p.facets() == chief.facets());
-    let light = along.map(|(s, p)| {
-        let pass = libm::pow(scene.superstructure.mirror.reflectivity, p.silvered as f64) * p.gain;
+    let along = rays.iter().zip(paths());
+    let along = along.filter(|(_, (_, p))| exit(p).is_some() && p.facets() == chief.facets());
+    let light = along.map(|(ray, (s, p))| {
+        let pass = sensor.reflected(bare, beam, ray, p) * p.gain;
         s.weight * pass * pass
     });
+    let shown = sensor.shown(bare, beam, chief.facets());
     let mut traced = Traced {
         beam,
         status,
         chief_energy,
-        light: light.sum(),
+        light: light.sum::<f64>() * shown,
         sees: false,
         chief,
         trail,

@@ -48,6 +48,12 @@ fn built_in(name: &str) -> Option<Color> {
     })
 }
 
+/// Whether readings from a color have Table 4's noise, whatever `errors.noise` says: a built-in color, unless the scene
+/// defines it.
+pub(crate) fn has_own_noise(scene: &Scene, name: &str) -> bool {
+    !scene.color.contains_key(name) && built_in(name).is_some_and(|color| color.noise.is_some())
+}
+
 /// Looks up a color among the scene's own and the built-in ones.
 ///
 /// # Errors

@@ -1,6 +1,7 @@
 //! From the drawing to surfaces: mirrors, bodies, boards, walls; and the trajectory of a flight.
 
 pub(crate) mod board;
+pub(crate) mod coating;
 pub mod color;
 pub mod pattern;
 pub(crate) mod room;

@@ -3,6 +3,7 @@
 //! They are exactly where the scene places them. Every ray cast into the room can hit them; the drawing of the
 //! structure, its beams and the truth about them do not include them.
 
+use crate::build::coating::Finish;
 use crate::build::structure::{BuiltFacet, OpaquePart, mesh_shape};
 use crate::error::SimError;
 use crate::scene::facet::outline::rectangle;
@@ -27,7 +28,11 @@ impl Stage {
     /// # Errors
     /// A mirror or surface without a shape; a mesh that has not been read.
     pub fn new(scene: &Scene, frame_from_room: &Pose) -> Result<Self, SimError> {
-        let mirrors = scene.room.mirror.iter().map(|m| mirror(m, frame_from_room));
+        let mirrors = scene
+            .room
+            .mirror
+            .iter()
+            .map(|m| mirror(scene, m, frame_from_room));
         let surfaces = scene.room.surface.iter().map(|s| {
             let frame_from_surface =
                 frame_from_room * pose(s.position_m, [s.yaw_deg, s.pitch_deg, s.roll_deg]);
@@ -52,7 +57,7 @@ fn pose(position_m: [f64; 3], yaw_pitch_roll_deg: [f64; 3]) -> Pose {
     )
 }
 
-fn mirror(mirror: &RoomMirror, frame_from_room: &Pose) -> Result<BuiltFacet, SimError> {
+fn mirror(scene: &Scene, mirror: &RoomMirror, frame_from_room: &Pose) -> Result<BuiltFacet, SimError> {
     let attitude = [mirror.yaw_deg, mirror.pitch_deg, mirror.roll_deg];
     let place = frame_from_room * pose(mirror.position_m, attitude);
     let fail = || SimError::Facet {
@@ -68,6 +73,7 @@ fn mirror(mirror: &RoomMirror, frame_from_room: &Pose) -> Result<BuiltFacet, Sim
         thickness,
         mirror.two_sided,
         mirror.glass,
+        Finish::of(&scene.superstructure.mirror, None),
     )
     .ok_or_else(fail)
 }

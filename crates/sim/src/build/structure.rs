@@ -4,6 +4,7 @@
 //! and the laser's own frame is slightly off in its housing: in the true sensor frame, everything bolted to the housing
 //! moves accordingly.
 
+use crate::build::coating::Finish;
 use crate::error::SimError;
 use crate::noise::{Draws, Purpose};
 use crate::scene::{Facet, Glass, MeshShape, Post, PostShape, Scene};
@@ -26,6 +27,8 @@ pub struct BuiltFacet {
     pub thickness: f64,
     /// Glass in front of the reflecting surface.
     pub glass: Option<Glass>,
+    /// How it reflects.
+    pub(crate) finish: Finish,
     /// The second reflecting side of a two-sided mirror.
     pub back: Option<Back>,
     slope: Slope,
@@ -153,6 +156,7 @@ impl BuiltFacet {
         thickness: f64,
         two_sided: bool,
         glass: Option<Glass>,
+        finish: Finish,
     ) -> Option<Self> {
         let behind = face.normal.into_inner() * thickness;
         let backing = Polygon::new(face.corners.iter().map(|c| c - behind).collect())?;
@@ -167,6 +171,7 @@ impl BuiltFacet {
             backing,
             thickness,
             glass,
+            finish,
             back: match back {
                 Some(back) => Some(back?),
                 None => None,
@@ -175,9 +180,18 @@ impl BuiltFacet {
         })
     }
 
+    /// Share of unpolarized light that it reflects, at a cosine of the incidence.
+    pub fn reflectivity(&self, cos_incidence: f64, wavelength_nm: f64) -> f64 {
+        let [s, p] = self.finish.amplitudes(cos_incidence, wavelength_nm);
+        0.5 * (s.norm_sqr() + p.norm_sqr())
+    }
+
     /// Whether both reflect identically.
     pub(crate) fn reflects_like(&self, other: &Self) -> bool {
-        self.slope == other.slope && self.glass == other.glass && self.face.corners == other.face.corners
+        self.slope == other.slope
+            && self.glass == other.glass
+            && self.finish == other.finish
+            && self.face.corners == other.face.corners
     }
 
     /// Normal of the reflecting surface at a point on it.
@@ -324,6 +338,7 @@ fn build_facet(
         backing,
         thickness,
         glass: scene.superstructure.mirror.glass,
+        finish: Finish::of(&scene.superstructure.mirror, Some(facet)),
         back,
         slope,
     })
@@ -414,6 +429,7 @@ mod tests {
             thickness: 0.0,
             face,
             glass: None,
+            finish: Finish::Plain(1.0),
             back: None,
             slope,
         };

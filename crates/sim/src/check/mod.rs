@@ -7,6 +7,7 @@
 
 mod experiment;
 mod flight;
+mod mirror;
 mod mishap;
 mod outline;
 mod overlap;
@@ -21,9 +22,10 @@ use crate::findings::Findings;
 use crate::scene::Scene;
 use catoptric_model::place::{KeyPath, Problem};
 
-/// What is probably not meant, and hinders nothing: mirrors that no beam reaches.
+/// What is probably not meant, and hinders nothing: mirrors that no beam reaches, and noise that holds for nothing.
 pub fn warnings(scene: &Scene) -> Vec<Problem> {
     let mut found = Findings(Vec::new());
+    values::warn(scene, &mut found);
     if let Ok(scan) = scene.scanner.scan() {
         structure::warn(scene, &scan, &mut found);
     }
@@ -35,6 +37,7 @@ pub fn problems(scene: &Scene) -> Vec<Problem> {
     let mut found = Findings(Vec::new());
     values::check(scene, &mut found);
     stage::check(scene, &mut found);
+    mirror::check(scene, &mut found);
     let scan = match scene.scanner.scan() {
         Ok(scan) => scan,
         Err(error) => {

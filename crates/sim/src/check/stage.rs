@@ -70,17 +70,6 @@ pub(super) fn check(scene: &Scene, found: &mut Findings) {
             found,
         );
     }
-    let total = material.reflectivity + material.diffuse_reflectivity;
-    if total > 1.0 {
-        found.add(
-            &path.key("diffuse_reflectivity"),
-            format_args!(
-                "is {} and `{path}.reflectivity` is {}: a mirror cannot return more light than it receives",
-                material.diffuse_reflectivity, material.reflectivity
-            ),
-            format!("their sum is {total}; 1 is allowed"),
-        );
-    }
 }
 
 /// Checks that the glass is no thicker than the mirror, of which it is a part.

@@ -2,7 +2,7 @@
 
 use crate::build::color;
 use crate::findings::{Findings, suggestion};
-use crate::scene::{Detector, EchoChoice, MocapProfile, NoiseTable, Preset, Principle, Scene};
+use crate::scene::{Detector, EchoChoice, Errors, MocapProfile, NoiseTable, Preset, Principle, Scene};
 use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::place::KeyPath;
 use std::collections::BTreeMap;
@@ -143,6 +143,27 @@ fn colors(scene: &Scene, found: &mut Findings) {
     }
 }
 
+/// Warns of a table of noise that does not hold for the boards and walls, whose colors have their own.
+pub(super) fn warn(scene: &Scene, found: &mut Findings) {
+    if scene.errors.noise == Errors::default().noise {
+        return;
+    }
+    let boards = scene.board.iter().map(|b| b.color.as_str());
+    let mut own: Vec<&str> = boards
+        .chain([scene.room.color.as_str()])
+        .filter(|name| color::has_own_noise(scene, name))
+        .collect();
+    own.sort_unstable();
+    own.dedup();
+    if !own.is_empty() {
+        found.add(
+            &KeyPath::of("errors").key("noise"),
+            format_args!("is not that of {}, which the paper's Table 4 gives", own.join(", ")),
+            format!("to use it there too, give the color without noise of its own: [color.{}] with a reflectivity", own[0]),
+        );
+    }
+}
+
 fn tables(scene: &Scene, found: &mut Findings) {
     let errors = KeyPath::of("errors");
     let noise = |table: &NoiseTable, path: &KeyPath, found: &mut Findings| {
@@ -153,6 +174,10 @@ fn tables(scene: &Scene, found: &mut Findings) {
         if let Some(table) = &color.noise {
             noise(table, &KeyPath::of("color").key(name).key("noise"), found);
         }
+    }
+    if let Some(table) = &scene.errors.incidence {
+        let nodes = ("incidence_deg", "°", table.incidence_deg.as_slice());
+        increasing(nodes, &table.factor, &errors.key("incidence"), "factor", found);
     }
     let distance = &scene.errors.distance;
     columns(

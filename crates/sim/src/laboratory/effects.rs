@@ -53,7 +53,8 @@ pub struct StretchEffects<'a> {
     scan: ScanEffects,
 }
 
-/// The AR(1) state of every beam, of unit variance, after some number of scans; empty before the first.
+/// The AR(1) state of every beam, then the one that all beams share, of unit variance, after some number of scans; empty
+/// before the first, and without those that the scene does not have.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Memory {
     states: Vec<f64>,
@@ -122,12 +123,26 @@ impl EffectSource<'_> {
             .filter(|_| errors.model != ErrorModel::None)
     }
 
+    /// The law of the noise that all beams share, if there is any.
+    fn common(&self) -> Option<&Correlated> {
+        let errors = &self.scene.errors;
+        errors
+            .common
+            .as_ref()
+            .filter(|_| errors.model != ErrorModel::None)
+    }
+
+    /// Number of states that beams have for themselves.
+    fn own_states(&self) -> usize {
+        self.correlated().map_or(0, |_| self.geometry.beams())
+    }
+
     /// Noise row of a scan.
     fn row(&self, scan: usize) -> u64 {
         (self.first_scan + scan) as u64
     }
 
-    /// The innovations ε of a scan, for all beams; empty without correlated noise.
+    /// The innovations ε of a scan, for all beams and then for what they share; empty without correlated noise.
     pub(super) fn innovations(&self, scan: usize, columns: &mut Columns, out: &mut Vec<f64>) {
         out.clear();
         if self.correlated().is_some() {
@@ -139,23 +154,34 @@ impl EffectSource<'_> {
             );
             columns.normals(0, out);
         }
+        if self.common().is_some() {
+            out.push(Draws::new(self.seed, Purpose::Common, self.row(scan)).normal());
+        }
     }
 
-    /// Takes the AR(1) step of all beams, which turns the innovations of a scan into states: x₀ = ε₀,
+    /// Takes the AR(1) step of all states, which turns the innovations of a scan into states: x₀ = ε₀,
     /// xₖ = φ·xₖ₋₁ + √(1 − φ²)·εₖ.
     pub(super) fn remember(&self, scan: usize, memory: &mut Memory, innovations: &mut [f64]) {
-        let Some(law) = self.correlated() else { return };
-        let period_s = self.geometry.scan_period_s();
-        let share = if scan == 0 {
-            0.0
-        } else {
-            libm::exp(-period_s / law.time_constant_s)
-        };
-        let fresh = (1.0 - share * share).sqrt();
-        memory.states.resize(self.geometry.beams(), 0.0);
-        for (state, innovation) in memory.states.iter_mut().zip(innovations) {
-            *state = share * *state + fresh * *innovation;
-            *innovation = *state;
+        memory.states.resize(innovations.len(), 0.0);
+        let split = self.own_states();
+        let (own, shared) = memory.states.split_at_mut(split);
+        let (of_beams, of_all) = innovations.split_at_mut(split);
+        for (law, states, innovations) in [
+            (self.correlated(), own, of_beams),
+            (self.common(), shared, of_all),
+        ] {
+            let Some(law) = law else { continue };
+            let period_s = self.geometry.scan_period_s();
+            let share = if scan == 0 {
+                0.0
+            } else {
+                libm::exp(-period_s / law.time_constant_s)
+            };
+            let fresh = (1.0 - share * share).sqrt();
+            for (state, innovation) in states.iter_mut().zip(innovations) {
+                *state = share * *state + fresh * *innovation;
+                *innovation = *state;
+            }
         }
     }
 
@@ -173,10 +199,16 @@ impl EffectSource<'_> {
                 .draw(self.geometry.beams(), self.seed, Purpose::Reading, row);
             into.columns.normals(0, &mut into.noise);
             into.columns.uniforms(2, &mut into.dropout);
+            let (own, shared) = states.split_at(self.own_states());
+            into.correlated.clear();
             if let Some(law) = self.correlated() {
-                into.correlated.clear();
                 into.correlated
-                    .extend(states.iter().map(|state| law.sd_mm * 1e-3 * state));
+                    .extend(own.iter().map(|state| law.sd_mm * 1e-3 * state));
+            }
+            if let (Some(law), [state]) = (self.common(), shared) {
+                into.correlated.resize(self.geometry.beams(), 0.0);
+                let shared = law.sd_mm * 1e-3 * state;
+                into.correlated.iter_mut().for_each(|own| *own += shared);
             }
             if let Some(law) = &errors.interference {
                 into.columns

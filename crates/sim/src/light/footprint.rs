@@ -175,6 +175,21 @@ fn correct_spread(rays: &mut [SubRay], inside: usize) {
     }
 }
 
+/// Long and short axis of the ellipse of the beam at an azimuth, in the sensor frame.
+pub(crate) fn axes(shape: &BeamShape, azimuth: f64) -> [Vector3<f64>; 2] {
+    let direction = beam::direction(azimuth);
+    let horizontal = Vector3::new(-direction.y, direction.x, 0.0);
+    let (sin, cos) = if shape.turns {
+        libm::sincos(azimuth)
+    } else {
+        (0.0, 1.0)
+    };
+    [
+        horizontal * cos + Vector3::z() * sin,
+        Vector3::z() * cos - horizontal * sin,
+    ]
+}
+
 /// The ray of a sub-ray of the beam at a given azimuth, in the sensor frame.
 ///
 /// Behind a spinning 45° mirror the spot rotates with the azimuth θ: its long axis is along
@@ -187,14 +202,7 @@ pub fn ray(shape: &BeamShape, azimuth: f64, sub_ray: &SubRay) -> Ray {
             direction,
         };
     }
-    let horizontal = Vector3::new(-direction.y, direction.x, 0.0);
-    let (sin, cos) = if shape.turns {
-        libm::sincos(azimuth)
-    } else {
-        (0.0, 1.0)
-    };
-    let wide = horizontal * cos + Vector3::z() * sin;
-    let narrow = Vector3::z() * cos - horizontal * sin;
+    let [wide, narrow] = axes(shape, azimuth);
     let half = |full: f64| 0.5e-3 * full;
     let offset = wide * (sub_ray.wide * half(shape.wide_aperture_mm))
         + narrow * (sub_ray.narrow * half(shape.narrow_aperture_mm));

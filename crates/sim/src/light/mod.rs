@@ -4,6 +4,7 @@ pub mod footprint;
 pub mod glass;
 pub(crate) mod optics;
 pub mod power;
+pub(crate) mod view;
 
 pub use optics::{
     Bounce, Course, Edit, End, MAX_BOUNCES, Meeting, Mirrors, RayPath, Rig, Role, Setting, Target, Trail,

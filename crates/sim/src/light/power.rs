@@ -15,16 +15,18 @@ pub struct Illumination {
     pub range: f64,
     /// Reflectivity of the mirrors on the outgoing path; it applies again to the return.
     pub mirrors: f64,
+    /// Share of the receiver's lens that sees it.
+    pub seen: f64,
 }
 
 /// Power at the detector, in watts: P = τ_o·τ_a²·D_R²·ρ_t·dA·P_t / (R²·θ_R·(θ_d·R)²) — Eq. (1).
 ///
 /// dA is the part of the spot (θ_d·R)² that a sub-ray represents, so that the size of the spot cancels and the sub-rays
 /// of a beam whose spot is entirely on the target add up to the closed form. Unlike the paper, the cosine of the
-/// incidence and the losses at the mirrors are written out.
+/// incidence, the losses at the mirrors and the share of the lens that sees the spot are written out.
 #[doc(alias = "P_detector")]
 pub fn received(light: &Light, on: &Illumination) -> f64 {
-    Target::new(light, on.reflectivity, on.mirrors).received(on.share, on.range, on.cos_incidence)
+    Target::new(light, on.reflectivity, on.mirrors).received(on.share, on.range, on.cos_incidence) * on.seen
 }
 
 /// A target and the mirrors in front of it: everything that is the same for all sub-rays that go there.
@@ -73,6 +75,7 @@ mod tests {
             share: 1.0,
             range: 3.0,
             mirrors: 0.9,
+            seen: 1.0,
         };
         // τ_o = 0.9, τ_a = 0.95, D_R = 20 mm, P_t = 10 W, θ_R = π, dA = (θ_d·R)².
         let by_hand =

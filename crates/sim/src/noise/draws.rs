@@ -42,6 +42,8 @@ pub enum Purpose {
     BareDistance = 16,
     /// Thickness of a mirror as built; row = facet.
     MirrorThickness = 17,
+    /// Innovation of the noise that all beams share; row = scan.
+    Common = 18,
 }
 
 /// The draws of one row.

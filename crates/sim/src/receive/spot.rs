@@ -74,8 +74,9 @@ mod tests {
             for range in [0.5, 4.0] {
                 let [width, height] = sensor(preset, 61).spot(&ahead(range, 0.0), 3).expect("it is met");
                 let half = |full_mrad: f64| libm::tan(0.5e-3 * full_mrad);
-                let wide =
-                    2.0 * range * half(shape.wide_full_mrad) + 2.0 * range * libm::tan(step_deg.to_radians());
+                let wide = 1e-3 * shape.wide_aperture_mm
+                    + 2.0 * range * half(shape.wide_full_mrad)
+                    + 2.0 * range * libm::tan(step_deg.to_radians());
                 let high = 1e-3 * shape.narrow_aperture_mm + 2.0 * range * half(shape.narrow_full_mrad);
                 // The outer two beams hit the board 0.25° off its normal, and the spot rotates by as much.
                 assert!(

@@ -1,5 +1,6 @@
 //! From received light to a range: which principle, which detector, which echo.
 
+use super::omit::is_zero;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -78,6 +79,11 @@ pub struct Detection {
     /// Range of the face-on white target at which the walk of the detector is calibrated out, in meters.
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub reference_range_m: f64,
+    /// Share of the walk, by which weaker echoes read longer, that the device itself takes out; 1 leaves none, and the
+    /// error models without the detector's own errors have none.
+    #[serde(skip_serializing_if = "is_zero")]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub walk_compensated: f64,
     /// Height above which the receiver clips an echo, in units of the threshold; 0 for a receiver that never clips.
     #[schemars(range(min = 0.0, max = 1e9))]
     pub saturation_over_threshold: f64,
@@ -99,6 +105,7 @@ impl Default for Detection {
             threshold_reflectivity: 0.1,
             threshold_range_m: 8.0,
             reference_range_m: 2.0,
+            walk_compensated: 0.0,
             saturation_over_threshold: 0.0,
             noise_over_threshold: 0.0,
         }

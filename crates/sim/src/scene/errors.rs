@@ -49,6 +49,12 @@ pub struct Errors {
     /// Noise correlated between successive readings of a beam; none by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correlated: Option<Correlated>,
+    /// Noise that all beams of a scan share and that changes slowly from scan to scan; none by default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub common: Option<Correlated>,
+    /// How much larger the noise is where the light meets a surface at an angle; not at all by default.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub incidence: Option<IncidenceNoise>,
     /// Rare steps of single readings; none by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interference: Option<Interference>,
@@ -82,6 +88,8 @@ impl Default for Errors {
             element_sd_mm: 0.0,
             warm_up: None,
             correlated: None,
+            common: None,
+            incidence: None,
             interference: None,
             quantization_mm: 1.0,
             dropout: 0.0,
@@ -101,7 +109,7 @@ pub struct WarmUp {
     pub time_constant_s: f64,
 }
 
-/// Noise that changes slowly, an AR(1) process for every beam individually: x₀ = ε₀, xₖ = φ·xₖ₋₁ + √(1 − φ²)·εₖ.
+/// Noise that changes slowly, an AR(1) process: x₀ = ε₀, xₖ = φ·xₖ₋₁ + √(1 − φ²)·εₖ.
 ///
 /// φ = exp(−T/τ) for scans T apart. It starts anew, in its stationary distribution, with every stretch.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -138,6 +146,28 @@ pub struct NoiseTable {
     /// Standard deviations in millimeters at those distances.
     #[schemars(inner(range(min = 0.0, max = 1000.0)))]
     pub sd_mm: Vec<f64>,
+}
+
+/// Factor on the noise of a reading as a function of the incidence on the surface, interpolated linearly and constant
+/// outside.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct IncidenceNoise {
+    /// Angles of incidence, strictly increasing, in degrees.
+    #[schemars(length(min = 1))]
+    #[schemars(inner(range(min = 0.0, max = 90.0)))]
+    pub incidence_deg: Vec<f64>,
+    /// Factors at those angles.
+    #[schemars(inner(range(min = 0.0, max = 100.0)))]
+    pub factor: Vec<f64>,
+}
+
+impl IncidenceNoise {
+    /// The factor at a cosine of the incidence.
+    pub fn factor(&self, cos_incidence: f64) -> f64 {
+        let incidence = libm::acos(cos_incidence.clamp(-1.0, 1.0)).to_degrees();
+        interpolate(&self.incidence_deg, &self.factor, incidence)
+    }
 }
 
 /// How well step 1 knows the errors: the beliefs differ from the truth by these standard deviations (assumed).

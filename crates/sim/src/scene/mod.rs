@@ -4,6 +4,7 @@
 //! value are in [`crate::check`].
 
 mod body;
+mod coating;
 mod detection;
 mod errors;
 pub(crate) mod facet;
@@ -25,8 +26,11 @@ mod test;
 pub use body::{
     PlanePolygon, PlaneRectangle, PlaneShape, RoomBox, RoomCylinder, RoomMirror, RoomSurface, SurfaceShape,
 };
+pub use coating::{Coating, CoatingTable, Dust, Film, Stack};
 pub use detection::{Detection, Detector, EchoChoice, Principle};
-pub use errors::{Characterization, Correlated, ErrorModel, Errors, Interference, NoiseTable, WarmUp};
+pub use errors::{
+    Characterization, Correlated, ErrorModel, Errors, IncidenceNoise, Interference, NoiseTable, WarmUp,
+};
 pub use facet::{Facet, FacetShape, Plate, PolygonShape, RectangleShape, Wedge};
 pub use flight::{Attitude, Flight, Waypoint};
 pub use meshes::Meshes;

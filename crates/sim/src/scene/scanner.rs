@@ -1,5 +1,6 @@
 //! The scanner: preset, beam, mounting and light.
 
+use super::omit::is_false;
 use super::preset::Preset;
 use super::sheet::{BeamShape, HousingBox, Limits};
 use catoptric_model::{ScanAngles, ScanError, ScanGeometry};
@@ -135,6 +136,37 @@ pub struct Light {
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     #[schemars(range(min = 0.0, max = 100.0))]
     pub target_dispersion_sr: f64,
+    /// Wavelength, in nanometers.
+    #[serde(skip_serializing_if = "is_infrared")]
+    #[schemars(range(min = 200.0, max = 20000.0))]
+    pub wavelength_nm: f64,
+    /// Angle of the laser's linear polarization from the long axis of the beam's ellipse, with which it turns, in degrees;
+    /// without it, the light is not polarized (nobody publishes it).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -180.0, max = 180.0))]
+    pub polarization_deg: Option<f64>,
+    /// Full angle θ_V that the receiver's detector takes, in milliradians: the third of the areas that dA is the least of,
+    /// and what makes near targets no brighter than far ones. Without it, the receiver sees every spot with all of its
+    /// lens.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.01, max = 3000.0))]
+    pub receiver_field_of_view_mrad: Option<f64>,
+    /// Center of the receiver's lens from where the beam leaves, horizontally across the beam and up, in millimeters
+    /// (assumed).
+    #[serde(skip_serializing_if = "is_nothing")]
+    #[schemars(inner(range(min = -1000.0, max = 1000.0)))]
+    pub receiver_offset_mm: [f64; 2],
+    /// Whether only that part of the lens counts from which the mirrors show the spot.
+    #[serde(skip_serializing_if = "is_false")]
+    pub vignetting: bool,
+}
+
+fn is_infrared(wavelength_nm: &f64) -> bool {
+    *wavelength_nm == 905.0
+}
+
+fn is_nothing(offset: &[f64; 2]) -> bool {
+    *offset == [0.0; 2]
 }
 
 impl Default for Light {
@@ -145,6 +177,11 @@ impl Default for Light {
             air_transmission: 1.0,
             receiver_diameter_mm: 20.0,
             target_dispersion_sr: std::f64::consts::PI,
+            wavelength_nm: 905.0,
+            polarization_deg: None,
+            receiver_field_of_view_mrad: None,
+            receiver_offset_mm: [0.0; 2],
+            vignetting: false,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! What is built around the scanner: mirrors, posts, markers, and their deviations from the drawing.
 
+use super::coating::{Coating, Dust};
 use super::facet::Facet;
 use super::omit::{is_false, is_zero};
 use super::pattern::Pattern;
@@ -120,6 +121,26 @@ pub struct Mirror {
     #[serde(skip_serializing_if = "is_zero")]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub diffuse_reflectivity: f64,
+    /// What reflects, instead of `reflectivity`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coating: Option<Coating>,
+    /// Dust on the mirrors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dust: Option<Dust>,
+}
+
+impl Mirror {
+    /// Share of the light that a plain mirror and the dust on it reflect.
+    pub fn reflected(&self) -> f64 {
+        self.dust
+            .map_or(self.reflectivity, |dust| self.reflectivity * dust.passed())
+    }
+
+    /// Share of the light that a mirror and the dust on it scatter.
+    pub fn scattered(&self) -> f64 {
+        let by_dust = self.dust.map_or(0.0, |dust| dust.cover * dust.reflectivity);
+        self.diffuse_reflectivity + by_dust
+    }
 }
 
 /// Glass in front of the reflecting surface of a mirror.
@@ -149,6 +170,8 @@ impl Default for Mirror {
             thickness_mm: 1.0,
             glass: None,
             diffuse_reflectivity: 0.0,
+            coating: None,
+            dust: None,
         }
     }
 }

@@ -134,7 +134,7 @@ pub fn mirrored(facet: &Facet, name: String, across: &[Exchange], scan: &ScanGeo
     Facet {
         name,
         shape,
-        two_sided: facet.two_sided,
+        ..facet.clone()
     }
 }
 
@@ -145,7 +145,7 @@ pub fn turned(facet: &Facet, name: String, turn_deg: f64, scan: &ScanGeometry) -
     Facet {
         name,
         shape,
-        two_sided: facet.two_sided,
+        ..facet.clone()
     }
 }
 

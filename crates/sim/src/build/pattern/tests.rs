@@ -9,6 +9,8 @@ fn facet(name: &str, shape: FacetShape) -> Facet {
         name: name.to_owned(),
         shape,
         two_sided: false,
+        reflectivity: None,
+        coating: None,
     }
 }
 

@@ -17,6 +17,8 @@ fn drawn(corners_mm: &[&[[f64; 3]]]) -> Scene {
         Facet {
             name: format!("m{i}"),
             two_sided: true,
+            reflectivity: None,
+            coating: None,
             shape: FacetShape::Polygon(PolygonShape { corners_mm }),
         }
     };

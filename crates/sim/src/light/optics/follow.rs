@@ -113,6 +113,7 @@ impl Setting<'_> {
         };
         let length = course.length + hit.distance;
         let cos_incidence = -normal.dot(&incoming);
+        let after = mirror::reflect(&incoming, &normal);
         let mut bounce = Bounce {
             facet,
             point: hit.point,
@@ -121,7 +122,7 @@ impl Setting<'_> {
             passage: None,
             after: Ray {
                 origin: hit.point,
-                direction: mirror::reflect(&incoming, &normal),
+                direction: after,
             },
             length_after: length,
             meeting: Meeting {
@@ -130,6 +131,8 @@ impl Setting<'_> {
                 cos_incidence,
                 silvered: course.silvered,
                 gain: course.gain,
+                silver: (!ghost).then_some(facet),
+                after,
             },
         };
         let glass = mirror.glass.filter(|_| !back && cos_incidence > 0.0);

@@ -4,7 +4,7 @@ use crate::light::glass::Passage;
 use catoptric_cast::Ray;
 use catoptric_cast::{SurfacePoint, placed};
 use catoptric_model::Pose;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Unit, Vector3};
 
 /// Maximum number of mirrors that a ray can hit; `max_bounces` may be less.
 pub const MAX_BOUNCES: usize = 8;
@@ -33,6 +33,17 @@ pub struct Meeting {
     pub silvered: usize,
     /// Share of the light that earlier glass has transmitted.
     pub gain: f64,
+    /// Index of the mirror; `None` if the front of its glass reflects, whatever its coating.
+    pub silver: Option<usize>,
+    /// Direction in which the light goes on.
+    pub after: Unit<Vector3<f64>>,
+}
+
+impl Meeting {
+    /// The mirror whose coating counts, and where the light goes on.
+    pub(crate) fn hop(&self) -> (Option<usize>, Unit<Vector3<f64>>) {
+        (self.silver, self.after)
+    }
 }
 
 /// A reflection.
@@ -162,6 +173,10 @@ impl Bounce {
                 ..p
             }),
             after: placed(&self.after, &kept_from_sensor.inverse()),
+            meeting: Meeting {
+                after: kept_from_sensor.inverse_transform_unit_vector(&self.meeting.after),
+                ..self.meeting
+            },
             ..self
         }
     }

@@ -6,8 +6,11 @@
 
 use super::path::{Course, End, Meeting};
 use super::setting::Setting;
+#[cfg(doc)]
+use crate::build::coating::Finishes;
 use catoptric_cast::Ray;
 use catoptric_cast::Rays;
+use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -32,6 +35,9 @@ pub(crate) struct BeamPaths<'a> {
     pub(crate) runs: &'a [Run],
     /// Path lengths of all sub-rays, in meters: to the end on the structure, or to where the last leg begins.
     pub(crate) lengths: &'a [f64],
+    /// Share of the light of all sub-rays that mirrors reflect, as [`Finishes::passed`]; empty if that is the same number
+    /// for all mirrors.
+    pub(crate) passed: &'a [f64],
     /// The last legs of those that leave, as indices into [`Rig::leaving`].
     pub(crate) leaving: Range<usize>,
     facets: &'a [usize],
@@ -43,6 +49,7 @@ pub(crate) struct BeamPaths<'a> {
 struct Compiled {
     runs: Vec<Run>,
     lengths: Vec<f64>,
+    passed: Vec<f64>,
     leaving: Vec<Ray>,
     /// Mirrors hit by each run, run by run.
     facets: Vec<usize>,
@@ -93,10 +100,11 @@ impl Rig {
         bare: &Setting<'_>,
         beams: usize,
         rays: impl Fn(usize) -> R + Sync,
+        long_axis: impl Fn(usize) -> Vector3<f64> + Sync,
     ) -> Self {
         let beams: Vec<(Compiled, f64, bool)> = (0..beams)
             .into_par_iter()
-            .map(|beam| Compiled::of(bare, rays(beam)))
+            .map(|beam| Compiled::of(bare, rays(beam), &long_axis(beam)))
             .collect();
         let mut all = Compiled::default();
         let mut starts = vec![all.start()];
@@ -124,6 +132,7 @@ impl Rig {
         BeamPaths {
             runs: &all.runs[from.runs..to.runs],
             lengths: &all.lengths[from.lengths..to.lengths],
+            passed: all.passed.get(from.lengths..to.lengths).unwrap_or_default(),
             leaving: from.leaving..to.leaving,
             facets: &all.facets[from.facets..to.facets],
             meetings: &all.meetings[from.meetings..to.meetings],
@@ -148,7 +157,11 @@ impl Rig {
 
 impl Compiled {
     /// The paths of a beam, how far from the sensor they go before they leave, and whether glass on them makes ghosts.
-    fn of(bare: &Setting<'_>, rays: impl Iterator<Item = Ray>) -> (Self, f64, bool) {
+    fn of(
+        bare: &Setting<'_>,
+        rays: impl Iterator<Item = Ray>,
+        long_axis: &Vector3<f64>,
+    ) -> (Self, f64, bool) {
         let rays: Vec<Ray> = rays.collect();
         let mut compiled = Self::default();
         let mut bounces: Vec<(usize, usize, Meeting)> = Vec::new();
@@ -188,6 +201,12 @@ impl Compiled {
             let own = met..met + course.count;
             met = own.end;
             compiled.lengths.push(course.length);
+            if let Some(finishes) = bare.finishes() {
+                let met = bounces[own.clone()].iter().map(|(.., meeting)| meeting.hop());
+                compiled
+                    .passed
+                    .push(finishes.passed(&ray.direction, long_axis, met));
+            }
             compiled.depart(course, then, own.clone().map(|i| bounces[i].1));
             compiled
                 .meetings
@@ -210,6 +229,7 @@ impl Compiled {
     fn append(&mut self, beam: &Self) {
         self.runs.extend_from_slice(&beam.runs);
         self.lengths.extend_from_slice(&beam.lengths);
+        self.passed.extend_from_slice(&beam.passed);
         self.leaving.extend_from_slice(&beam.leaving);
         self.facets.extend_from_slice(&beam.facets);
         self.meetings.extend_from_slice(&beam.meetings);

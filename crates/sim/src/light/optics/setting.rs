@@ -6,10 +6,12 @@
 
 use super::clearance::Extent;
 use super::path::MAX_BOUNCES;
+use crate::build::coating::{Finish, Finishes};
 use crate::build::color::{self, Paint};
 use crate::build::stage::Stage;
 use crate::build::structure::{Back, BuiltFacet, OpaquePart, Structure};
 use crate::error::SimError;
+use crate::light::view::Lens;
 use crate::scene::Scene;
 use catoptric_cast::Ray;
 use catoptric_cast::{Hit, Rays, Shape, SurfacePoint, World, placed};
@@ -73,8 +75,12 @@ pub(super) struct Contents<'a> {
     /// Index of the first surface of the room.
     first_of_room: usize,
     pub(super) facets: Vec<Cow<'a, BuiltFacet>>,
+    /// Those that are there, and how many of them the structure has: these come first.
+    mirrors: Vec<usize>,
+    of_structure: usize,
     pub(super) max_bounces: usize,
     diffuse_reflectivity: f64,
+    finishes: Option<Finishes>,
 }
 
 /// The end of a leg of a ray, in the frame in which the surface is kept.
@@ -206,9 +212,22 @@ impl<'a> Setting<'a> {
         flies: bool,
     ) -> Self {
         let room = list.shapes.split_off(first_of_room);
+        let faces = |surface: &Surface| match (surface.role, surface.side) {
+            (Role::Facet(facet), Side::Face | Side::Both) => Some(facet),
+            _ => None,
+        };
+        let mirrors: Vec<usize> = list.surfaces.iter().filter_map(faces).collect();
+        let of_structure = list.surfaces[..first_of_room].iter().filter_map(faces).count();
         let corners = list.shapes.iter().flat_map(|shape| match shape {
             Shape::Mesh(mesh) => mesh.vertices().to_vec(),
             _ => shape.triangles().into_iter().flatten().collect(),
+        });
+        let plain = Finish::of(&scene.superstructure.mirror, None);
+        let is_plain = matches!(plain, Finish::Plain(_)) && facets.iter().all(|f| f.finish == plain);
+        let finishes = (!is_plain).then(|| Finishes {
+            of_facets: facets.iter().map(|f| f.finish.clone()).collect(),
+            wavelength_nm: scene.light.wavelength_nm,
+            polarization: scene.light.polarization_deg.map(f64::to_radians),
         });
         let contents = Contents {
             // The triangles of a cylinder are flat.
@@ -219,9 +238,12 @@ impl<'a> Setting<'a> {
             surfaces: list.surfaces,
             first_of_room,
             flies,
+            mirrors,
+            of_structure,
             facets,
             max_bounces: (scene.superstructure.max_bounces as usize).min(MAX_BOUNCES),
-            diffuse_reflectivity: scene.superstructure.mirror.diffuse_reflectivity,
+            diffuse_reflectivity: scene.superstructure.mirror.scattered(),
+            finishes,
         };
         Self {
             contents: Held::Own(Box::new(contents)),
@@ -309,6 +331,47 @@ impl<'a> Setting<'a> {
     /// Share of the light that the mirrors themselves scatter.
     pub fn diffuse_reflectivity(&self) -> f64 {
         self.contents.diffuse_reflectivity
+    }
+
+    /// Share of the receiver's lens from which the mirrors show the spot of a part of a beam's light: `facets` are those
+    /// on the path to the surface, if there is one, `beam` is its chief ray's direction and `range` the length of the path.
+    pub(crate) fn shown(
+        &self,
+        lens: &Lens,
+        beam: &Unit<Vector3<f64>>,
+        facets: &[usize],
+        (surface, range): (Option<usize>, f64),
+    ) -> f64 {
+        let outline = |facet: usize| self.outline(facet);
+        let via: Vec<Vec<Point3<f64>>> = facets.iter().map(|f| outline(*f)).collect();
+        let via: Vec<&[Point3<f64>]> = via.iter().map(Vec::as_slice).collect();
+        let own = match surface.map(|surface| self.role(surface)) {
+            Some(Role::Facet(facet)) => Some(facet),
+            _ => None,
+        };
+        let past: Vec<Vec<Point3<f64>>> = if facets.is_empty() {
+            let others = self.contents.mirrors.iter().filter(|f| Some(**f) != own);
+            others.map(|f| outline(*f)).collect()
+        } else {
+            Vec::new()
+        };
+        lens.seen(beam, range, &via, past.iter().map(Vec::as_slice))
+    }
+
+    /// Corners of a mirror in the sensor frame.
+    fn outline(&self, facet: usize) -> Vec<Point3<f64>> {
+        let corners = &self.contents.facets[facet].face.corners;
+        match &self.start_from_sensor {
+            Some(pose) if !self.contents.mirrors[..self.contents.of_structure].contains(&facet) => {
+                corners.iter().map(|c| pose.inverse_transform_point(c)).collect()
+            }
+            _ => corners.clone(),
+        }
+    }
+
+    /// How the mirrors reflect, if that is not one number.
+    pub(crate) fn finishes(&self) -> Option<&Finishes> {
+        self.contents.finishes.as_ref()
     }
 
     /// The mirror that a surface belongs to, if its given side reflects, and whether that side is the back of the

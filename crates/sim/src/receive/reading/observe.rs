@@ -2,7 +2,7 @@
 
 use super::part::{Parts, Place};
 use super::returned::Return;
-use super::sensor::{Sensor, is_chief};
+use super::sensor::{BeamIn, Sensor, is_chief};
 use super::sub_ray::Arrival;
 use crate::light::footprint::SubRay;
 use crate::light::optics::{End, RayPath, Role, Setting};
@@ -63,38 +63,40 @@ impl Sensor {
     }
 
     /// The surfaces that a beam's light reaches, each with its pulses.
-    fn illuminate(&self, setting: &Setting<'_>, beam: usize, parts: &mut Parts) {
+    pub(super) fn illuminate(&self, setting: &Setting<'_>, beam: usize, parts: &mut Parts) {
         parts.begin();
+        let within = self.beam_in(setting, beam);
         let rays: Vec<Ray> = self.rays(beam).collect();
         let paths = setting.trace_beam(&rays);
         for ((sub_ray, ray), path) in self.sub_rays.iter().zip(&rays).zip(&paths) {
-            self.illuminate_along(setting, sub_ray, ray, path, parts);
+            self.illuminate_along(&within, sub_ray, ray, path, parts);
         }
         if self.lacks_chief() {
             Self::add_chief(parts, &self.chief_path(setting, beam));
         }
+        self.vignette(setting, beam, parts);
         parts.end();
     }
 
     /// What one sub-ray's light reaches along its path.
     pub(super) fn illuminate_along(
         &self,
-        setting: &Setting<'_>,
+        within: &BeamIn<'_>,
         sub_ray: &SubRay,
         ray: &Ray,
         path: &RayPath,
         parts: &mut Parts,
     ) {
         let chief = is_chief(sub_ray);
-        if let Some(arrival) = self.at_end(setting, sub_ray, path) {
+        if let Some(arrival) = self.at_end(within, (sub_ray, ray), path) {
             self.add(parts, path, &arrival, chief);
         }
-        for ghost in setting.ghosts(ray, path) {
-            if let Some(arrival) = self.at_end(setting, sub_ray, &ghost) {
+        for ghost in within.setting.ghosts(ray, path) {
+            if let Some(arrival) = self.at_end(within, (sub_ray, ray), &ghost) {
                 self.add(parts, &ghost, &arrival, false);
             }
         }
-        for arrival in self.on_mirrors(setting, sub_ray, path.meetings()) {
+        for arrival in self.on_mirrors(within, (sub_ray, ray), path.meetings()) {
             self.add(parts, path, &arrival, chief);
         }
     }

@@ -3,7 +3,7 @@
 
 use super::part::{Parts, Place};
 use super::returned::Return;
-use super::sensor::{Sensor, is_chief};
+use super::sensor::{BeamIn, Sensor, is_chief};
 use crate::light::footprint;
 use crate::light::optics::{BeamPaths, Rig, Run, Setting, Then};
 use crate::light::power::{self, Target};
@@ -14,7 +14,7 @@ use std::ops::Range;
 /// Sub-rays that leave the structure identically, and what is around it.
 #[derive(Clone, Copy)]
 struct RunContext<'a> {
-    setting: &'a Setting<'a>,
+    within: BeamIn<'a>,
     paths: &'a BeamPaths<'a>,
     run: &'a Run,
 }
@@ -23,7 +23,12 @@ impl Sensor {
     /// Compiles the paths of all sub-rays via the structure, for [`Sensor::observe_over`]; `bare` contains nothing
     /// else.
     pub fn compile(&self, bare: &Setting<'_>) -> Rig {
-        Rig::compile(bare, self.scan.beams(), |beam| self.rays(beam))
+        Rig::compile(
+            bare,
+            self.scan.beams(),
+            |beam| self.rays(beam),
+            |beam| self.long_axis(beam),
+        )
     }
 
     /// What neighboring beams from `first` on receive: bit for bit the same as [`Sensor::observe`], but with the
@@ -68,9 +73,10 @@ impl Sensor {
         parts: &mut Parts,
     ) {
         parts.begin();
+        let within = self.beam_in(setting, beam);
         let mut left = 0;
         for run in paths.runs {
-            let context = RunContext { setting, paths, run };
+            let context = RunContext { within, paths, run };
             let all = run.sub_rays.clone();
             match run.then {
                 Then::Leaves => {
@@ -82,14 +88,15 @@ impl Sensor {
                     let end = |length| (length, cos_incidence);
                     let ends = paths.lengths[all.clone()].iter().copied().map(end);
                     self.add_light(&context, all.clone(), surface, ends, parts);
-                    self.add_on_mirrors(&context, all, parts);
+                    self.add_on_mirrors(&context, beam, all, parts);
                 }
-                Then::Trapped => self.add_on_mirrors(&context, all, parts),
+                Then::Trapped => self.add_on_mirrors(&context, beam, all, parts),
             }
         }
         if self.lacks_chief() {
             Self::add_chief(parts, &self.chief_path(setting, beam));
         }
+        self.vignette(setting, beam, parts);
         parts.end();
     }
 
@@ -101,11 +108,11 @@ impl Sensor {
         in_room: &[Option<Hit>],
         parts: &mut Parts,
     ) {
-        let RunContext { setting, paths, run } = *context;
+        let RunContext { within, paths, run } = *context;
         let mut done = 0;
         while let Some(first) = in_room.get(done) {
-            let surface = first.map(|hit| setting.surface_in_room(&hit));
-            let mirror = surface.filter(|surface| setting.is_mirror(*surface));
+            let surface = first.map(|hit| within.setting.surface_in_room(&hit));
+            let mirror = surface.filter(|surface| within.setting.is_mirror(*surface));
             // Mirrors are handled ray by ray.
             let count = if mirror.is_some() {
                 1
@@ -117,11 +124,11 @@ impl Sensor {
             let sub_rays = from..from + count;
             done += count;
             let front = first.is_some_and(|hit| hit.front());
-            if mirror.is_some_and(|mirror| setting.reflecting(mirror, front).is_some()) {
+            if mirror.is_some_and(|mirror| within.setting.reflecting(mirror, front).is_some()) {
                 // Its light may return to the structure.
                 let sub_ray = &self.sub_rays[sub_rays.start];
                 let ray = footprint::ray(&self.shape, self.scan.azimuth(beam), sub_ray);
-                self.illuminate_along(setting, sub_ray, &ray, &setting.trace(&ray), parts);
+                self.illuminate_along(&within, sub_ray, &ray, &within.setting.trace(&ray), parts);
                 continue;
             }
             if let Some(surface) = surface {
@@ -133,7 +140,7 @@ impl Sensor {
                 });
                 self.add_light(context, sub_rays.clone(), surface, ends, parts);
             }
-            self.add_on_mirrors(context, sub_rays, parts);
+            self.add_on_mirrors(context, beam, sub_rays, parts);
         }
     }
 
@@ -146,9 +153,10 @@ impl Sensor {
         ends: impl Iterator<Item = (f64, f64)>,
         parts: &mut Parts,
     ) {
-        let RunContext { setting, paths, run } = *context;
-        let reflectivity = setting.paint(surface).reflectivity;
-        let target = Target::new(&self.light, reflectivity, self.mirrors[run.silvered] * run.gain);
+        let RunContext { within, paths, run } = *context;
+        let reflectivity = within.setting.paint(surface).reflectivity;
+        let reflecting = |passed: f64| Target::new(&self.light, reflectivity, passed * run.gain);
+        let target = reflecting(self.mirrors[run.silvered]);
         let facets = paths.facets(run);
         let part = parts.of(surface, facets);
         let known = part.pulses.len();
@@ -158,7 +166,13 @@ impl Sensor {
             sub_rays
                 .zip(ends)
                 .map(|((number, sub_ray), (range, cos_incidence))| {
-                    let power = target.received(sub_ray.weight, range, cos_incidence);
+                    let coated = paths.passed.get(number).map(|passed| reflecting(*passed));
+                    let power =
+                        coated
+                            .as_ref()
+                            .unwrap_or(&target)
+                            .received(sub_ray.weight, range, cos_incidence)
+                            * within.overlap(sub_ray, range);
                     if is_chief(sub_ray) {
                         chief = Some((number, range, cos_incidence));
                     }
@@ -175,15 +189,16 @@ impl Sensor {
     }
 
     /// Adds the light that the mirrors on the paths of a run's sub-rays scatter themselves.
-    fn add_on_mirrors(&self, context: &RunContext<'_>, which: Range<usize>, parts: &mut Parts) {
-        let RunContext { setting, paths, run } = *context;
-        if setting.diffuse_reflectivity() <= 0.0 {
+    fn add_on_mirrors(&self, context: &RunContext<'_>, beam: usize, which: Range<usize>, parts: &mut Parts) {
+        let RunContext { within, paths, run } = *context;
+        if within.setting.diffuse_reflectivity() <= 0.0 {
             return;
         }
         let facets = paths.facets(run);
         for number in which {
             let (sub_ray, meetings) = (&self.sub_rays[number], paths.meetings(run, number));
-            for arrival in self.on_mirrors(setting, sub_ray, meetings.iter().copied()) {
+            let ray = footprint::ray(&self.shape, self.scan.azimuth(beam), sub_ray);
+            for arrival in self.on_mirrors(&within, (sub_ray, &ray), meetings.iter().copied()) {
                 let on = &arrival.on;
                 let cosines = meetings[..arrival.bounces].iter().map(|m| m.cos_incidence);
                 let (power, share) = (power::received(&self.light, on), on.share * arrival.gain);

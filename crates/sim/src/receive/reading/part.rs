@@ -13,6 +13,8 @@ pub(super) struct Part {
     pub(super) pulses: Vec<Pulse>,
     pub(super) share: f64,
     pub(super) power: f64,
+    /// Share of the lens from which mirrors show it.
+    pub(super) shown: f64,
     /// Where the chief ray hits it.
     pub(super) chief: Option<Place>,
     /// Where its light hits it on average.
@@ -100,13 +102,26 @@ impl Part {
         }
     }
 
+    /// Mean range of the pulses before the sums become means.
+    pub(super) fn range(&self) -> f64 {
+        self.mean.range / self.power
+    }
+
+    /// Leaves a share of the light.
+    fn dim(&mut self, shown: f64) {
+        self.shown = shown;
+        self.pulses.iter_mut().for_each(|pulse| pulse.power *= shown);
+        self.power *= shown;
+        self.mean.divide(1.0 / shown.max(f64::MIN_POSITIVE), self.count);
+    }
+
     /// Starts over, without light.
     fn begin(&mut self, surface: usize, facets: &[usize]) {
         self.surface = surface;
         self.facets[..facets.len()].copy_from_slice(facets);
         self.count = facets.len();
         self.pulses.clear();
-        (self.share, self.power) = (0.0, 0.0);
+        (self.share, self.power, self.shown) = (0.0, 0.0, 1.0);
         (self.chief, self.mean) = (None, Place::default());
     }
 }
@@ -120,6 +135,12 @@ impl Parts {
     /// The parts of the beam.
     pub(super) fn as_slice(&self) -> &[Part] {
         &self.live
+    }
+
+    /// Share of the lens from which mirrors show the light on a surface that took a path.
+    pub(super) fn shown(&self, surface: usize, facets: &[usize]) -> f64 {
+        let part = self.live.iter().find(|p| p.is_for(surface, facets));
+        part.map_or(1.0, |part| part.shown)
     }
 
     /// The part of a surface and the facets on the path to it, if any light took that path.
@@ -156,6 +177,13 @@ impl Parts {
         part.add_cosines(known, std::iter::once(cosines.clone()));
         if chief {
             part.chief = Some(Place::new(range, cos_incidence, cosines));
+        }
+    }
+
+    /// Leaves a share of the light of each part.
+    pub(super) fn dim(&mut self, shown: impl Fn(&Part) -> f64) {
+        for part in self.live.iter_mut().filter(|p| p.power > 0.0) {
+            part.dim(shown(part));
         }
     }
 

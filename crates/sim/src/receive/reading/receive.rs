@@ -76,7 +76,12 @@ impl Sensor {
             mixed: seen.mixed,
             detection: seen.detection,
             bias: self.bias.terms(geometric, cos_incidence, &paint.name),
-            noise_sd: paint.noise.sd(geometric),
+            noise_sd: paint.noise.sd(geometric)
+                * self
+                    .errors
+                    .incidence
+                    .as_ref()
+                    .map_or(1.0, |table| table.factor(cos_incidence)),
             probability: seen.probability,
             others: Vec::new(),
         };
@@ -99,11 +104,8 @@ impl Sensor {
             .max_by(|a, b| a.power.total_cmp(&b.power))?;
         let geometric = part.place().range;
         let read = |edge: &detect::Edge| {
-            if physical {
-                edge.crossing + self.reference_walk
-            } else {
-                edge.compensated(self.receiver.sd, self.receiver.threshold)
-            }
+            let compensated = edge.compensated(self.receiver.sd, self.receiver.threshold);
+            self.walked(physical, edge.crossing, compensated)
         };
         let alone = match parts {
             [_] => read(&edge),
@@ -113,6 +115,16 @@ impl Sensor {
         };
         let detection = if physical { alone - geometric } else { 0.0 };
         Some((part, read(&edge) - alone, detection))
+    }
+
+    /// Where the device takes an echo to be, from where its detector triggers and from where it would without walk.
+    fn walked(&self, physical: bool, triggered: f64, compensated: f64) -> f64 {
+        let share = self.detection.walk_compensated;
+        match physical {
+            false => compensated,
+            true if share == 0.0 => triggered + self.reference_walk,
+            true => share * compensated + (1.0 - share) * (triggered + self.reference_walk),
+        }
     }
 
     /// Whether only the first leading edge counts, which is found faster than all echoes are.
@@ -149,13 +161,7 @@ impl Sensor {
             EchoChoice::Strongest => echoes.sort_by(|a, b| b.peak.total_cmp(&a.peak)),
             EchoChoice::Last => echoes.reverse(),
         }
-        let read = |echo: &Echo| {
-            if physical {
-                echo.place + self.reference_walk
-            } else {
-                echo.compensated
-            }
-        };
+        let read = |echo: &Echo| self.walked(physical, echo.place, echo.compensated);
         let seen = |echo: &Echo| {
             let inside = |p: &&Part| p.power > 0.0 && (echo.start..=echo.end).contains(&p.mean.range);
             let part = parts

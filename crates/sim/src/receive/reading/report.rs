@@ -13,7 +13,7 @@ pub struct RandomEffects {
     pub element: f64,
     /// Warm-up error of the scanner, in meters.
     pub warm_up: f64,
-    /// Noise correlated with that of earlier readings, in meters.
+    /// Noise correlated with that of earlier readings, of the beam itself and of all, in meters.
     pub correlated: f64,
     /// Step due to interference, in meters.
     pub interference: f64,

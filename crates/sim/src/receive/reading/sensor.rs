@@ -1,15 +1,18 @@
 //! The scanner with everything resolved that does not depend on its surroundings.
 
+use super::part::Parts;
 use crate::build::color;
 use crate::error::SimError;
 use crate::light::footprint::{self, SubRay};
-use crate::light::optics::{MAX_BOUNCES, RayPath, Setting};
+use crate::light::optics::{MAX_BOUNCES, Meeting, RayPath, Setting};
 use crate::light::power::{self, Illumination};
+use crate::light::view::{BeamView, Lens};
 use crate::receive::detect;
 use crate::receive::echo::Receiver;
 use crate::scene::{BeamShape, Detection, ErrorModel, Errors, Light, Limits, Scene};
 use catoptric_cast::Ray;
 use catoptric_model::{RangeBias, ScanGeometry};
+use nalgebra::Vector3;
 
 /// The scanner with everything resolved that does not depend on its surroundings.
 pub struct Sensor {
@@ -17,6 +20,7 @@ pub struct Sensor {
     pub(super) shape: BeamShape,
     pub(super) sub_rays: Vec<SubRay>,
     pub(super) light: Light,
+    pub(super) lens: Lens,
     /// Share of the light that is left after a number of reflections by silver.
     pub(super) mirrors: [f64; MAX_BOUNCES + 1],
     pub(super) limits: Limits,
@@ -25,6 +29,26 @@ pub struct Sensor {
     pub(super) reference_walk: f64,
     pub(super) bias: RangeBias,
     pub(super) errors: Errors,
+}
+
+/// A beam in a setting, and the receiver as it sees the beam.
+#[derive(Clone, Copy)]
+pub(super) struct BeamIn<'a> {
+    pub(super) setting: &'a Setting<'a>,
+    /// `None` if every spot is seen by all of the lens.
+    view: Option<BeamView>,
+    /// Along the long axis of the beam's ellipse.
+    long_axis: Vector3<f64>,
+}
+
+impl BeamIn<'_> {
+    /// Share of the lens that sees a sub-ray's spot at a range.
+    #[inline]
+    pub(super) fn overlap(&self, sub_ray: &SubRay, range: f64) -> f64 {
+        self.view
+            .as_ref()
+            .map_or(1.0, |view| view.overlap(sub_ray, range))
+    }
 }
 
 impl Sensor {
@@ -41,6 +65,7 @@ impl Sensor {
                 share: 1.0,
                 range,
                 mirrors: 1.0,
+                seen: 1.0,
             };
             power::received(&scene.light, &on)
         };
@@ -67,8 +92,9 @@ impl Sensor {
             shape: scene.scanner.beam_shape(),
             sub_rays: footprint::sub_rays(scene.scanner.sub_rays as usize),
             light: scene.light.clone(),
+            lens: Lens::of(&scene.light),
             mirrors: std::array::from_fn(|count| {
-                libm::pow(scene.superstructure.mirror.reflectivity, count as f64)
+                libm::pow(scene.superstructure.mirror.reflected(), count as f64)
             }),
             limits: scene.scanner.limits(),
             detection: scene.detection.clone(),
@@ -143,6 +169,60 @@ impl Sensor {
     /// The path of a beam's chief ray.
     pub fn chief_path(&self, setting: &Setting<'_>, beam: usize) -> RayPath {
         setting.trace(&self.chief_ray(beam))
+    }
+
+    /// A beam in a setting.
+    pub(super) fn beam_in<'a>(&self, setting: &'a Setting<'a>, beam: usize) -> BeamIn<'a> {
+        BeamIn {
+            setting,
+            view: self.lens.seen_by(&self.shape, self.scan.azimuth(beam)),
+            long_axis: self.long_axis(beam),
+        }
+    }
+
+    /// Along the long axis of a beam's ellipse.
+    pub(super) fn long_axis(&self, beam: usize) -> Vector3<f64> {
+        footprint::axes(&self.shape, self.scan.azimuth(beam))[0]
+    }
+
+    /// Share of a ray's light that the mirrors on its path reflect, as an amplitude: its square is the share of
+    /// the round trip.
+    pub fn reflected(&self, setting: &Setting<'_>, beam: usize, ray: &Ray, path: &RayPath) -> f64 {
+        self.passed(&self.beam_in(setting, beam), ray, path.meetings(), path.silvered)
+    }
+
+    /// The same for the mirrors that are met, some of which reflect by their silver.
+    pub(super) fn passed(
+        &self,
+        within: &BeamIn<'_>,
+        ray: &Ray,
+        meetings: impl Iterator<Item = Meeting>,
+        silvered: usize,
+    ) -> f64 {
+        match within.setting.finishes() {
+            Some(finishes) => finishes.passed(&ray.direction, &within.long_axis, meetings.map(|m| m.hop())),
+            None => self.mirrors[silvered],
+        }
+    }
+
+    /// Counts only that part of the lens from which the mirrors show each part of a beam's light.
+    pub(super) fn vignette(&self, setting: &Setting<'_>, beam: usize, parts: &mut Parts) {
+        if self.lens.vignettes() {
+            let chief = self.chief_ray(beam).direction;
+            parts.dim(|part| {
+                let spot = (Some(part.surface), part.range());
+                setting.shown(&self.lens, &chief, part.facets(), spot)
+            });
+        }
+    }
+
+    /// Share of the receiver's lens from which the mirrors on a path show a spot at the longest range.
+    pub fn shown(&self, setting: &Setting<'_>, beam: usize, facets: &[usize]) -> f64 {
+        if !self.lens.vignettes() {
+            return 1.0;
+        }
+        let chief = self.chief_ray(beam).direction;
+        setting.shown(&self.lens, &chief, facets, (None, self.limits.range_max_m))
     }
 
     /// Whether no sub-ray is the chief ray.

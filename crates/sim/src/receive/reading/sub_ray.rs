@@ -2,10 +2,12 @@
 //!
 //! The beam's echo consists of the same light: every entry with a power is one of its pulses.
 
-use super::sensor::Sensor;
+use super::part::Parts;
+use super::sensor::{BeamIn, Sensor};
 use crate::light::footprint::{self, SubRay};
 use crate::light::optics::{End, Meeting, RayPath, Setting};
 use crate::light::power::{self, Illumination};
+use catoptric_cast::Ray;
 use nalgebra::Point3;
 
 /// Which part of a sub-ray's light took a path.
@@ -73,6 +75,13 @@ impl Sensor {
     pub fn sub_ray_ends(&self, setting: &Setting<'_>, beam: usize) -> Vec<SubRayEnd> {
         let mut ends = Vec::with_capacity(self.sub_rays.len());
         let azimuth = self.scan.azimuth(beam);
+        let within = self.beam_in(setting, beam);
+        // What the mirrors hide from the lens is the same for all sub-rays of a part.
+        let mut parts = Parts::default();
+        self.illuminate(setting, beam, &mut parts);
+        let power = |arrival: &Arrival, facets: &[usize]| {
+            power::received(&self.light, &arrival.on) * parts.shown(arrival.surface, facets)
+        };
         for (number, sub_ray) in self.sub_rays.iter().enumerate() {
             let ray = footprint::ray(&self.shape, azimuth, sub_ray);
             let path = setting.trace(&ray);
@@ -82,11 +91,11 @@ impl Sensor {
                 light,
                 facets: path.facets().to_vec(),
                 path: path.length,
-                stop: self.stop(setting, sub_ray, path),
+                stop: self.stop(&within, (sub_ray, &ray), path, power),
             };
             ends.push(end(Light::Beam, &path));
             ends.extend(setting.ghosts(&ray, &path).map(|ghost| end(Light::Ghost, &ghost)));
-            for arrival in self.on_mirrors(setting, sub_ray, path.meetings()) {
+            for arrival in self.on_mirrors(&within, (sub_ray, &ray), path.meetings()) {
                 ends.push(SubRayEnd {
                     number,
                     sub_ray: *sub_ray,
@@ -97,7 +106,7 @@ impl Sensor {
                         surface: arrival.surface,
                         point: path.points()[arrival.bounces],
                         cos_incidence: arrival.on.cos_incidence,
-                        power: power::received(&self.light, &arrival.on),
+                        power: power(&arrival, &path.facets()[..arrival.bounces]),
                     },
                 });
             }
@@ -105,13 +114,19 @@ impl Sensor {
         ends
     }
 
-    fn stop(&self, setting: &Setting<'_>, sub_ray: &SubRay, path: &RayPath) -> SubRayStop {
-        match (path.end, self.at_end(setting, sub_ray, path)) {
+    fn stop(
+        &self,
+        within: &BeamIn<'_>,
+        sub_ray: (&SubRay, &Ray),
+        path: &RayPath,
+        power: impl Fn(&Arrival, &[usize]) -> f64,
+    ) -> SubRayStop {
+        match (path.end, self.at_end(within, sub_ray, path)) {
             (End::Hit(hit), Some(arrival)) => SubRayStop::Hit {
                 surface: hit.surface,
                 point: hit.point,
                 cos_incidence: arrival.on.cos_incidence,
-                power: power::received(&self.light, &arrival.on),
+                power: power(&arrival, path.facets()),
             },
             (End::Trapped, _) => SubRayStop::Trapped,
             (End::Escaped | End::Hit(_), _) => SubRayStop::Escaped,
@@ -119,17 +134,23 @@ impl Sensor {
     }
 
     /// The light that a sub-ray leaves where its path ends; `None` if it does not end on a surface.
-    pub(super) fn at_end(&self, setting: &Setting<'_>, sub_ray: &SubRay, path: &RayPath) -> Option<Arrival> {
+    pub(super) fn at_end(
+        &self,
+        within: &BeamIn<'_>,
+        (sub_ray, ray): (&SubRay, &Ray),
+        path: &RayPath,
+    ) -> Option<Arrival> {
         let End::Hit(hit) = path.end else { return None };
         Some(Arrival {
             surface: hit.surface,
             bounces: path.facets().len(),
             on: Illumination {
-                reflectivity: setting.paint(hit.surface).reflectivity,
+                reflectivity: within.setting.paint(hit.surface).reflectivity,
                 cos_incidence: hit.cos_incidence(),
                 share: sub_ray.weight,
                 range: path.length,
-                mirrors: self.mirrors[path.silvered] * path.gain,
+                mirrors: self.passed(within, ray, path.meetings(), path.silvered) * path.gain,
+                seen: within.overlap(sub_ray, path.length),
             },
             gain: path.gain,
         })
@@ -138,11 +159,12 @@ impl Sensor {
     /// The light that the mirrors on a sub-ray's path scatter themselves.
     pub(super) fn on_mirrors(
         &self,
-        setting: &Setting<'_>,
-        sub_ray: &SubRay,
-        meetings: impl Iterator<Item = Meeting>,
+        within: &BeamIn<'_>,
+        (sub_ray, ray): (&SubRay, &Ray),
+        meetings: impl Iterator<Item = Meeting> + Clone,
     ) -> impl Iterator<Item = Arrival> {
-        let reflectivity = setting.diffuse_reflectivity();
+        let reflectivity = within.setting.diffuse_reflectivity();
+        let all = meetings.clone();
         let meetings = meetings.enumerate().filter(move |_| reflectivity > 0.0);
         meetings.map(move |(bounces, meeting)| Arrival {
             surface: meeting.surface,
@@ -152,7 +174,8 @@ impl Sensor {
                 cos_incidence: meeting.cos_incidence.max(0.0),
                 share: sub_ray.weight,
                 range: meeting.length,
-                mirrors: self.mirrors[meeting.silvered] * meeting.gain,
+                mirrors: self.passed(within, ray, all.clone().take(bounces), meeting.silvered) * meeting.gain,
+                seen: within.overlap(sub_ray, meeting.length),
             },
             gain: reflectivity * meeting.gain,
         })

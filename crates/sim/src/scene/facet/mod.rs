@@ -24,6 +24,7 @@ pub use polygon::PolygonShape;
 pub use rectangle::RectangleShape;
 pub use wedge::Wedge;
 
+use super::coating::Coating;
 use super::omit::is_false;
 use super::pattern::Exchange;
 use crate::findings::Findings;
@@ -45,6 +46,13 @@ pub struct Facet {
     /// Whether the back of its body, `mirror.thickness_mm` behind the face, reflects too.
     #[serde(default, skip_serializing_if = "is_false")]
     pub two_sided: bool,
+    /// Share of the light that it reflects, instead of `superstructure.mirror.reflectivity`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub reflectivity: Option<f64>,
+    /// What reflects on it, instead of `superstructure.mirror.coating`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coating: Option<Coating>,
 }
 
 /// Outline of a facet.
