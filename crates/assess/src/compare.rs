@@ -116,22 +116,13 @@ pub struct Pair {
 }
 
 /// What every calibration of a comparison has to meet in addition to the gates of its score.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Rules {
     /// Share of the knowable elements that must be solved, [`MIN_SOLVED`](crate::score::MIN_SOLVED) unless given. On blind data, where nobody knows
     /// what is knowable, it is the share of the deflected elements of the calibration, if it is given.
     pub min_solved: Option<f64>,
     /// Limits on the figures of a score.
     pub requirements: Vec<Requirement>,
-}
-
-impl Default for Rules {
-    fn default() -> Self {
-        Self {
-            min_solved: None,
-            requirements: Vec::new(),
-        }
-    }
 }
 
 /// Why there is no comparison.
