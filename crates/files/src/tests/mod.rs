@@ -165,7 +165,7 @@ fn stretch(session: &Session, pose: usize, scans: usize, frames: usize, seed: u6
             board: Some("white".to_owned()),
             color: Some("white".to_owned()),
             facet: Some("port".to_owned()),
-            beams: Some([1, 3]),
+            beams: Some([0, session.scanner.scan.beams() - 1]),
             ..PoseLabel::of(pose, PoseKind::Facet, scans)
         },
         start_s,

@@ -180,6 +180,20 @@ fn a_scan_without_angles_is_no_scan() {
     }
 }
 
+#[test]
+fn a_label_names_beams_that_there_are() {
+    let session = session(5);
+    for beams in [[0, 5], [3, 2], [1000, 5000]] {
+        let mut lab = stretch(&session, 0, 2, 3, 5);
+        lab.label.beams = Some(beams);
+        let error = play(&session, &record(&session, &[lab])).expect_err("no such beams");
+        assert!(
+            error.to_string().contains("the beams 0 to 4 are allowed"),
+            "{error}"
+        );
+    }
+}
+
 /// Bodies that are never seen at the same time, and no markers: the recording of a laboratory without labeled markers.
 #[test]
 fn frames_without_markers_have_none() {
