@@ -46,10 +46,10 @@ impl Score {
     #[must_use]
     pub fn with_min_solved(mut self, share: f64) -> Self {
         let gate = judge::solved(&self, share);
-        if let Some(there) = self.gates.iter_mut().find(|g| g.name == gate.name)
-            && there.outcome != Outcome::NotJudged
-        {
-            *there = gate;
+        match self.gates.iter_mut().find(|g| g.name == gate.name) {
+            Some(there) if there.outcome != Outcome::NotJudged => *there = gate,
+            None if !self.has_truth => self.gates.push(gate),
+            Some(_) | None => {}
         }
         self.settled()
     }

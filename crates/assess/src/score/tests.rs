@@ -593,6 +593,16 @@ fn what_the_boards_determine_has_to_be_solved() {
     assert_eq!(unmet(&abstaining(1)), ["solved"]);
     assert_eq!(abstaining(11).verdict, Verdict::Pass);
     assert_eq!(abstaining(11).with_min_solved(0.95).verdict, Verdict::Fail);
+    // On blind data nobody knows what is knowable: the share of what the calibration calls deflected, if it is asked for.
+    let s = sample();
+    let mut halved = perfect(&s.truth);
+    for b in solved(&mut halved).step_by(2) {
+        *b = BeamEstimate::without_angles(b.beam, Status::Rejected, Some("no time".to_owned()));
+    }
+    let blind = score(&s.dataset, &halved, None).expect("in memory");
+    assert!(!unmet(&blind).contains(&"solved"));
+    assert!(unmet(&blind.clone().with_min_solved(0.9)).contains(&"solved"));
+    assert!(!unmet(&blind.with_min_solved(0.2)).contains(&"solved"));
 }
 
 #[test]
