@@ -118,8 +118,9 @@ pub struct Pair {
 /// What every calibration of a comparison has to meet in addition to the gates of its score.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Rules {
-    /// Share of the knowable elements that must be solved, [`MIN_SOLVED`](crate::score::MIN_SOLVED) unless given. On blind data, where nobody knows
-    /// what is knowable, it is the share of the deflected elements of the calibration, if it is given.
+    /// Share of the knowable elements that must be solved, [`MIN_SOLVED`](crate::score::MIN_SOLVED) unless given. On
+    /// blind data, where nobody knows what is knowable, it is the share of the deflected elements of the calibration, if it
+    /// is given.
     pub min_solved: Option<f64>,
     /// Limits on the figures of a score.
     pub requirements: Vec<Requirement>,

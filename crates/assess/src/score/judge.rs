@@ -118,22 +118,18 @@ fn of_false(score: &Score) -> Option<Gate> {
 
 /// The gate on completeness: the share of what the boards make knowable that is solved.
 pub(super) fn solved(score: &Score, min_solved: f64) -> Gate {
-    if !score.has_truth {
-        let (solved, all) = (score.beams.solved, score.beams.solved + score.beams.abstained);
-        let share = solved as f64 / all.max(1) as f64;
-        let words = format!(
-            "{solved} of {all} elements that the calibration calls deflected are solved, {:.0} %; at least {:.0} % are required",
-            100.0 * share,
-            100.0 * min_solved
-        );
-        return Gate::at_least("solved", share, min_solved, words);
-    }
-    let Some((knowable @ 1.., solved)) = score.knowable.zip(score.knowable_solved) else {
-        return Gate::without("solved", Outcome::NotTested, "the boards determine no element");
+    let (solved, all, which) = if score.has_truth {
+        let Some((knowable @ 1.., solved)) = score.knowable.zip(score.knowable_solved) else {
+            return Gate::without("solved", Outcome::NotTested, "the boards determine no element");
+        };
+        (solved, knowable, "the boards determine")
+    } else {
+        let deflected = score.beams.solved + score.beams.abstained;
+        (score.beams.solved, deflected, "the calibration calls deflected")
     };
-    let share = solved as f64 / knowable as f64;
+    let share = solved as f64 / all.max(1) as f64;
     let words = format!(
-        "{solved} of {knowable} elements that the boards determine are solved, {:.0} %; at least {:.0} % are required",
+        "{solved} of {all} elements that {which} are solved, {:.0} %; at least {:.0} % are required",
         100.0 * share,
         100.0 * min_solved
     );

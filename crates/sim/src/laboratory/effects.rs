@@ -116,20 +116,18 @@ fn warm_up(scene: &Scene, time_s: f64) -> f64 {
 impl EffectSource<'_> {
     /// The law of the correlated noise, if there is any.
     fn correlated(&self) -> Option<&Correlated> {
-        let errors = &self.scene.errors;
-        errors
-            .correlated
-            .as_ref()
-            .filter(|_| errors.model != ErrorModel::None)
+        self.acting(&self.scene.errors.correlated)
     }
 
     /// The law of the noise that all beams share, if there is any.
     fn common(&self) -> Option<&Correlated> {
-        let errors = &self.scene.errors;
-        errors
-            .common
-            .as_ref()
-            .filter(|_| errors.model != ErrorModel::None)
+        self.acting(&self.scene.errors.common)
+    }
+
+    /// A law of the scene, unless the sensor has no errors.
+    fn acting<'a>(&self, law: &'a Option<Correlated>) -> Option<&'a Correlated> {
+        law.as_ref()
+            .filter(|_| self.scene.errors.model != ErrorModel::None)
     }
 
     /// Number of states that beams have for themselves.

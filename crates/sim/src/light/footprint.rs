@@ -175,15 +175,20 @@ fn correct_spread(rays: &mut [SubRay], inside: usize) {
     }
 }
 
+/// Sine and cosine of the angle by which the ellipse of the beam at an azimuth is turned.
+pub(crate) fn turn(shape: &BeamShape, azimuth: f64) -> (f64, f64) {
+    if shape.turns {
+        libm::sincos(azimuth)
+    } else {
+        (0.0, 1.0)
+    }
+}
+
 /// Long and short axis of the ellipse of the beam at an azimuth, in the sensor frame.
 pub(crate) fn axes(shape: &BeamShape, azimuth: f64) -> [Vector3<f64>; 2] {
     let direction = beam::direction(azimuth);
     let horizontal = Vector3::new(-direction.y, direction.x, 0.0);
-    let (sin, cos) = if shape.turns {
-        libm::sincos(azimuth)
-    } else {
-        (0.0, 1.0)
-    };
+    let (sin, cos) = turn(shape, azimuth);
     [
         horizontal * cos + Vector3::z() * sin,
         Vector3::z() * cos - horizontal * sin,

@@ -8,7 +8,7 @@
 //! up for the 1/R² of Eq. (1): the light of near targets does not grow without limit. This is the overlap function of
 //! lidars (Measures 1984, *Laser Remote Sensing*, section 7.4).
 
-use crate::light::footprint::SubRay;
+use crate::light::footprint::{self, SubRay};
 use crate::scene::{BeamShape, Light};
 use nalgebra::{Point2, Point3, Unit, Vector2, Vector3};
 use std::f64::consts::PI;
@@ -57,13 +57,12 @@ impl Lens {
 
     /// As a beam at an azimuth sees it; `None` if the detector takes everything.
     pub(crate) fn seen_by(&self, shape: &BeamShape, azimuth: f64) -> Option<BeamView> {
+        if self.view.is_infinite() {
+            return None;
+        }
         let half = |full: f64| 0.5e-3 * full;
-        let (sin, cos) = if shape.turns {
-            libm::sincos(azimuth)
-        } else {
-            (0.0, 1.0)
-        };
-        self.view.is_finite().then(|| BeamView {
+        let (sin, cos) = footprint::turn(shape, azimuth);
+        Some(BeamView {
             aperture: self.aperture,
             view: self.view,
             offset: Vector2::new(

@@ -104,7 +104,7 @@ impl Sensor {
             .max_by(|a, b| a.power.total_cmp(&b.power))?;
         let geometric = part.place().range;
         let read = |edge: &detect::Edge| {
-            let compensated = edge.compensated(self.receiver.sd, self.receiver.threshold);
+            let compensated = || edge.compensated(self.receiver.sd, self.receiver.threshold);
             self.walked(physical, edge.crossing, compensated)
         };
         let alone = match parts {
@@ -118,12 +118,12 @@ impl Sensor {
     }
 
     /// Where the device takes an echo to be, from where its detector triggers and from where it would without walk.
-    fn walked(&self, physical: bool, triggered: f64, compensated: f64) -> f64 {
+    fn walked(&self, physical: bool, triggered: f64, compensated: impl FnOnce() -> f64) -> f64 {
         let share = self.detection.walk_compensated;
         match physical {
-            false => compensated,
+            false => compensated(),
             true if share == 0.0 => triggered + self.reference_walk,
-            true => share * compensated + (1.0 - share) * (triggered + self.reference_walk),
+            true => share * compensated() + (1.0 - share) * (triggered + self.reference_walk),
         }
     }
 
@@ -161,7 +161,7 @@ impl Sensor {
             EchoChoice::Strongest => echoes.sort_by(|a, b| b.peak.total_cmp(&a.peak)),
             EchoChoice::Last => echoes.reverse(),
         }
-        let read = |echo: &Echo| self.walked(physical, echo.place, echo.compensated);
+        let read = |echo: &Echo| self.walked(physical, echo.place, || echo.compensated);
         let seen = |echo: &Echo| {
             let inside = |p: &&Part| p.power > 0.0 && (echo.start..=echo.end).contains(&p.mean.range);
             let part = parts

@@ -35,10 +35,9 @@ pub struct Sensor {
 #[derive(Clone, Copy)]
 pub(super) struct BeamIn<'a> {
     pub(super) setting: &'a Setting<'a>,
+    beam: usize,
     /// `None` if every spot is seen by all of the lens.
     view: Option<BeamView>,
-    /// Along the long axis of the beam's ellipse.
-    long_axis: Vector3<f64>,
 }
 
 impl BeamIn<'_> {
@@ -175,8 +174,8 @@ impl Sensor {
     pub(super) fn beam_in<'a>(&self, setting: &'a Setting<'a>, beam: usize) -> BeamIn<'a> {
         BeamIn {
             setting,
+            beam,
             view: self.lens.seen_by(&self.shape, self.scan.azimuth(beam)),
-            long_axis: self.long_axis(beam),
         }
     }
 
@@ -200,7 +199,10 @@ impl Sensor {
         silvered: usize,
     ) -> f64 {
         match within.setting.finishes() {
-            Some(finishes) => finishes.passed(&ray.direction, &within.long_axis, meetings.map(|m| m.hop())),
+            Some(finishes) => {
+                let hops = meetings.map(|m| m.hop());
+                finishes.passed(&ray.direction, &self.long_axis(within.beam), hops)
+            }
             None => self.mirrors[silvered],
         }
     }

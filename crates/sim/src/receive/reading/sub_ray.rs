@@ -78,7 +78,9 @@ impl Sensor {
         let within = self.beam_in(setting, beam);
         // What the mirrors hide from the lens is the same for all sub-rays of a part.
         let mut parts = Parts::default();
-        self.illuminate(setting, beam, &mut parts);
+        if self.lens.vignettes() {
+            self.illuminate(setting, beam, &mut parts);
+        }
         let power = |arrival: &Arrival, facets: &[usize]| {
             power::received(&self.light, &arrival.on) * parts.shown(arrival.surface, facets)
         };
