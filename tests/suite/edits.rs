@@ -37,7 +37,7 @@ fn affected(old: &Scene, new: &Scene) -> usize {
     let (before, after) = (setting(0), setting(1));
     let edit = Edit::between(&before, &after).unwrap();
     let is_concerned = |beam: &usize| {
-        let rays: Vec<_> = sensor.rays(*beam).collect();
+        let rays: Vec<_> = sensor.seeking_rays(*beam);
         let (_, trail) = before.trace_with_trail(&rays);
         let affected = edit.may_change(&trail);
         if !affected {

@@ -16,6 +16,7 @@ mod detection;
 mod determinism;
 mod docs;
 mod door;
+mod edge_rays;
 mod edits;
 mod energy;
 mod export;

@@ -8,7 +8,6 @@
 //! R = R_t·√(g·ρ/ρ_t)         limited by the scanner's maximum range, along the whole path from the scanner
 //! ```
 
-use catoptric_cast::Ray;
 use catoptric_sim::Scene;
 use catoptric_sim::build::color;
 use catoptric_sim::light::{End, RayPath, Setting, Trail};
@@ -17,6 +16,7 @@ use catoptric_sim::truth::BeamClass;
 use nalgebra::{Unit, Vector3};
 use rayon::prelude::*;
 use serde::Serialize;
+use std::borrow::Cow;
 
 catoptric_model::closed_set! {
     /// How an element's light ends.
@@ -127,10 +127,23 @@ pub(crate) fn trace(sensor: &Sensor, bare: &Setting<'_>, scene: &Scene) -> Vec<T
 
 /// Traces a beam through a setting without targets.
 pub(crate) fn trace_one(sensor: &Sensor, bare: &Setting<'_>, scene: &Scene, beam: usize) -> Traced {
-    let rays: Vec<Ray> = sensor.rays(beam).chain([sensor.chief_ray(beam)]).collect();
-    let (paths, trail) = bare.trace_with_trail(&rays);
+    let (mut sub_rays, mut rays) = (Cow::Borrowed(sensor.sub_ray_list()), sensor.seeking_rays(beam));
+    let extra = rays.len() > sub_rays.len();
+    rays.push(sensor.chief_ray(beam));
+    let (mut paths, mut trail) = bare.trace_with_trail(&rays);
+    if extra && paths.iter().any(|path| !path.goes_like(&paths[0])) {
+        // One for each path: that is where all of its light goes.
+        sub_rays = Cow::Owned(sensor.divided(bare, beam, 1));
+        rays = sensor
+            .rays(beam, &sub_rays)
+            .chain([sensor.chief_ray(beam)])
+            .collect();
+        (paths, trail) = bare.trace_with_trail(&rays);
+        // The edges were found by more rays than these.
+        trail.take_any();
+    }
     let chief = paths[paths.len() - 1];
-    let paths = || sensor.sub_ray_list().iter().zip(&paths);
+    let paths = || sub_rays.iter().zip(&paths);
     let (status, chief_energy) = class(&chief, paths());
     let along = rays.iter().zip(paths());
     let along = along.filter(|(_, (_, p))| exit(p).is_some() && p.facets() == chief.facets());

@@ -8,6 +8,7 @@ use crate::build::structure::Structure;
 use crate::build::trajectory::Trajectory;
 use crate::error::SimError;
 use crate::laboratory::placement::{self, Planned};
+use crate::light::edges::EdgeRays;
 use crate::light::optics::Rig;
 use crate::noise::{Draws, Purpose};
 use crate::receive::reading::Sensor;
@@ -33,8 +34,16 @@ pub struct Laboratory {
     pub(super) trajectories: Vec<Trajectory>,
     /// Beliefs about the biases, from step 1.
     pub(super) believed: RangeBias,
-    /// Paths of all sub-rays via the structure, with its mirrors and without, once they are compiled.
-    pub(super) rigs: [OnceLock<Rig>; 2],
+    /// With the mirrors and without, once each is compiled.
+    pub(super) compiled: [OnceLock<Compiled>; 2],
+}
+
+/// What light does past the structure, wherever the sensor is.
+pub(super) struct Compiled {
+    /// Paths of all sub-rays.
+    pub(super) rig: Rig,
+    /// Sub-rays of the beams that edges divide, if they are treated differently.
+    pub(super) edge_rays: Option<EdgeRays>,
 }
 
 impl Laboratory {
@@ -85,7 +94,7 @@ impl Laboratory {
             planned,
             boards,
             trajectories,
-            rigs: [OnceLock::new(), OnceLock::new()],
+            compiled: [OnceLock::new(), OnceLock::new()],
         };
         laboratory.check_markers()?;
         laboratory.check_mishaps()?;

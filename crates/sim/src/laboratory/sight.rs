@@ -3,7 +3,7 @@
 //! In a flight, beam i of scan k is cast from where the sensor is at k·T + i·step after the first waypoint; everything
 //! else is as at rest. Every scan is a function of the scene, the seed and its number alone.
 
-use super::setup::Laboratory;
+use super::setup::{Compiled, Laboratory};
 use super::targets::wall_targets;
 use crate::build::color;
 use crate::build::stage::Stage;
@@ -85,11 +85,13 @@ impl Laboratory {
             PoseKind::Bare => Mirrors::Removed,
             _ => Mirrors::Attached,
         };
+        let compiled = self.compiled(mirrors)?;
+        let edge_rays = compiled.edge_rays.as_ref();
         Ok(Sight {
-            rig: self.rig(mirrors)?,
-            after,
+            rig: &compiled.rig,
+            after: after.map(|(scan, setting)| (scan, setting.with_edge_rays(edge_rays))),
             laboratory: self,
-            setting,
+            setting: setting.with_edge_rays(edge_rays),
             trajectory,
         })
     }
@@ -110,19 +112,20 @@ impl Laboratory {
         )
     }
 
-    /// The compiled paths via the structure, with or without its mirrors; compiled on first use.
-    fn rig(&self, mirrors: Mirrors) -> Result<&Rig, SimError> {
+    /// What is compiled of the structure, with or without its mirrors; on first use.
+    pub(super) fn compiled(&self, mirrors: Mirrors) -> Result<&Compiled, SimError> {
         let kept = match mirrors {
-            Mirrors::Attached => &self.rigs[0],
-            Mirrors::Removed => &self.rigs[1],
+            Mirrors::Attached => &self.compiled[0],
+            Mirrors::Removed => &self.compiled[1],
         };
-        if let Some(rig) = kept.get() {
-            return Ok(rig);
+        if let Some(compiled) = kept.get() {
+            return Ok(compiled);
         }
         let bare = Setting::new(&self.scene, &self.structure, mirrors, Vec::new())?;
         // Outside the lock: a thread that waits for others to compile may take up another stretch and get here again.
-        let rig = self.sensor.compile(&bare);
-        Ok(kept.get_or_init(|| rig))
+        let edge_rays = self.sensor.edge_rays(&bare);
+        let rig = self.sensor.compile(&bare.with_edge_rays(edge_rays.as_ref()));
+        Ok(kept.get_or_init(|| Compiled { rig, edge_rays }))
     }
 
     /// Time at which a beam of a scan is read, in seconds since its stretch began.

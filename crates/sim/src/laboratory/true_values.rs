@@ -15,7 +15,9 @@ impl Laboratory {
     /// # Errors
     /// An unknown color.
     pub fn truth(&self) -> Result<Truth, SimError> {
+        let edge_rays = self.compiled(Mirrors::Attached)?.edge_rays.as_ref();
         let setting = Setting::new(&self.scene, &self.structure, Mirrors::Attached, Vec::new())?;
+        let setting = setting.with_edge_rays(edge_rays);
         let facets = &self.structure.facets;
         let beams = (0..self.sensor.scan().beams())
             .into_par_iter()

@@ -1,5 +1,6 @@
 //! Paths of light: the footprint of a beam, its path via mirrors and through glass, and the power that returns.
 
+pub mod edges;
 pub mod footprint;
 pub mod glass;
 pub(crate) mod optics;

@@ -125,6 +125,7 @@ fn ust_20lx() -> Scanner {
     Scanner {
         preset: Preset::Ust20lx,
         sub_rays: 19,
+        edge_rays: None,
         beam: None,
         custom: None,
         housing: true,

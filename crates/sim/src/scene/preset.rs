@@ -14,6 +14,9 @@ catoptric_model::closed_set! {
         /// Hokuyo UST-20LX with the spot given in its manual: 160 × 25 mm at 10 m.
         #[serde(rename = "ust-20lx")]
         Ust20lx,
+        /// The same with a beam that leaves as wide as Cooper's Table 1 shows: 3 mm across its narrow axis.
+        #[serde(rename = "ust-20lx-measured")]
+        Ust20lxMeasured,
         /// The same with the spot of Cooper's Table 1, read as three neighboring beams.
         #[serde(rename = "ust-20lx-cooper")]
         Ust20lxCooper,
@@ -76,6 +79,13 @@ impl Preset {
                 limits: UST_20LX,
                 housing: &UST_20LX_HOUSING,
                 beam: MANUAL_SPOT,
+                mass_g: UST_20LX_MASS,
+            },
+            Self::Ust20lxMeasured => &Data {
+                name: "ust-20lx-measured",
+                limits: UST_20LX,
+                housing: &UST_20LX_HOUSING,
+                beam: MEASURED_SPOT,
                 mass_g: UST_20LX_MASS,
             },
             Self::Ust20lxCooper => &Data {
@@ -175,6 +185,14 @@ impl Preset {
     /// The name used in files.
     pub fn name(self) -> &'static str {
         self.data().name
+    }
+
+    /// Number of sub-rays of a beam that an edge divides, unless a scene says it; 0 if it is not treated differently.
+    ///
+    /// The idealized UST-20LX keeps what it has always recorded.
+    pub fn edge_rays(self) -> usize {
+        const EDGE_RAYS: usize = 48;
+        if self == Self::Ust20lx { 0 } else { EDGE_RAYS }
     }
 
     /// What the scanner can report.
@@ -419,6 +437,17 @@ const MANUAL_SPOT: BeamShape = BeamShape {
     turns: true,
 };
 
+/// Spot of the UST-20LX as measured and as in its manual: 3 mm of height as it leaves (Table 1, whose height is 3.0 mm +
+/// 0.85 mrad·R; the same along the narrow axis at all azimuths, and nothing along the wide one, are assumed), and
+/// 160 × 25 mm at 10 m.
+const MEASURED_SPOT: BeamShape = BeamShape {
+    wide_full_mrad: 16.0,
+    narrow_full_mrad: 2.2,
+    wide_aperture_mm: 0.0,
+    narrow_aperture_mm: 3.0,
+    turns: true,
+};
+
 /// Table 1 as the union of three neighbors: width 33.6 mrad·R minus two steps of 0.25°, height 3.0 mm + 0.85 mrad·R. The
 /// interpretation as a union is assumed. 33.6 mrad is the slope through the origin of all widths except that at 2 m, which
 /// is 12 mm below the line between its neighbors at 1 m and 3 m.
@@ -482,6 +511,7 @@ mod tests {
         for preset in Preset::ALL {
             let size = match preset {
                 Preset::Ust20lx
+                | Preset::Ust20lxMeasured
                 | Preset::Ust20lxCooper
                 | Preset::Ust10lx
                 | Preset::Urg04lxUg01
@@ -517,6 +547,7 @@ mod tests {
             let (sum, step_deg, beams, rate) = match preset {
                 // All of Hokuyo's but one scan 1081 beams in steps of 0.25°, 40 times a second.
                 Preset::Ust20lx
+                | Preset::Ust20lxMeasured
                 | Preset::Ust20lxCooper
                 | Preset::Utm30lxEw
                 | Preset::Ust10lx
@@ -533,6 +564,7 @@ mod tests {
             let scanner = Scanner {
                 preset,
                 sub_rays: 1,
+                edge_rays: None,
                 beam: None,
                 custom: None,
                 housing: true,
@@ -562,6 +594,7 @@ mod tests {
             let scanner = Scanner {
                 preset,
                 sub_rays: 1,
+                edge_rays: None,
                 beam: None,
                 custom: None,
                 housing,

@@ -17,6 +17,12 @@ pub struct Scanner {
     #[serde(default = "Scanner::default_sub_rays")]
     #[schemars(range(min = 1, max = 4096))]
     pub sub_rays: u32,
+    /// Number of sub-rays, about, of a beam that an edge of the structure divides within four standard deviations of its
+    /// chief ray; 0 for `sub_rays` there too, which finds edges to within the distance between sub-rays. The default is
+    /// 48, but 0 for the preset "ust-20lx" and for single rays.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0, max = 4096))]
+    pub edge_rays: Option<u32>,
     /// Shape of a beam, instead of the preset's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beam: Option<BeamShape>,
@@ -41,6 +47,13 @@ fn yes() -> bool {
 impl Scanner {
     fn default_sub_rays() -> u32 {
         19
+    }
+
+    /// Number of sub-rays of a beam that an edge divides; `None` if it is not treated differently.
+    pub fn edge_rays(&self) -> Option<usize> {
+        let own = self.edge_rays.map(|rays| rays as usize);
+        let wanted = own.unwrap_or_else(|| self.preset.edge_rays());
+        (wanted > 0 && self.sub_rays > 1).then_some(wanted)
     }
 
     /// Shape of a beam: the scene's, otherwise the preset's.

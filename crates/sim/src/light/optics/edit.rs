@@ -16,8 +16,8 @@ pub struct Trail {
     legs: Vec<(Ray, f64)>,
     /// Surfaces at the ends of legs.
     met: Vec<usize>,
-    /// Whether a ray was trapped, whose last surface is not known.
-    trapped: bool,
+    /// Whether it is not known where all rays passed.
+    unknown: bool,
 }
 
 /// The differences between two structures that have the same number of surfaces of the same kinds.
@@ -46,7 +46,8 @@ impl Setting<'_> {
             match path.end {
                 End::Hit(hit) => trail.add(path.last, hit.distance, Some(hit.surface)),
                 End::Escaped => trail.add(path.last, f64::INFINITY, None),
-                End::Trapped => trail.trapped = true,
+                // Where it was trapped is not known.
+                End::Trapped => trail.unknown = true,
             }
         }
         (paths, trail)
@@ -54,6 +55,11 @@ impl Setting<'_> {
 }
 
 impl Trail {
+    /// Makes it one that any change affects: more rays counted than have left it.
+    pub fn take_any(&mut self) {
+        self.unknown = true;
+    }
+
     fn add(&mut self, leg: Ray, length: f64, met: Option<usize>) {
         self.legs.push((leg, length));
         if let Some(surface) = met
@@ -95,7 +101,7 @@ impl Edit {
     pub fn may_change(&self, trail: &Trail) -> bool {
         let meets = |(leg, length): &(Ray, f64)| self.boxes.iter().any(|b| passes(leg, *length, b));
         !self.boxes.is_empty()
-            && (trail.trapped || trail.met.iter().any(|s| self.changed[*s]) || trail.legs.iter().any(meets))
+            && (trail.unknown || trail.met.iter().any(|s| self.changed[*s]) || trail.legs.iter().any(meets))
     }
 }
 

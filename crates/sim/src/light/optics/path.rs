@@ -102,6 +102,40 @@ pub struct RayPath {
     pub end: End,
 }
 
+/// By which mirrors a ray goes, and on what it ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Route {
+    facets: [usize; MAX_BOUNCES],
+    count: usize,
+    /// The surface that it ends on; `None` in the open and between mirrors.
+    end: Option<usize>,
+    trapped: bool,
+}
+
+impl Route {
+    pub(super) fn begin() -> Self {
+        Self {
+            facets: [0; MAX_BOUNCES],
+            count: 0,
+            end: None,
+            trapped: false,
+        }
+    }
+
+    pub(super) fn add(&mut self, bounce: &Bounce) {
+        self.facets[self.count] = bounce.facet;
+        self.count += 1;
+    }
+
+    pub(super) fn end(&mut self, course: &Course) {
+        match course.end {
+            End::Hit(hit) => self.end = Some(hit.surface),
+            End::Escaped => {}
+            End::Trapped => self.trapped = true,
+        }
+    }
+}
+
 impl RayPath {
     /// The facets hit, in order.
     pub fn facets(&self) -> &[usize] {
@@ -111,6 +145,16 @@ impl RayPath {
     /// The state of the ray at each of them.
     pub fn meetings(&self) -> impl Iterator<Item = Meeting> + Clone {
         self.meetings.into_iter().flatten()
+    }
+
+    /// Whether a path goes by the same mirrors and ends on the same surface.
+    pub fn goes_like(&self, other: &Self) -> bool {
+        let surface = |path: &Self| match path.end {
+            End::Hit(hit) => Some(hit.surface),
+            End::Escaped | End::Trapped => None,
+        };
+        let trapped = |path: &Self| matches!(path.end, End::Trapped);
+        self.facets() == other.facets() && surface(self) == surface(other) && trapped(self) == trapped(other)
     }
 
     /// Where they are hit, in the sensor frame.

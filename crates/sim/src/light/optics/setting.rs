@@ -11,6 +11,7 @@ use crate::build::color::{self, Paint};
 use crate::build::stage::Stage;
 use crate::build::structure::{Back, BuiltFacet, OpaquePart, Structure};
 use crate::error::SimError;
+use crate::light::edges::EdgeRays;
 use crate::light::view::Lens;
 use crate::scene::Scene;
 use catoptric_cast::Ray;
@@ -40,6 +41,8 @@ pub struct Setting<'a> {
     pub(super) contents: Held<'a>,
     /// Pose of the sensor in the frame in which the room is kept; `None` at the start.
     start_from_sensor: Option<Pose>,
+    /// The sub-rays of beams that edges of the structure divide, if they are treated differently.
+    edge_rays: Option<&'a EdgeRays>,
 }
 
 /// The contents of a setting, or those of another one that is seen from elsewhere.
@@ -248,6 +251,7 @@ impl<'a> Setting<'a> {
         Self {
             contents: Held::Own(Box::new(contents)),
             start_from_sensor: None,
+            edge_rays: None,
         }
     }
 
@@ -258,7 +262,19 @@ impl<'a> Setting<'a> {
         Setting {
             contents: Held::Lent(&self.contents),
             start_from_sensor: moved.then_some(*start_from_sensor),
+            edge_rays: self.edge_rays,
         }
+    }
+
+    /// The same with the sub-rays of beams that edges of its structure divide.
+    #[must_use]
+    pub fn with_edge_rays(self, edge_rays: Option<&'a EdgeRays>) -> Self {
+        Self { edge_rays, ..self }
+    }
+
+    /// The sub-rays of beams that edges of the structure divide, if they are treated differently.
+    pub(crate) fn edge_rays(&self) -> Option<&'a EdgeRays> {
+        self.edge_rays
     }
 
     /// Whether no part of the room is within a distance of the sensor, in meters.

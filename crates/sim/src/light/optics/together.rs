@@ -1,6 +1,6 @@
 //! Follows the rays of a beam together, leg by leg: rays that have left the same mirror are a beam again.
 
-use super::path::{Bounce, Course, RayPath};
+use super::path::{Bounce, Course, RayPath, Route};
 use super::setting::Setting;
 use catoptric_cast::Ray;
 use catoptric_cast::Rays;
@@ -26,6 +26,18 @@ impl Setting<'_> {
             path.end(course);
         }
         paths
+    }
+
+    /// The routes of some rays, without the points on them.
+    pub(crate) fn routes(&self, rays: &[Ray]) -> Vec<Route> {
+        let mut routes = vec![Route::begin(); rays.len()];
+        let courses = self.follow_beam(rays, self.contents.max_bounces, |ray, bounce| {
+            routes[ray].add(bounce)
+        });
+        for (route, course) in routes.iter_mut().zip(&courses) {
+            route.end(course);
+        }
+        routes
     }
 
     /// Follows rays via at most `limit` mirrors each and visits every bounce with the number of its ray, those of one

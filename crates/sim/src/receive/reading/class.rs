@@ -1,6 +1,7 @@
 //! Classifies what the structure does to a beam.
 
 use super::sensor::Sensor;
+use crate::light::edges;
 use crate::light::footprint::SubRay;
 use crate::light::optics::{End, RayPath, Setting};
 use schemars::JsonSchema;
@@ -14,7 +15,8 @@ pub enum BeamClass {
     Direct,
     /// All of it leaves by one facet.
     Deflected,
-    /// An edge divides it between paths.
+    /// An edge divides it between paths, of which the chief ray's lacks more light than lies beyond three standard
+    /// deviations.
     Split,
     /// All of it leaves after more than one facet.
     MultiBounce,
@@ -50,8 +52,7 @@ pub fn class<'p>(
             _ => BeamClass::MultiBounce,
         },
     };
-    let mut whole = true;
-    let mut share = 0.0;
+    let (mut share, mut others) = (0.0, 0.0);
     for (sub_ray, path) in paths {
         // Light that ends on the structure is lost to the scanner, whichever part of it is hit.
         let same =
@@ -59,8 +60,9 @@ pub fn class<'p>(
         if same {
             share += sub_ray.weight;
         } else {
-            whole = false;
+            others += sub_ray.weight;
         }
     }
+    let whole = others < edges::NEGLIGIBLE;
     (if whole { of(chief) } else { BeamClass::Split }, share)
 }

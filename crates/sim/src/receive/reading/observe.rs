@@ -2,7 +2,7 @@
 
 use super::part::{Parts, Place};
 use super::returned::Return;
-use super::sensor::{BeamIn, Sensor, is_chief};
+use super::sensor::{BeamIn, Sensor, is_chief, lacks_chief};
 use super::sub_ray::Arrival;
 use crate::light::footprint::SubRay;
 use crate::light::optics::{End, RayPath, Role, Setting};
@@ -66,12 +66,13 @@ impl Sensor {
     pub(super) fn illuminate(&self, setting: &Setting<'_>, beam: usize, parts: &mut Parts) {
         parts.begin();
         let within = self.beam_in(setting, beam);
-        let rays: Vec<Ray> = self.rays(beam).collect();
+        let sub_rays = self.sub_rays_in(setting, beam);
+        let rays: Vec<Ray> = self.rays(beam, sub_rays).collect();
         let paths = setting.trace_beam(&rays);
-        for ((sub_ray, ray), path) in self.sub_rays.iter().zip(&rays).zip(&paths) {
+        for ((sub_ray, ray), path) in sub_rays.iter().zip(&rays).zip(&paths) {
             self.illuminate_along(&within, sub_ray, ray, path, parts);
         }
-        if self.lacks_chief() {
+        if lacks_chief(sub_rays) {
             Self::add_chief(parts, &self.chief_path(setting, beam));
         }
         self.vignette(setting, beam, parts);

@@ -3,8 +3,8 @@
 
 use super::part::{Parts, Place};
 use super::returned::Return;
-use super::sensor::{BeamIn, Sensor, is_chief};
-use crate::light::footprint;
+use super::sensor::{BeamIn, Sensor, is_chief, lacks_chief};
+use crate::light::footprint::{self, SubRay};
 use crate::light::optics::{BeamPaths, Rig, Run, Setting, Then};
 use crate::light::power::{self, Target};
 use crate::receive::detect::Pulse;
@@ -15,18 +15,19 @@ use std::ops::Range;
 #[derive(Clone, Copy)]
 struct RunContext<'a> {
     within: BeamIn<'a>,
+    sub_rays: &'a [SubRay],
     paths: &'a BeamPaths<'a>,
     run: &'a Run,
 }
 
 impl Sensor {
     /// Compiles the paths of all sub-rays via the structure, for [`Sensor::observe_over`]; `bare` contains nothing
-    /// else.
+    /// else, but [its edges](Sensor::edge_rays) if the scene treats them.
     pub fn compile(&self, bare: &Setting<'_>) -> Rig {
         Rig::compile(
             bare,
             self.scan.beams(),
-            |beam| self.rays(beam),
+            |beam| self.rays(beam, self.sub_rays_in(bare, beam)),
             |beam| self.long_axis(beam),
         )
     }
@@ -74,9 +75,15 @@ impl Sensor {
     ) {
         parts.begin();
         let within = self.beam_in(setting, beam);
+        let sub_rays = self.sub_rays_in(setting, beam);
         let mut left = 0;
         for run in paths.runs {
-            let context = RunContext { within, paths, run };
+            let context = RunContext {
+                within,
+                sub_rays,
+                paths,
+                run,
+            };
             let all = run.sub_rays.clone();
             match run.then {
                 Then::Leaves => {
@@ -93,7 +100,7 @@ impl Sensor {
                 Then::Trapped => self.add_on_mirrors(&context, beam, all, parts),
             }
         }
-        if self.lacks_chief() {
+        if lacks_chief(sub_rays) {
             Self::add_chief(parts, &self.chief_path(setting, beam));
         }
         self.vignette(setting, beam, parts);
@@ -108,7 +115,12 @@ impl Sensor {
         in_room: &[Option<Hit>],
         parts: &mut Parts,
     ) {
-        let RunContext { within, paths, run } = *context;
+        let RunContext {
+            within,
+            sub_rays: all,
+            paths,
+            run,
+        } = *context;
         let mut done = 0;
         while let Some(first) = in_room.get(done) {
             let surface = first.map(|hit| within.setting.surface_in_room(&hit));
@@ -126,7 +138,7 @@ impl Sensor {
             let front = first.is_some_and(|hit| hit.front());
             if mirror.is_some_and(|mirror| within.setting.reflecting(mirror, front).is_some()) {
                 // Its light may return to the structure.
-                let sub_ray = &self.sub_rays[sub_rays.start];
+                let sub_ray = &all[sub_rays.start];
                 let ray = footprint::ray(&self.shape, self.scan.azimuth(beam), sub_ray);
                 self.illuminate_along(&within, sub_ray, &ray, &within.setting.trace(&ray), parts);
                 continue;
@@ -153,7 +165,12 @@ impl Sensor {
         ends: impl Iterator<Item = (f64, f64)>,
         parts: &mut Parts,
     ) {
-        let RunContext { within, paths, run } = *context;
+        let RunContext {
+            within,
+            sub_rays: all,
+            paths,
+            run,
+        } = *context;
         let reflectivity = within.setting.paint(surface).reflectivity;
         let reflecting = |passed: f64| Target::new(&self.light, reflectivity, passed * run.gain);
         let target = reflecting(self.mirrors[run.silvered]);
@@ -161,7 +178,7 @@ impl Sensor {
         let part = parts.of(surface, facets);
         let known = part.pulses.len();
         let mut chief = None;
-        let sub_rays = which.clone().zip(&self.sub_rays[which.clone()]);
+        let sub_rays = which.clone().zip(&all[which.clone()]);
         part.add(
             sub_rays
                 .zip(ends)
@@ -190,13 +207,18 @@ impl Sensor {
 
     /// Adds the light that the mirrors on the paths of a run's sub-rays scatter themselves.
     fn add_on_mirrors(&self, context: &RunContext<'_>, beam: usize, which: Range<usize>, parts: &mut Parts) {
-        let RunContext { within, paths, run } = *context;
+        let RunContext {
+            within,
+            sub_rays: all,
+            paths,
+            run,
+        } = *context;
         if within.setting.diffuse_reflectivity() <= 0.0 {
             return;
         }
         let facets = paths.facets(run);
         for number in which {
-            let (sub_ray, meetings) = (&self.sub_rays[number], paths.meetings(run, number));
+            let (sub_ray, meetings) = (&all[number], paths.meetings(run, number));
             let ray = footprint::ray(&self.shape, self.scan.azimuth(beam), sub_ray);
             for arrival in self.on_mirrors(&within, (sub_ray, &ray), meetings.iter().copied()) {
                 let on = &arrival.on;

@@ -3,6 +3,7 @@
 use super::part::Parts;
 use crate::build::color;
 use crate::error::SimError;
+use crate::light::edges::{self, EdgeRays, Place};
 use crate::light::footprint::{self, SubRay};
 use crate::light::optics::{MAX_BOUNCES, Meeting, RayPath, Setting};
 use crate::light::power::{self, Illumination};
@@ -13,12 +14,15 @@ use crate::scene::{BeamShape, Detection, ErrorModel, Errors, Light, Limits, Scen
 use catoptric_cast::Ray;
 use catoptric_model::{RangeBias, ScanGeometry};
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 /// The scanner with everything resolved that does not depend on its surroundings.
 pub struct Sensor {
     pub(super) scan: ScanGeometry,
     pub(super) shape: BeamShape,
     pub(super) sub_rays: Vec<SubRay>,
+    /// Number of sub-rays of a beam that an edge divides, if it is treated differently.
+    edge_rays: Option<usize>,
     pub(super) light: Light,
     pub(super) lens: Lens,
     /// Share of the light that is left after a number of reflections by silver.
@@ -90,6 +94,7 @@ impl Sensor {
             scan: scene.scanner.scan()?,
             shape: scene.scanner.beam_shape(),
             sub_rays: footprint::sub_rays(scene.scanner.sub_rays as usize),
+            edge_rays: scene.scanner.edge_rays(),
             light: scene.light.clone(),
             lens: Lens::of(&scene.light),
             mirrors: std::array::from_fn(|count| {
@@ -122,7 +127,7 @@ impl Sensor {
         &self.bias
     }
 
-    /// Number of sub-rays of a beam.
+    /// Number of sub-rays of a beam that no edge divides.
     pub fn sub_rays(&self) -> usize {
         self.sub_rays.len()
     }
@@ -132,9 +137,15 @@ impl Sensor {
         &self.shape
     }
 
-    /// The sub-rays of a beam.
+    /// The sub-rays of a beam that no edge divides.
     pub fn sub_ray_list(&self) -> &[SubRay] {
         &self.sub_rays
+    }
+
+    /// The sub-rays of a beam in a setting: those of its own if edges of the structure [divide](Sensor::edge_rays) it.
+    pub fn sub_rays_in<'a>(&'a self, setting: &'a Setting<'_>, beam: usize) -> &'a [SubRay] {
+        let divided = setting.edge_rays().and_then(|lists| lists.of(beam));
+        divided.unwrap_or(&self.sub_rays)
     }
 
     /// The paths of a beam's sub-rays, in the order in which they are cast.
@@ -143,16 +154,57 @@ impl Sensor {
         setting: &'a Setting<'_>,
         beam: usize,
     ) -> impl Iterator<Item = (&'a SubRay, RayPath)> {
-        let rays: Vec<Ray> = self.rays(beam).collect();
-        self.sub_rays.iter().zip(setting.trace_beam(&rays))
+        let sub_rays = self.sub_rays_in(setting, beam);
+        let rays: Vec<Ray> = self.rays(beam, sub_rays).collect();
+        sub_rays.iter().zip(setting.trace_beam(&rays))
     }
 
-    /// A beam's sub-rays as they leave the scanner, in the order in which they are cast.
-    pub fn rays(&self, beam: usize) -> impl Iterator<Item = Ray> {
+    /// Some sub-rays of a beam as they leave the scanner, in the order in which they are cast.
+    pub fn rays<'a>(&'a self, beam: usize, sub_rays: &'a [SubRay]) -> impl Iterator<Item = Ray> + 'a {
         let azimuth = self.scan.azimuth(beam);
-        self.sub_rays
+        sub_rays
             .iter()
             .map(move |s| footprint::ray(&self.shape, azimuth, s))
+    }
+
+    /// The sub-rays of all beams that edges of the structure divide; `None` if the scene does not treat them differently.
+    /// `bare` is the structure alone.
+    pub fn edge_rays(&self, bare: &Setting<'_>) -> Option<EdgeRays> {
+        let count = self.edge_rays?;
+        let of_beam = |beam| {
+            let seeking = self.seeking_rays(beam);
+            let routes = bare.routes(&seeking);
+            let is_divided = routes.windows(2).any(|pair| pair[0] != pair[1]);
+            is_divided.then(|| self.divided(bare, beam, count))
+        };
+        let lists: Vec<_> = (0..self.scan.beams()).into_par_iter().map(of_beam).collect();
+        Some(lists.into_iter().collect())
+    }
+
+    /// The rays that show whether an edge divides a beam: its sub-rays, then, if the scene treats divided beams
+    /// differently, others around them where the beam ends.
+    pub fn seeking_rays(&self, beam: usize) -> Vec<Ray> {
+        let around = edges::around().filter(|_| self.edge_rays.is_some());
+        let around = around.map(|place| self.ray_from(beam, &place));
+        self.rays(beam, &self.sub_rays).chain(around).collect()
+    }
+
+    /// The light of a beam that edges of the structure divide: about as many sub-rays as wanted, and one for each path at
+    /// least.
+    pub fn divided(&self, bare: &Setting<'_>, beam: usize, count: usize) -> Vec<SubRay> {
+        edges::divided(count, |places| {
+            let rays: Vec<Ray> = places.iter().map(|place| self.ray_from(beam, place)).collect();
+            bare.routes(&rays)
+        })
+    }
+
+    fn ray_from(&self, beam: usize, [wide, narrow]: &Place) -> Ray {
+        let sub_ray = SubRay {
+            wide: *wide,
+            narrow: *narrow,
+            weight: 0.0,
+        };
+        footprint::ray(&self.shape, self.scan.azimuth(beam), &sub_ray)
     }
 
     /// A beam's chief ray as it leaves the scanner.
@@ -226,11 +278,11 @@ impl Sensor {
         let chief = self.chief_ray(beam).direction;
         setting.shown(&self.lens, &chief, facets, (None, self.limits.range_max_m))
     }
+}
 
-    /// Whether no sub-ray is the chief ray.
-    pub(super) fn lacks_chief(&self) -> bool {
-        !self.sub_rays.iter().any(is_chief)
-    }
+/// Whether none of a beam's sub-rays is the chief ray.
+pub(super) fn lacks_chief(sub_rays: &[SubRay]) -> bool {
+    !sub_rays.iter().any(is_chief)
 }
 
 /// Whether a sub-ray is the chief ray.

@@ -73,7 +73,8 @@ impl Sensor {
     ///
     /// Each sub-ray has one path of [`Light::Beam`]; its ghosts follow, then what the mirrors on its path scatter.
     pub fn sub_ray_ends(&self, setting: &Setting<'_>, beam: usize) -> Vec<SubRayEnd> {
-        let mut ends = Vec::with_capacity(self.sub_rays.len());
+        let sub_rays = self.sub_rays_in(setting, beam);
+        let mut ends = Vec::with_capacity(sub_rays.len());
         let azimuth = self.scan.azimuth(beam);
         let within = self.beam_in(setting, beam);
         // What the mirrors hide from the lens is the same for all sub-rays of a part.
@@ -84,7 +85,7 @@ impl Sensor {
         let power = |arrival: &Arrival, facets: &[usize]| {
             power::received(&self.light, &arrival.on) * parts.shown(arrival.surface, facets)
         };
-        for (number, sub_ray) in self.sub_rays.iter().enumerate() {
+        for (number, sub_ray) in sub_rays.iter().enumerate() {
             let ray = footprint::ray(&self.shape, azimuth, sub_ray);
             let path = setting.trace(&ray);
             let end = |light, path: &RayPath| SubRayEnd {
