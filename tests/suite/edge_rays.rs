@@ -13,6 +13,7 @@ use std::path::Path;
 
 /// What a beam reads by its own sub-rays, by random rays, and by each half of these.
 #[derive(Debug)]
+#[expect(dead_code, reason = "pose and beam are printed")]
 struct Compared {
     pose: usize,
     beam: usize,

@@ -23,6 +23,7 @@ mod export;
 mod gates;
 mod hostile_names;
 mod house;
+mod intensity;
 mod layout;
 mod light;
 mod misfit;

@@ -84,6 +84,16 @@ fn correlated_noise_is_named() {
 }
 
 #[test]
+fn a_scanner_that_smooths_its_readings_is_named() {
+    for beams in [3, 5] {
+        names(
+            Cause::NeighborNoise,
+            &[&format!("detection.median_of_beams={beams}")],
+        );
+    }
+}
+
+#[test]
 fn boards_that_are_thicker_are_named() {
     let sets = [
         "board.0.thickness_mm=2",

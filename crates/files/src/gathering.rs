@@ -3,7 +3,7 @@
 use super::bodies::Bodies;
 use super::capture::{Capture, seconds_between};
 use super::codes::{Codes, Limits};
-use super::messages::{LabeledMarker, Scan};
+use super::messages::{Echoes, LabeledMarker, Scan};
 use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::frame::Pose;
 use catoptric_model::session::ScannerSheet;
@@ -31,10 +31,10 @@ pub(super) trait Keep: Sized {
     type Kept;
     /// Begins an empty stretch with a given number of beams.
     fn begin(label: &PoseLabel, beams: usize) -> Self;
-    /// Adds a scan.
-    fn scan(&mut self, ranges: Vec<f64>);
+    /// Adds the ranges of a scan, and their intensities unless these are empty.
+    fn scan(&mut self, ranges: Vec<f64>, intensities: Vec<f64>);
     /// Adds the echoes of a scan.
-    fn echoes(&mut self, echoes: Vec<Vec<f64>>);
+    fn echoes(&mut self, echoes: Echoes);
     /// Processes the motion capture received so far.
     fn look(&mut self, capture: &mut Capture, known: Known<'_>);
     /// Ends a complete stretch.
@@ -69,6 +69,8 @@ const MOST_TURNS: f64 = 4.0;
 pub(super) struct Whole {
     ranges: Vec<f64>,
     echoes: Vec<Vec<f64>>,
+    intensities: Vec<f64>,
+    echo_intensities: Vec<Vec<f64>>,
 }
 
 impl<R: Keep> Gathering<R> {
@@ -114,6 +116,10 @@ impl<R: Keep> Gathering<R> {
                 scan.angle_min, scan.angle_increment
             ));
         }
+        let counts = scan.intensities.len();
+        if counts > 0 && counts != beams {
+            return Err(format!("{beams} beams, intensities of {counts}"));
+        }
         codes.replace(&mut scan.ranges, Limits::of(scanner, scan.limits_m));
         if self.label.kind == PoseKind::Flight {
             self.stamps.push(scan.stamp);
@@ -123,15 +129,15 @@ impl<R: Keep> Gathering<R> {
         self.latest_scan = logged;
         self.scan_time = scan.scan_time;
         self.scans += 1;
-        self.kept.scan(scan.ranges);
+        self.kept.scan(scan.ranges, scan.intensities);
         Ok(())
     }
 
     /// Adds the echoes of a scan; its beams must be those of the session.
-    pub(super) fn echoes(&mut self, echoes: Vec<Vec<f64>>, scanner: &ScannerSheet) -> Result<(), String> {
+    pub(super) fn echoes(&mut self, echoes: Echoes, scanner: &ScannerSheet) -> Result<(), String> {
         let beams = scanner.scan.beams();
-        if echoes.len() != beams {
-            return Err(format!("{} beams, session.toml has {beams}", echoes.len()));
+        if echoes.ranges.len() != beams {
+            return Err(format!("{} beams, session.toml has {beams}", echoes.ranges.len()));
         }
         self.echoes += 1;
         self.kept.echoes(echoes);
@@ -251,6 +257,8 @@ impl<R: Keep> Gathering<R> {
             tracks: self.tracks(known),
             ranges: Vec::new(),
             echoes: None,
+            intensities: None,
+            echo_intensities: None,
             label: PoseLabel {
                 scans: self.scans,
                 ..self.label
@@ -319,21 +327,31 @@ impl Keep for Whole {
         Self::default()
     }
 
-    fn scan(&mut self, ranges: Vec<f64>) {
+    fn scan(&mut self, ranges: Vec<f64>, intensities: Vec<f64>) {
         self.ranges.extend(ranges);
+        self.intensities.extend(intensities);
     }
 
-    fn echoes(&mut self, echoes: Vec<Vec<f64>>) {
-        self.echoes.extend(echoes);
+    fn echoes(&mut self, echoes: Echoes) {
+        self.echoes.extend(echoes.ranges);
+        self.echo_intensities.extend(echoes.intensities);
     }
 
     fn look(&mut self, _: &mut Capture, _: Known<'_>) {}
 
     fn end(stretch: Gathering<Self>, known: Known<'_>) -> Stretch {
         let (stretch, kept) = stretch.into_stretch(known);
+        // Scans with intensities and without cannot be told apart afterward.
+        let complete = |counts: usize, readings: usize| counts > 0 && counts == readings;
+        let (all, of_echoes) = (
+            complete(kept.intensities.len(), kept.ranges.len()),
+            complete(kept.echo_intensities.len(), kept.echoes.len()),
+        );
         Stretch {
             ranges: kept.ranges,
             echoes: (!kept.echoes.is_empty()).then_some(kept.echoes),
+            intensities: all.then_some(kept.intensities),
+            echo_intensities: of_echoes.then_some(kept.echo_intensities),
             ..stretch
         }
     }

@@ -71,6 +71,8 @@ pub struct Scan {
     pub limits_m: [f64; 2],
     /// Readings in meters, with the codes of REP-117.
     pub ranges: Vec<f64>,
+    /// Intensities of the readings in counts of the receiver; empty if there are none.
+    pub intensities: Vec<f64>,
 }
 
 /// A marker with its label "subject/marker".
@@ -144,24 +146,38 @@ fn write_singles(cdr: &mut CdrWriter, values: &[f64]) {
     cdr.f32_sequence(values.iter().map(|v| single(*v)));
 }
 
-/// A `sensor_msgs/msg/LaserScan`.
-pub fn encode_scan(stamp: u64, scanner: &ScannerSheet, period_s: f64, ranges: &[f64]) -> Vec<u8> {
+/// A `sensor_msgs/msg/LaserScan`; its intensities are empty if there are none.
+pub fn encode_scan(
+    stamp: u64,
+    scanner: &ScannerSheet,
+    period_s: f64,
+    ranges: &[f64],
+    intensities: &[f64],
+) -> Vec<u8> {
     let mut cdr = CdrWriter::new();
     write_scan_sheet(&mut cdr, stamp, scanner, period_s);
     write_singles(&mut cdr, ranges);
-    cdr.length(0); // no intensities
+    write_singles(&mut cdr, intensities);
     cdr.into_bytes()
 }
 
-/// A `sensor_msgs/msg/MultiEchoLaserScan`: the echoes of every beam, empty if there is no return.
-pub fn encode_echoes(stamp: u64, scanner: &ScannerSheet, period_s: f64, echoes: &[Vec<f64>]) -> Vec<u8> {
+/// A `sensor_msgs/msg/MultiEchoLaserScan`: the echoes of every beam, empty if there is no return, and their intensities,
+/// which are empty for all if there are none.
+pub fn encode_echoes(
+    stamp: u64,
+    scanner: &ScannerSheet,
+    period_s: f64,
+    echoes: &[Vec<f64>],
+    intensities: &[Vec<f64>],
+) -> Vec<u8> {
     let mut cdr = CdrWriter::new();
     write_scan_sheet(&mut cdr, stamp, scanner, period_s);
-    cdr.length(echoes.len());
-    for beam in echoes {
-        write_singles(&mut cdr, beam);
+    for of_beams in [echoes, intensities] {
+        cdr.length(of_beams.len());
+        for beam in of_beams {
+            write_singles(&mut cdr, beam);
+        }
     }
-    cdr.length(0); // no intensities
     cdr.into_bytes()
 }
 
@@ -264,21 +280,36 @@ fn read_singles(cdr: &mut CdrReader<'_>) -> Result<Vec<f64>, CdrError> {
     Ok(cdr.f32_sequence()?.map(f64::from).collect())
 }
 
-/// Reads the time and the echoes of every beam of a `MultiEchoLaserScan`.
+/// What every beam of a scan returned, echo by echo.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Echoes {
+    /// Time at which the scan began, in nanoseconds.
+    pub stamp: u64,
+    /// Ranges in meters, beam by beam.
+    pub ranges: Vec<Vec<f64>>,
+    /// Their intensities in counts of the receiver; empty if there are none.
+    pub intensities: Vec<Vec<f64>>,
+}
+
+/// Reads a `MultiEchoLaserScan`.
 ///
 /// # Errors
 /// [`MessageError`] if the bytes are not one.
-pub fn decode_echoes(message: &[u8]) -> Result<(u64, Vec<Vec<f64>>), MessageError> {
+pub fn decode_echoes(message: &[u8]) -> Result<Echoes, MessageError> {
     let (stamp, mut cdr) = open(message)?;
     for _ in 0..7 {
         cdr.f32()?; // angles, times and limits are those of the accompanying LaserScan
     }
-    // A beam takes at least the four bytes of its number of echoes.
-    let beams = cdr.length(size_of::<u32>())?;
-    let echoes = (0..beams)
-        .map(|_| read_singles(&mut cdr))
-        .collect::<Result<_, _>>()?;
-    Ok((stamp, echoes))
+    let mut of_beams = || -> Result<Vec<Vec<f64>>, CdrError> {
+        // A beam takes at least the four bytes of its number of echoes.
+        let beams = cdr.length(size_of::<u32>())?;
+        (0..beams).map(|_| read_singles(&mut cdr)).collect()
+    };
+    Ok(Echoes {
+        stamp,
+        ranges: of_beams()?,
+        intensities: of_beams()?,
+    })
 }
 
 /// Reads a `LaserScan`.
@@ -299,6 +330,7 @@ pub fn decode_scan(message: &[u8]) -> Result<Scan, MessageError> {
         });
     }
     let ranges = read_singles(&mut cdr)?;
+    let intensities = read_singles(&mut cdr)?;
     Ok(Scan {
         stamp,
         angle_min,
@@ -306,6 +338,7 @@ pub fn decode_scan(message: &[u8]) -> Result<Scan, MessageError> {
         scan_time,
         limits_m: [range_min, range_max],
         ranges,
+        intensities,
     })
 }
 

@@ -275,7 +275,7 @@ impl<'a, R: Keep> Playback<'a, R> {
             }
             Topic::Echoes => {
                 let echoes = messages::decode_echoes(message.data).map_err(|e| e.to_string());
-                let taken = echoes.and_then(|(_, echoes)| current.echoes(echoes, self.scanner));
+                let taken = echoes.and_then(|echoes| current.echoes(echoes, self.scanner));
                 (taken, "/echoes".to_owned())
             }
             Topic::Pose(body) => {

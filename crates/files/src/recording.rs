@@ -327,9 +327,10 @@ impl RecordingEncoder {
             }
             Event::Scan(k) => {
                 let ranges = &part.ranges[readings(k)];
+                let counts = part.intensities.as_ref().map_or(&[][..], |all| &all[readings(k)]);
                 (
                     channels.scan,
-                    messages::encode_scan(time, &self.scanner, period, ranges),
+                    messages::encode_scan(time, &self.scanner, period, ranges, counts),
                 )
             }
             Event::Echoes(k) => {
@@ -337,9 +338,13 @@ impl RecordingEncoder {
                     return Ok(None);
                 };
                 let echoes = &echoes[readings(k)];
+                let counts = part
+                    .echo_intensities
+                    .as_ref()
+                    .map_or(&[][..], |all| &all[readings(k)]);
                 (
                     channels.echoes,
-                    messages::encode_echoes(time, &self.scanner, period, echoes),
+                    messages::encode_echoes(time, &self.scanner, period, echoes, counts),
                 )
             }
             Event::Pose { track, frame } => {
@@ -395,6 +400,13 @@ impl RecordingEncoder {
         }
         if let Some(found) = stretch.echoes.as_ref().map(Vec::len).filter(|n| *n != expected) {
             return Err(format!("echoes of {found} readings, {expected} expected"));
+        }
+        let counts = [
+            stretch.intensities.as_ref().map(Vec::len),
+            stretch.echo_intensities.as_ref().map(Vec::len),
+        ];
+        if let Some(found) = counts.into_iter().flatten().find(|n| *n != expected) {
+            return Err(format!("intensities of {found} readings, {expected} expected"));
         }
         let duration = stretch.label.scans as f64 * stretch.scan_period_s;
         if !time_fits(stretch.start_s) || !time_fits(duration) || !time_fits(stretch.start_s + duration) {

@@ -8,11 +8,14 @@ use super::capture::{Capture, MOST_WAITING};
 use super::error::IoError;
 use super::gathering::{Gathering, Keep, Known, followed};
 use super::lost::{Seen, Sieve};
+use super::messages::Echoes;
 use super::source::Source;
 use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::selection::Median;
 use catoptric_model::tracking::{Jumping, MeanPose, Watching, median_jump};
-use catoptric_model::{BeamStatistics, Gathered, ModelError, Motion, Pose, PoseKind, PoseLabel, PoseRecord};
+use catoptric_model::{
+    BeamStatistics, Gathered, Intensities, ModelError, Motion, Pose, PoseKind, PoseLabel, PoseRecord,
+};
 use catoptric_model::{Readings, ScanSource, TrackedFrame, Unreadable, Watched};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -23,6 +26,8 @@ const MOST_JUMPS: usize = 1 << if cfg!(test) { 12 } else { 20 };
 /// A stretch being read.
 pub(super) struct Survey {
     gathered: Gathered,
+    /// Intensities, once a scan has some.
+    intensities: Option<Intensities>,
     /// Body by body, once frames have been discarded.
     followed: Option<Vec<Followed>>,
     is_flight: bool,
@@ -60,6 +65,7 @@ impl Default for Jumps {
 pub(super) struct Surveyed {
     pub(super) record: Result<PoseRecord, ModelError>,
     pub(super) statistics: Vec<BeamStatistics>,
+    pub(super) intensities: Option<Intensities>,
     /// Bodies whose markers remain to be averaged.
     pub(super) unwatched: Vec<Unwatched>,
     /// What the poses of each body look like.
@@ -158,16 +164,23 @@ impl Keep for Survey {
     fn begin(label: &PoseLabel, beams: usize) -> Self {
         Self {
             gathered: Gathered::new(beams, label.scans),
+            intensities: None,
             followed: None,
             is_flight: label.kind == PoseKind::Flight,
         }
     }
 
-    fn scan(&mut self, ranges: Vec<f64>) {
+    fn scan(&mut self, ranges: Vec<f64>, intensities: Vec<f64>) {
         self.gathered.add(&ranges);
+        if !intensities.is_empty() {
+            let all = self
+                .intensities
+                .get_or_insert_with(|| Intensities::new(ranges.len()));
+            all.add(&ranges, &intensities);
+        }
     }
 
-    fn echoes(&mut self, _: Vec<Vec<f64>>) {}
+    fn echoes(&mut self, _: Echoes) {}
 
     fn look(&mut self, capture: &mut Capture, known: Known<'_>) {
         if capture.waiting() > MOST_WAITING {
@@ -182,7 +195,8 @@ impl Keep for Survey {
         let lost = std::mem::take(&mut stretch.capture.lost);
         let (is_miscounted, starts) = (stretch.miscounts(), stretch.uneven_starts(known));
         let (stretch, kept) = stretch.into_stretch(known);
-        let (statistics, label) = (kept.gathered.finish(), stretch.label.clone());
+        let (statistics, intensities) = (kept.gathered.finish(), kept.intensities);
+        let label = stretch.label.clone();
         let Some(mut all) = kept.followed else {
             let mut seen = vec![Seen::default(); known.bodies.all.len()];
             for track in &stretch.tracks {
@@ -201,6 +215,7 @@ impl Keep for Survey {
             return Surveyed {
                 record,
                 statistics,
+                intensities,
                 unwatched: Vec::new(),
                 seen,
                 lost,
@@ -220,6 +235,7 @@ impl Keep for Survey {
         Surveyed {
             record,
             statistics,
+            intensities,
             unwatched,
             seen,
             lost,
@@ -355,7 +371,8 @@ impl Surveyed {
             record.watched = watch(source, stretch, self.unwatched, sieve)?;
         }
         let recording: Arc<dyn ScanSource> = Arc::<Source>::clone(source);
-        record.readings = Readings::recorded(recording, stretch, record.label.scans, self.statistics);
+        let readings = Readings::recorded(recording, stretch, record.label.scans, self.statistics);
+        record.readings = readings.with_intensities(self.intensities);
         Ok(Ok(record))
     }
 }

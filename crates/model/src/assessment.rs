@@ -64,6 +64,8 @@ pub enum Cause {
     WarmUp,
     /// Noise is correlated from scan to scan.
     CorrelatedNoise,
+    /// Noise is correlated from beam to beam.
+    NeighborNoise,
     /// Single beams are off from pose to pose.
     Noise,
     /// The faces of all boards are nearer or farther than their markers.

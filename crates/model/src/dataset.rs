@@ -6,7 +6,7 @@ use crate::error::ModelError;
 use crate::frame::Pose;
 use crate::label::{PoseKind, PoseLabel};
 use crate::motion::Motion;
-use crate::readings::{BeamStatistics, Readings, Scans};
+use crate::readings::{BeamStatistics, Intensities, Readings, Scans};
 use crate::session::Session;
 use crate::summary::Summary;
 use crate::tracking::{Track, Watched};
@@ -40,6 +40,10 @@ pub struct Stretch {
     pub ranges: Vec<f64>,
     /// Echoes of every reading in meters, nearest first and in the order of `ranges`, if they were recorded.
     pub echoes: Option<Vec<Vec<f64>>>,
+    /// Intensity of every reading in counts of the receiver, in the order of `ranges`, if it was recorded; 0 for a code.
+    pub intensities: Option<Vec<f64>>,
+    /// Intensities of the echoes, in the order of `echoes`, if both were recorded.
+    pub echo_intensities: Option<Vec<Vec<f64>>>,
     /// The tracked bodies, the rig first.
     pub tracks: Vec<Track>,
 }
@@ -114,7 +118,15 @@ impl Stretch {
             Some(_) => Vec::new(),
             None => self.tracks.iter().filter_map(Watched::of).collect(),
         };
-        let readings = Readings::in_memory(self.beams, self.ranges);
+        let intensities = self.intensities.map(|counts| {
+            let mut all = Intensities::new(self.beams);
+            let scans = self.ranges.chunks(self.beams.max(1));
+            scans
+                .zip(counts.chunks(self.beams.max(1)))
+                .for_each(|(ranges, counts)| all.add(ranges, counts));
+            all
+        });
+        let readings = Readings::in_memory(self.beams, self.ranges).with_intensities(intensities);
         PoseRecord::new(self.label, motion, mean, watched, readings)
     }
 

@@ -71,7 +71,7 @@ pub use label::{PoseKind, PoseLabel, SpotNote, TestKind, TestNote};
 pub use mirror::MirrorPlane;
 pub use motion::Motion;
 pub use range::{CorrectedRange, RawRange};
-pub use readings::{BeamStatistics, Gathered, Readings, ScanSource, Scans, Unreadable};
+pub use readings::{BeamStatistics, Gathered, Intensities, Readings, ScanSource, Scans, Unreadable};
 pub use scan::{ScanAngles, ScanDirection, ScanError, ScanGeometry};
 pub use session::Session;
 pub use stop::{Stop, Stopped};

@@ -115,6 +115,35 @@ impl Gathered {
     }
 }
 
+/// Intensities of every beam, accumulated scan by scan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Intensities {
+    beams: Vec<Moments>,
+}
+
+impl Intensities {
+    /// Begins a stretch with a given number of beams.
+    pub fn new(beams: usize) -> Self {
+        Self {
+            beams: vec![Moments::default(); beams],
+        }
+    }
+
+    /// Adds a scan: the intensities, in counts, of those of its readings that are ranges.
+    pub fn add(&mut self, ranges: &[f64], counts: &[f64]) {
+        for ((beam, range), count) in self.beams.iter_mut().zip(ranges).zip(counts) {
+            if range.is_finite() && count.is_finite() {
+                beam.add(*count);
+            }
+        }
+    }
+
+    /// Mean intensity of a beam's ranges, in counts; `None` without any.
+    pub fn mean(&self, beam: usize) -> Option<f64> {
+        self.beams.get(beam).filter(|b| b.count > 0).map(|b| b.mean)
+    }
+}
+
 /// The readings of a stretch in meters; −∞ too close, +∞ no return, NaN invalid (REP-117).
 ///
 /// Readings in memory are compared individually; readings in recordings, by their statistics.
@@ -124,6 +153,7 @@ pub struct Readings {
     place: Place,
     /// Computed on first use.
     statistics: OnceLock<Arc<[BeamStatistics]>>,
+    intensities: Option<Arc<Intensities>>,
 }
 
 #[derive(Clone)]
@@ -143,6 +173,7 @@ impl Readings {
             beams,
             place: Place::Memory(ranges),
             statistics: OnceLock::new(),
+            intensities: None,
         }
     }
 
@@ -157,6 +188,7 @@ impl Readings {
             beams: statistics.len(),
             place: Place::Recording(source, stretch, scans),
             statistics: OnceLock::from(Arc::from(statistics)),
+            intensities: None,
         }
     }
 
@@ -166,7 +198,20 @@ impl Readings {
             beams: self.beams,
             place: Place::Nowhere(self.len() / self.beams.max(1)),
             statistics: OnceLock::new(),
+            intensities: None,
         }
+    }
+
+    /// The same with the intensities that were recorded with them, if they were.
+    #[must_use]
+    pub fn with_intensities(mut self, intensities: Option<Intensities>) -> Self {
+        self.intensities = intensities.map(Arc::new);
+        self
+    }
+
+    /// Mean intensity of a beam's ranges, in counts of the receiver; `None` if there are no ranges or no intensities.
+    pub fn intensity(&self, beam: usize) -> Option<f64> {
+        self.intensities.as_ref()?.mean(beam)
     }
 
     /// Beams of a scan.
@@ -278,6 +323,24 @@ mod tests {
         // Changing the readings discards the cached statistics.
         readings.held_mut().expect("they are in memory")[1] = 4.0;
         assert_eq!(readings.statistics()[1].missing, 1);
+    }
+
+    #[test]
+    fn intensities_are_means_over_ranges() {
+        let mut all = Intensities::new(2);
+        all.add(&[1.0, f64::INFINITY], &[100.0, 0.0]);
+        all.add(&[1.0, 2.0], &[300.0, 50.0]);
+        all.add(&[f64::NAN, 2.0], &[0.0, f64::NAN]);
+        assert_eq!(
+            (all.mean(0), all.mean(1), all.mean(2)),
+            (Some(200.0), Some(50.0), None)
+        );
+        let readings = Readings::in_memory(2, vec![1.0; 6]);
+        assert_eq!(readings.intensity(0), None);
+        let readings = readings.with_intensities(Some(all));
+        assert_eq!(readings.intensity(1), Some(50.0));
+        // What is left out has no intensity either.
+        assert_eq!(readings.left_out().intensity(0), None);
     }
 
     #[test]

@@ -164,6 +164,7 @@ proptest! {
         scene.errors.dropout = 0.1;
         let sensor = Sensor::new(&scene).expect("white is built in");
         let found = Return {
+            received: 0.0,
             role: Role::Wall,
             facets: Vec::new(),
             geometric: range,
@@ -186,6 +187,7 @@ proptest! {
             correlated,
             interference,
             noise,
+            intensity: 0.0,
             dropout,
             detection: [0.5; 8],
         };

@@ -173,6 +173,8 @@ fn stretch(session: &Session, pose: usize, scans: usize, frames: usize, seed: u6
         beams: session.scanner.scan.beams(),
         ranges: ranges(&mut numbers, scans * session.scanner.scan.beams()),
         echoes: None,
+        intensities: None,
+        echo_intensities: None,
         tracks,
     }
 }

@@ -164,7 +164,7 @@ fn another_sessions_recording_is_rejected() {
 #[test]
 fn a_scan_without_angles_is_no_scan() {
     let session = session(3);
-    let message = encode_scan(5, &session.scanner, 0.025, &[1.0, 2.0, 3.0]);
+    let message = encode_scan(5, &session.scanner, 0.025, &[1.0, 2.0, 3.0], &[]);
     let read = decode_scan(&message).expect("a scan");
     #[allow(clippy::cast_possible_truncation)]
     let first = (read.angle_min as f32).to_le_bytes();
@@ -223,7 +223,7 @@ fn a_clockwise_scan_has_a_negative_increment() {
     let stretches = [stretch(&session, 0, 2, 3, 5)];
     let bytes = record(&session, &stretches);
     assert!(same(&play(&session, &bytes).expect("read"), &stretches));
-    let scan = messages::encode_scan(0, &session.scanner, 0.025, &[1.0; 5]);
+    let scan = messages::encode_scan(0, &session.scanner, 0.025, &[1.0; 5], &[]);
     let number = |place: usize| {
         // After the encapsulation, the stamp, and the name of the frame with its length.
         let at = 4 + 8 + (4 + messages::LASER_FRAME.len() + 1).next_multiple_of(4) + 4 * place;

@@ -223,6 +223,21 @@ fn detection(scene: &Scene, found: &mut Findings) {
             "more than 1 is allowed, or 0 for a receiver that never clips".to_owned(),
         );
     }
+    let beams = detection.median_of_beams;
+    if beams > 0 && beams.is_multiple_of(2) {
+        found.add(
+            &path.key("median_of_beams"),
+            format_args!("is {beams}; a beam in the middle has as many neighbors on either side"),
+            format!("use {} or {}, or 0 for no smoothing", beams - 1, beams + 1),
+        );
+    }
+    if detection.intensity.is_some() && detection.threshold_reflectivity == 0.0 {
+        found.add(
+            &path.key("intensity"),
+            "counts from the threshold, and `detection.threshold_reflectivity` is 0: there is none",
+            "give `detection.threshold_reflectivity` more than 0, or omit `detection.intensity`".to_owned(),
+        );
+    }
     let limits = scene.scanner.limits();
     if detection.echo == EchoChoice::All && limits.echoes < 2 {
         let several = (Preset::ALL.into_iter())

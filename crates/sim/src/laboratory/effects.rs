@@ -30,6 +30,7 @@ pub(super) struct ScanEffects {
     warm_up: f64,
     elements: Arc<[f64]>,
     noise: Vec<f64>,
+    intensity: Vec<f64>,
     dropout: Vec<f64>,
     correlated: Vec<f64>,
     interference: Vec<f64>,
@@ -223,6 +224,12 @@ impl EffectSource<'_> {
                 }
             }
         }
+        let noisy = self.scene.detection.intensity.filter(|law| law.noise_share > 0.0);
+        if noisy.is_some() && errors.model != ErrorModel::None {
+            into.columns
+                .draw(self.geometry.beams(), self.seed, Purpose::Intensity, row);
+            into.columns.normals(0, &mut into.intensity);
+        }
         into.detection.clear();
         into.asked.clear();
         if self.scene.detection.noise_over_threshold > 0.0 {
@@ -268,6 +275,7 @@ impl ScanEffects {
             correlated: of(&self.correlated),
             interference: of(&self.interference),
             noise: of(&self.noise),
+            intensity: of(&self.intensity),
             dropout: of(&self.dropout),
             detection: Default::default(),
         }

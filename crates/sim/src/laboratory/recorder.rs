@@ -19,6 +19,8 @@ pub struct Recorder<'a> {
 pub(super) struct Readings {
     pub(super) ranges: Vec<f64>,
     pub(super) echoes: Option<Vec<Vec<f64>>>,
+    pub(super) intensities: Option<Vec<f64>>,
+    pub(super) echo_intensities: Option<Vec<Vec<f64>>>,
 }
 
 impl Laboratory {
@@ -35,9 +37,12 @@ impl Laboratory {
     /// Space for the readings of a given number of scans.
     pub(super) fn readings(&self, scans: usize) -> Readings {
         let all_echoes = self.scene.detection.echo == EchoChoice::All;
+        let counts = self.scene.detection.intensity.is_some();
         Readings {
             ranges: Vec::with_capacity(scans * self.sensor.scan().beams()),
             echoes: all_echoes.then(Vec::new),
+            intensities: counts.then(Vec::new),
+            echo_intensities: (all_echoes && counts).then(Vec::new),
         }
     }
 }
@@ -103,6 +108,7 @@ impl Readings {
     ) {
         let sensor = &laboratory.sensor;
         let beams = digest.beams.iter().enumerate();
+        let known = self.ranges.len();
         self.ranges.extend(beams.map(|(beam, reported)| match *reported {
             Reported::Nothing => NO_RETURN,
             Reported::Surely { range, noise_sd } => {
@@ -110,9 +116,26 @@ impl Readings {
             }
             Reported::AtRandom => sensor.read(seen[beam].as_ref(), &effects.of(beam)),
         }));
+        sensor.smooth(&mut self.ranges[known..]);
+        if let Some(counts) = &mut self.intensities {
+            let ranges = self.ranges[known..].iter();
+            let beams = ranges.zip(seen).enumerate();
+            counts.extend(
+                beams.map(|(beam, (range, found))| {
+                    sensor.intensity(*range, found.as_ref(), &effects.of(beam))
+                }),
+            );
+        }
         if let Some(echoes) = &mut self.echoes {
+            let known = echoes.len();
             let beams = seen.iter().enumerate();
             echoes.extend(beams.map(|(beam, found)| sensor.read_all(found.as_ref(), &effects.of(beam))));
+            if let Some(counts) = &mut self.echo_intensities {
+                let beams = echoes[known..].iter().zip(seen).enumerate();
+                counts.extend(beams.map(|(beam, (ranges, found))| {
+                    sensor.intensities(ranges, found.as_ref(), &effects.of(beam))
+                }));
+            }
         }
     }
 }
@@ -147,6 +170,8 @@ impl Laboratory {
             beams: self.sensor.scan().beams(),
             ranges: readings.ranges,
             echoes: readings.echoes,
+            intensities: readings.intensities,
+            echo_intensities: readings.echo_intensities,
             tracks: self.tracks(number, frames),
         }
     }

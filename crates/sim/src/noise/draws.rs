@@ -44,6 +44,8 @@ pub enum Purpose {
     MirrorThickness = 17,
     /// Innovation of the noise that all beams share; row = scan.
     Common = 18,
+    /// Noise of the intensities; row = scan, column = beam.
+    Intensity = 19,
 }
 
 /// The draws of one row.

@@ -1,6 +1,6 @@
 //! From received light to a range: which principle, which detector, which echo.
 
-use super::omit::is_zero;
+use super::omit::{is_default, is_zero};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -91,6 +91,40 @@ pub struct Detection {
     /// Φ((A − V)/σ); 0 for a sharp threshold.
     #[schemars(range(min = 0.0, max = 0.2))]
     pub noise_over_threshold: f64,
+    /// Number of neighboring beams, an odd one, whose median the scanner reports in `/scan` instead of a reading; 0 if it
+    /// does not smooth. A code stays one, and others do not count.
+    #[serde(skip_serializing_if = "is_default")]
+    #[schemars(range(min = 0, max = 31))]
+    pub median_of_beams: u32,
+    /// The intensities that the scanner reports with its ranges; without this table it reports none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub intensity: Option<Intensity>,
+}
+
+/// Received power as a scanner reports it, in whole counts.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Intensity {
+    /// Counts of an echo that is just detected; others are in proportion to their power (assumed).
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    #[schemars(range(min = 0.0, max = 1e6))]
+    pub counts_at_threshold: f64,
+    /// Largest number that is reported (assumed: 16 bits).
+    #[schemars(range(min = 1.0, max = 16777216.0))]
+    pub largest: f64,
+    /// Noise of one intensity, 1σ, as a share of it; the echoes of a reading have the same.
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub noise_share: f64,
+}
+
+impl Default for Intensity {
+    fn default() -> Self {
+        Self {
+            counts_at_threshold: 10.0,
+            largest: 65535.0,
+            noise_share: 0.0,
+        }
+    }
 }
 
 impl Default for Detection {
@@ -108,6 +142,8 @@ impl Default for Detection {
             walk_compensated: 0.0,
             saturation_over_threshold: 0.0,
             noise_over_threshold: 0.0,
+            median_of_beams: 0,
+            intensity: None,
         }
     }
 }

@@ -27,7 +27,7 @@ pub use body::{
     PlanePolygon, PlaneRectangle, PlaneShape, RoomBox, RoomCylinder, RoomMirror, RoomSurface, SurfaceShape,
 };
 pub use coating::{Coating, CoatingTable, Dust, Film, Stack};
-pub use detection::{Detection, Detector, EchoChoice, Principle};
+pub use detection::{Detection, Detector, EchoChoice, Intensity, Principle};
 pub use errors::{
     Characterization, Correlated, ErrorModel, Errors, IncidenceNoise, Interference, NoiseTable, WarmUp,
 };

@@ -2,7 +2,8 @@
 //! the readings within each half lets them.
 //!
 //! What all beams of a stretch share, and what varies evenly along the scan, is taken out: a board or a rig that settles
-//! moves all readings together.
+//! moves all readings together. What is left of neighboring beams is then independent, unless the scanner smooths its
+//! readings.
 
 use super::super::problem::Joint;
 use super::evidence::Statistic;
@@ -24,6 +25,10 @@ pub(super) struct Halves {
     pub(super) statistic: Statistic,
     /// Variance of the differences relative to that of white noise.
     pub(super) inflation: f64,
+    /// Correlation of neighboring beams' differences.
+    pub(super) neighbors: f64,
+    /// Number of pairs of neighbors.
+    pairs: usize,
 }
 
 impl Halves {
@@ -35,11 +40,30 @@ impl Halves {
             p_value: libm::exp(self.statistic.ln_p()),
         }
     }
+
+    /// χ² of the correlation of neighbors, if it is positive; its variance is one over the number of pairs.
+    pub(super) fn of_neighbors(&self) -> Statistic {
+        Statistic {
+            chi_squared: self.neighbors.max(0.0).powi(2) * self.pairs as f64,
+            freedom: 1.0,
+        }
+    }
+
+    pub(super) fn test_of_neighbors(&self) -> ComponentTest {
+        let statistic = self.of_neighbors();
+        ComponentTest {
+            cause: Cause::NeighborNoise,
+            statistic: statistic.chi_squared,
+            degrees_of_freedom: statistic.freedom,
+            p_value: libm::exp(statistic.ln_p()),
+        }
+    }
 }
 
 /// Compares the halves of every stretch; `None` if there are too few readings.
 pub(super) fn correlated(joint: &Joint, dataset: &Dataset) -> Option<Halves> {
     let mut statistic = Statistic::default();
+    let (mut products, mut pairs) = (0.0, 0);
     for group in &joint.groups {
         for (place, board) in group.boards.iter().enumerate() {
             let statistics = dataset.poses.get(board.pose)?.readings.statistics();
@@ -56,13 +80,25 @@ pub(super) fn correlated(joint: &Joint, dataset: &Dataset) -> Option<Halves> {
                 }
             }
             if seen.len() >= MIN_BEAMS {
-                statistic.chi_squared += beside_trend(&seen);
+                let left = beside_trend(&seen);
+                statistic.chi_squared += left.iter().map(|p| p.y * p.y).sum::<f64>();
                 statistic.freedom += (seen.len() - 2) as f64;
+                for pair in left.windows(2).filter(|pair| pair[1].x - pair[0].x == 1.0) {
+                    products += pair[0].y * pair[1].y;
+                    pairs += 1;
+                }
             }
         }
     }
+    let inflation = statistic.chi_squared / statistic.freedom;
     (statistic.freedom > 0.0).then(|| Halves {
-        inflation: statistic.chi_squared / statistic.freedom,
+        neighbors: if pairs > 0 && inflation > 0.0 {
+            products / pairs as f64 / inflation
+        } else {
+            0.0
+        },
+        pairs,
+        inflation,
         statistic,
     })
 }
@@ -84,21 +120,21 @@ fn difference(readings: &BeamStatistics) -> Option<f64> {
     Some((second.mean - first.mean) / of_difference.sqrt() * student)
 }
 
-/// Σ of the squared distances from the straight line through points (place, value).
-fn beside_trend(points: &[Vector2<f64>]) -> f64 {
+/// Points (place, value), each with the distance of its value from the straight line through all.
+fn beside_trend(points: &[Vector2<f64>]) -> Vec<Vector2<f64>> {
     let count = points.len() as f64;
     let middle = points.iter().map(|p| p.x).sum::<f64>() / count;
-    let (mut normal, mut right, mut squares) = (Matrix2::zeros(), Vector2::zeros(), 0.0);
+    let row = |p: &Vector2<f64>| Vector2::new(1.0, p.x - middle);
+    let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
     for p in points {
-        let row = Vector2::new(1.0, p.x - middle);
-        normal += row * row.transpose();
-        right += row * p.y;
-        squares += p.y * p.y;
+        normal += row(p) * row(p).transpose();
+        right += row(p) * p.y;
     }
-    let explained = normal
+    let line = normal
         .try_inverse()
-        .map_or(0.0, |inverse| right.dot(&(inverse * right)));
-    (squares - explained).max(0.0)
+        .map_or_else(Vector2::zeros, |inverse| inverse * right);
+    let left = |p: &Vector2<f64>| Vector2::new(p.x, p.y - row(p).dot(&line));
+    points.iter().map(left).collect()
 }
 
 #[cfg(test)]
@@ -111,12 +147,13 @@ mod tests {
         let points: Vec<_> = (0..20)
             .map(|i| Vector2::new(f64::from(i), 3.0 + 0.1 * f64::from(i)))
             .collect();
-        assert!(beside_trend(&points) < 1e-20);
+        let squares = |points: &[Vector2<f64>]| beside_trend(points).iter().map(|p| p.y * p.y).sum::<f64>();
+        assert!(squares(&points) < 1e-20);
         let alternating = |i: i32| if i % 2 == 0 { 1.0 } else { -1.0 };
         let points: Vec<_> = (0..40)
             .map(|i| Vector2::new(f64::from(i), 5.0 + alternating(i)))
             .collect();
-        assert!((beside_trend(&points) - 40.0).abs() < 0.1);
+        assert!((squares(&points) - 40.0).abs() < 0.1);
     }
 
     #[test]

@@ -40,6 +40,9 @@ const EDGE_SHARE: usize = 8;
 const STRANGE: f64 = 4.0;
 const MOST_STRANGE: usize = 10;
 
+/// Correlation of neighboring beams that changes the uncertainty of their mean by less than a fifth.
+const WORTH_OF_NEIGHBORS: f64 = 0.2;
+
 /// Factor on the standard deviation of a reading that is left out.
 const LEFT_OUT: f64 = 1e6;
 
@@ -67,7 +70,7 @@ impl Joint<'_> {
         let mut estimated = shapes.of_figures();
         let mut left = whole.given(&estimated);
         let all = hypotheses(self, &shapes);
-        let kinds = all.iter().filter(|h| h.pose.is_none()).count() + 3;
+        let kinds = all.iter().filter(|h| h.pose.is_none()).count() + 4;
         let limit = libm::log(FALSE_ALARM / kinds as f64);
         let tests = all
             .iter()
@@ -81,11 +84,17 @@ impl Joint<'_> {
             freedom: solution.degrees_of_freedom() as f64 - left_out as f64,
         };
         let halves = halves::correlated(self, dataset);
-        tests.extend(halves.as_ref().map(|h| h.test()));
-        let correlated = halves.filter(|h| h.statistic.ln_p() < limit && h.inflation > WORTH * WORTH);
-        if let Some(halves) = correlated {
-            // All other tests take noise for white.
-            return (tests, vec![words::correlated(&halves)]);
+        tests.extend(halves.iter().flat_map(|h| [h.test(), h.test_of_neighbors()]));
+        if let Some(halves) = halves {
+            let correlated = halves.statistic.ln_p() < limit && halves.inflation > WORTH * WORTH;
+            let smoothed = halves.of_neighbors().ln_p() < limit && halves.neighbors > WORTH_OF_NEIGHBORS;
+            let mut doubts = Vec::new();
+            doubts.extend(correlated.then(|| words::correlated(&halves)));
+            doubts.extend(smoothed.then(|| words::smoothed(&halves)));
+            if !doubts.is_empty() {
+                // All other tests take noise for white.
+                return (tests, doubts);
+            }
         }
         for _ in 0..ROUNDS {
             let tested: Vec<_> = all.iter().map(|h| h.test_beside(&estimated, &left)).collect();

@@ -93,7 +93,7 @@ fn phrase(session: &Session, hypothesis: &Hypothesis, evidence: &Evidence) -> St
             "the board of pose {} was not where it was tracked: moved, or its markers are mislabeled",
             hypothesis.pose.unwrap_or_default()
         ),
-        Cause::CorrelatedNoise | Cause::Noise => "noise".to_owned(),
+        Cause::CorrelatedNoise | Cause::NeighborNoise | Cause::Noise => "noise".to_owned(),
     }
 }
 
@@ -108,6 +108,22 @@ pub(super) fn correlated(halves: &Halves) -> Doubt {
             "noise is correlated from scan to scan: means of half a stretch differ by {:.1} times what the scatter of \
              readings explains",
             halves.inflation.sqrt()
+        ),
+    }
+}
+
+/// The doubt about noise that neighboring beams share.
+pub(super) fn smoothed(halves: &Halves) -> Doubt {
+    let statistic = halves.of_neighbors();
+    Doubt {
+        causes: vec![Cause::NeighborNoise],
+        poses: Vec::new(),
+        statistic: statistic.chi_squared,
+        degrees_of_freedom: statistic.freedom,
+        message: format!(
+            "noise is correlated from beam to beam ({:.2} between neighbors), as that of a scanner that smooths its \
+             readings: what is stated of the means over neighboring beams is too certain",
+            halves.neighbors
         ),
     }
 }

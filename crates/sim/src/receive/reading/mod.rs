@@ -10,6 +10,7 @@ mod receive;
 mod report;
 mod returned;
 mod sensor;
+mod smooth;
 mod sub_ray;
 
 pub use class::{BeamClass, class};

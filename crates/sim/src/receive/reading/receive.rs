@@ -15,6 +15,8 @@ const FAINTEST: f64 = 5.0;
 /// An echo as it is read: the part that dominates it, and the shifts of its range.
 struct Seen<'a> {
     part: &'a Part,
+    /// Power of all parts of the echo.
+    received: f64,
     mixed: f64,
     detection: f64,
     probability: f64,
@@ -37,14 +39,14 @@ impl Sensor {
             }
             return Some(first);
         }
-        let (part, mixed, detection) = match parts {
+        let (part, received, mixed, detection) = match parts {
             [] => return None,
             // A single surface reads its own range, whatever point of its edge is detected.
             [only] if !physical => {
                 if !detect::is_seen(&only.pulses, self.receiver.sd, self.receiver.threshold) {
                     return None;
                 }
-                (only, 0.0, 0.0)
+                (only, only.power, 0.0, 0.0)
             }
             _ => self.detect(parts, physical)?,
         };
@@ -52,6 +54,7 @@ impl Sensor {
             setting,
             &Seen {
                 part,
+                received,
                 mixed,
                 detection,
                 probability: 1.0,
@@ -73,6 +76,7 @@ impl Sensor {
             facet_cos_incidence: place.facets[..part.facets().len()].to_vec(),
             power: part.power,
             share: part.share,
+            received: seen.received,
             mixed: seen.mixed,
             detection: seen.detection,
             bias: self.bias.terms(geometric, cos_incidence, &paint.name),
@@ -88,11 +92,12 @@ impl Sensor {
         (found.range() <= self.limits.range_max_m).then_some(found)
     }
 
-    /// The part that dominates the first echo, the shift that the others cause, and the shift by the detector itself.
+    /// The part that dominates the first echo, the power of all its parts, the shift that the others cause, and the shift
+    /// by the detector itself.
     ///
     /// If the error model excludes the detector, both edges are corrected for their walk, so that a single surface
     /// reads its own range and only the mixture shifts it.
-    fn detect<'a>(&self, parts: &'a [Part], physical: bool) -> Option<(&'a Part, f64, f64)> {
+    fn detect<'a>(&self, parts: &'a [Part], physical: bool) -> Option<(&'a Part, f64, f64, f64)> {
         let all = Parts::pulses(parts);
         let edge = detect::leading_edge(&all, self.receiver.sd, self.receiver.threshold)?;
         let first = edge.compensated(self.receiver.sd, self.receiver.threshold);
@@ -114,7 +119,8 @@ impl Sensor {
                 .map_or(geometric, |edge| read(&edge)),
         };
         let detection = if physical { alone - geometric } else { 0.0 };
-        Some((part, read(&edge) - alone, detection))
+        let received = parts.iter().filter(in_echo).map(|p| p.power).sum();
+        Some((part, received, read(&edge) - alone, detection))
     }
 
     /// Where the device takes an echo to be, from where its detector triggers and from where it would without walk.
@@ -176,6 +182,12 @@ impl Sensor {
             let alone = alone.map_or(geometric, &read);
             Some(Seen {
                 part,
+                received: parts
+                    .iter()
+                    .filter(inside)
+                    .map(|p| p.power)
+                    .sum::<f64>()
+                    .max(part.power),
                 mixed: read(echo) - alone,
                 detection: if physical { alone - geometric } else { 0.0 },
                 probability: self.probability(echo.peak),
@@ -205,6 +217,7 @@ impl Sensor {
         let range = phase::fold(base + phase::wrap(whole.range - alone, ambiguity), ambiguity);
         vec![Seen {
             part,
+            received: whole.amplitude,
             mixed: range - base,
             detection: base - geometric,
             probability: self.probability(whole.amplitude),

@@ -19,6 +19,8 @@ pub struct RandomEffects {
     pub interference: f64,
     /// White noise: a standard normal deviate, to be multiplied by [`Return::noise_sd`].
     pub noise: f64,
+    /// Noise of the intensity: a standard normal deviate.
+    pub intensity: f64,
     /// Whether the reading is lost: a uniform deviate; lost if below `errors.dropout`.
     pub dropout: f64,
     /// Whether each echo is detected: uniform deviates; detected if below [`Return::probability`].
@@ -76,6 +78,42 @@ impl Sensor {
             .take(self.limits.echoes as usize)
             .map(|echo| self.report(echo.range(), echo.noise_sd, effects))
             .collect()
+    }
+
+    /// Intensity of a reading, in counts; 0 for a code, and if the scene has none.
+    pub fn intensity(&self, range: f64, found: Option<&Return>, effects: &RandomEffects) -> f64 {
+        let detected = || self.detected(found, effects).next();
+        match range.is_finite().then(detected).flatten() {
+            Some(found) => self.counts(found.received, effects),
+            None => 0.0,
+        }
+    }
+
+    /// Intensities of the echoes of a reading, in the order of [`Sensor::read_all`].
+    pub fn intensities(&self, ranges: &[f64], found: Option<&Return>, effects: &RandomEffects) -> Vec<f64> {
+        let of = |(range, echo): (&f64, &Return)| {
+            if range.is_finite() {
+                self.counts(echo.received, effects)
+            } else {
+                0.0
+            }
+        };
+        ranges.iter().zip(self.detected(found, effects)).map(of).collect()
+    }
+
+    /// Counts of an echo by its power.
+    fn counts(&self, power: f64, effects: &RandomEffects) -> f64 {
+        let Some(law) = &self.detection.intensity else {
+            return 0.0;
+        };
+        let noisy = if self.errors.model == ErrorModel::None {
+            0.0
+        } else {
+            law.noise_share * effects.intensity
+        };
+        let power = power.min(self.receiver.saturation);
+        let counts = law.counts_at_threshold * power / self.receiver.threshold * (1.0 + noisy);
+        rounded(counts.clamp(0.0, law.largest))
     }
 
     /// The echoes of a reading that are detected, in the order in which they are reported.

@@ -23,6 +23,8 @@ pub struct Return {
     pub power: f64,
     /// Share of the beam's energy that falls on it.
     pub share: f64,
+    /// Power of the whole echo, whichever surfaces it comes from, in watts.
+    pub received: f64,
     /// Shift of the range due to other surfaces in the same echo, in meters.
     pub mixed: f64,
     /// Shift by pulse and threshold for this surface alone, in meters; 0 unless the error model is physical. For
