@@ -41,6 +41,7 @@ pub use element::attempt::MIN_BOARDS;
 pub use element::{initial, recursive, solve};
 pub use error::CalibError;
 pub use joint::{TrueDirection, limit};
+pub use judge::common::CommonErrors;
 pub use judge::covariance::{Budget, MountUncertainty};
 pub use judge::{covariance, gauge, observability};
 pub use method::Method;

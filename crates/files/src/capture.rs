@@ -4,6 +4,7 @@ use super::bodies::Bodies;
 use super::messages::{LabeledMarker, NS_PER_S};
 use catoptric_model::TrackedFrame;
 use catoptric_model::frame::Pose;
+use catoptric_model::limits::FAR_M;
 use nalgebra::Point3;
 use std::collections::BTreeMap;
 
@@ -22,6 +23,13 @@ pub(super) struct Capture {
     begin: u64,
     /// By body: the number of its frames in which the tracker reported no pose.
     pub(super) lost: BTreeMap<usize, usize>,
+    /// By body: the number of its frames in which it was beyond the largest coordinate.
+    pub(super) far: BTreeMap<usize, usize>,
+}
+
+/// Whether a coordinate is one that a laboratory has; false for NaN.
+fn is_near(coordinate: &f64) -> bool {
+    coordinate.abs() <= FAR_M
 }
 
 impl Capture {
@@ -29,6 +37,9 @@ impl Capture {
     pub(super) fn pose(&mut self, time: u64, body: usize, pose: Option<Pose>) -> Result<(), String> {
         self.check(time)?;
         match pose {
+            Some(pose) if !pose.translation.vector.iter().all(is_near) => {
+                *self.far.entry(body).or_default() += 1;
+            }
             Some(pose) => {
                 self.poses.insert((time, body), pose);
             }
@@ -38,7 +49,7 @@ impl Capture {
     }
 
     /// Adds the markers of a frame. Those of unknown bodies are ignored, and so are those that the tracker had lost:
-    /// their coordinates are zero or not finite.
+    /// their coordinates are zero, not finite or farther away than anything is.
     pub(super) fn markers(
         &mut self,
         time: u64,
@@ -49,7 +60,7 @@ impl Capture {
         let known = markers.iter().filter_map(|marker| {
             let (body, place) = bodies.find(&marker.name)?;
             let point = &marker.point;
-            let seen = point.iter().all(|c| c.is_finite()) && *point != Point3::origin();
+            let seen = point.iter().all(is_near) && *point != Point3::origin();
             seen.then_some((body, place, marker.point))
         });
         self.markers.entry(time).or_default().extend(known);

@@ -4,6 +4,7 @@ use super::bodies::Bodies;
 use super::capture::{Capture, seconds_between};
 use super::codes::{Codes, Limits};
 use super::messages::{Echoes, LabeledMarker, Scan};
+use super::order::Recent;
 use catoptric_model::dataset::RIG_SUBJECT;
 use catoptric_model::frame::Pose;
 use catoptric_model::session::ScannerSheet;
@@ -44,7 +45,9 @@ pub(super) trait Keep: Sized {
 /// A stretch being read; times are in nanoseconds.
 pub(super) struct Gathering<R> {
     pub(super) label: PoseLabel,
-    label_time: u64,
+    pub(super) label_time: u64,
+    /// The messages taken last, which may be repeated.
+    pub(super) recent: Recent,
     first_scan: Option<u64>,
     last_scan: u64,
     /// Time at which the last scan was logged.
@@ -80,6 +83,7 @@ impl<R: Keep> Gathering<R> {
             kept: R::begin(&label, scanner.scan.beams()),
             label,
             label_time,
+            recent: Recent::default(),
             first_scan: None,
             last_scan: label_time,
             latest_scan: label_time,

@@ -25,6 +25,8 @@ pub mod json;
 mod leftovers;
 pub mod names;
 #[cfg(feature = "recording")]
+mod order;
+mod outlying;
 pub mod output;
 pub mod paths;
 

@@ -3,6 +3,7 @@
 //! A tracker that measures never reports the same numbers twice, so a pose that is repeated bit for bit is frozen; a recording
 //! without noise repeats all of them, and is left alone. The identity is a pose like any other if the body has no other.
 
+use super::outlying::{Center, Sample};
 use catoptric_model::{Pose, TrackedFrame};
 use std::collections::BTreeMap;
 
@@ -10,7 +11,7 @@ use std::collections::BTreeMap;
 const FROZEN: usize = 3;
 
 /// What a body's poses over a stretch look like.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Seen {
     /// Frames in which it has a pose.
     pub(super) frames: usize,
@@ -22,6 +23,8 @@ pub(super) struct Seen {
     row: usize,
     first: Option<Pose>,
     last: Option<Pose>,
+    /// What outlying poses are compared with.
+    pub(super) sample: Sample,
 }
 
 /// The frames of a body that are not used.
@@ -31,6 +34,8 @@ struct Unused {
     repeats: bool,
     /// The pose before the next frame.
     before: Option<Pose>,
+    /// The pose from which no frame may be far.
+    center: Option<Center>,
 }
 
 /// Passes over frames that are not used, by body.
@@ -57,6 +62,7 @@ impl Seen {
         self.row = if repeats { self.row + 1 } else { 1 };
         self.longest = self.longest.max(self.row);
         self.first.get_or_insert(*pose);
+        self.sample.add(pose);
         self.last = Some(*pose);
     }
 
@@ -92,6 +98,7 @@ impl Sieve {
             identities: seen.identities > 0 && habit.is_elsewhere,
             repeats: habit.is_measured() && is_frozen,
             before,
+            center: None,
         };
         if !unused.identities && !unused.repeats {
             return 0;
@@ -111,6 +118,11 @@ impl Sieve {
         count
     }
 
+    /// Marks the frames of a body that are far from a pose as unused.
+    pub(super) fn mark_far(&mut self, body: usize, center: Center) {
+        self.0.entry(body).or_default().center = Some(center);
+    }
+
     /// Whether any frame is not used.
     pub(super) fn is_empty(&self) -> bool {
         self.0.is_empty()
@@ -126,7 +138,7 @@ impl Sieve {
         }
         let repeats = unused.repeats && unused.before == Some(pose);
         unused.before = Some(pose);
-        !repeats
+        !repeats && unused.center.is_none_or(|center| !center.is_far(&pose))
     }
 }
 

@@ -272,6 +272,14 @@ fn open(message: &[u8]) -> Result<(u64, CdrReader<'_>), MessageError> {
     Ok((stamp, cdr))
 }
 
+/// Reads the time of a message that begins with a header.
+///
+/// # Errors
+/// [`MessageError`] if the bytes do not begin with one.
+pub fn decode_stamp(message: &[u8]) -> Result<u64, MessageError> {
+    read_stamp(&mut CdrReader::new(message)?)
+}
+
 fn read_point(cdr: &mut CdrReader<'_>) -> Result<Point3<f64>, MessageError> {
     Ok(Point3::new(cdr.f64()?, cdr.f64()?, cdr.f64()?))
 }

@@ -3,11 +3,13 @@
 //! Messages belong together by the times at which they were logged; their order in the file means nothing. A stretch begins
 //! with its label on `/session/pose` and lasts to the next one; of messages logged at the same time the label comes first,
 //! and others in the order of the file. Scans and frames of motion capture happen when their own stamps say. The recording
-//! begins with its first message.
+//! begins with its first message. If stretches do not have the scans that their labels state, and log times differ from stamps
+//! by up to a scan period, the stamps decide what belongs together, too.
 //!
 //! Topics that are not in the table of [`recording`](super::recording) are ignored, and so are bodies and markers that are
 //! not in the session, and messages before the first label. A frame without a message on `/mocap/markers` has an empty list
-//! of markers. Lost scans, a label sent twice and readings that are no ranges are counted and noted.
+//! of markers. Of a message that was recorded more than once one counts. Lost scans, messages and labels that are repeated and
+//! readings that are no ranges are counted and noted.
 
 use super::blocks::{Block, Place, Visit};
 use super::bodies::{Bodies, MARKERS_TOPIC};
@@ -15,6 +17,7 @@ use super::codes::Codes;
 use super::error::IoError;
 use super::gathering::{Gathering, Keep, Known, Whole};
 use super::messages;
+use super::order::Index;
 use super::records;
 use super::source::{Entry, Position, Source, Start};
 use super::topics::{LABEL_TOPIC, Text, Topic};
@@ -33,14 +36,16 @@ pub(super) struct Played<R: Keep> {
     pub(super) notes: Vec<String>,
     /// The stretches that are left out, each with the reason.
     pub(super) left_out: Vec<String>,
+    /// Number of scans that labels state and that are not there.
+    missing: usize,
 }
 
 /// The state of reading a recording.
-struct Playback<'a, R: Keep> {
+pub(super) struct Playback<'a, R: Keep> {
     scanner: &'a ScannerSheet,
     bodies: Bodies,
     schemas: BTreeMap<u16, String>,
-    topics: BTreeMap<u16, Topic>,
+    pub(super) topics: BTreeMap<u16, Topic>,
     /// Names of all topics.
     names: BTreeSet<String>,
     /// Time of the first message, in nanoseconds.
@@ -52,7 +57,7 @@ struct Playback<'a, R: Keep> {
     is_unordered: bool,
     is_sorted: bool,
     /// Whether a stretch with a fault is left out instead of the whole recording.
-    partial: bool,
+    pub(super) partial: bool,
     /// Whether some of the recording cannot be read.
     has_damage: bool,
     current: Option<Gathering<R>>,
@@ -64,6 +69,9 @@ struct Playback<'a, R: Keep> {
     codes: Codes,
     /// Scans before the first label.
     unlabeled: usize,
+    /// Messages that were recorded before, and number of scans that are not there.
+    repeated: usize,
+    missing: usize,
     notes: Vec<String>,
     left_out: Vec<String>,
 }
@@ -88,9 +96,44 @@ pub fn parse_recording(bytes: &[u8], path: &Path, session: &Session) -> Result<V
     Ok(play::<Whole>(&place, session, false, &Stop::default())?.stretches)
 }
 
-/// Reads a recording once and returns the data kept of every stretch, and the index of its messages. If it is `partial`, what
-/// is damaged is left out.
+/// Reads a recording and returns the data kept of every stretch, and the index of its messages. If it is `partial`, what is
+/// damaged is left out.
 pub(super) fn play<R: Keep>(
+    place: &Place,
+    session: &Session,
+    partial: bool,
+    stop: &Stop,
+) -> Result<Played<R>, IoError> {
+    let as_logged = as_logged::<R>(place, session, partial, stop);
+    let is_complete = |played: &Played<R>| played.left_out.is_empty() && played.missing == 0;
+    match &as_logged {
+        Ok(played) if is_complete(played) => return as_logged,
+        Ok(_) | Err(IoError::Recording { .. }) => {}
+        Err(_) => return as_logged,
+    }
+    // Log times that jitter may put messages into a neighboring stretch.
+    let mut playback = Playback::<R>::new(place, session, partial)?;
+    let index = Index::of(place, &mut playback, stop)?;
+    let Some((index, jitter_ns)) = index.by_stamps(session.scanner.scan.scan_period_s()) else {
+        return as_logged;
+    };
+    match sorted(place, session, playback, stop, index) {
+        Err(error @ IoError::Stopped(_)) => Err(error),
+        Ok(mut by_stamp) if is_complete(&by_stamp) => {
+            let words = format!(
+                "log times are up to {:.1} ms from the stamps of their messages: the stamps decide which stretch a message belongs \
+                 to",
+                jitter_ns as f64 * 1e-6
+            );
+            by_stamp.notes.insert(0, words);
+            Ok(by_stamp)
+        }
+        Ok(_) | Err(_) => as_logged,
+    }
+}
+
+/// Reads a recording in the order of its log times.
+fn as_logged<R: Keep>(
     place: &Place,
     session: &Session,
     partial: bool,
@@ -105,63 +148,40 @@ pub(super) fn play<R: Keep>(
         return playback.finish(place, blocks, None, stop);
     }
     // Once more, for the times of all messages, and then in order.
-    let mut index = Index::default();
     let mut playback = Playback::<R>::new(place, session, partial)?;
-    let (blocks, length) = place.visit(stop, partial, |event| index.take(event, &mut playback))?;
-    index.entries.sort_by_key(|entry| (entry.time, !entry.is_label));
+    let index = Index::of(place, &mut playback, stop)?;
+    sorted(place, session, playback, stop, index.by_log_time())
+}
+
+/// Reads the messages of a recording in the order of an index, made with the help of a playback.
+fn sorted<R: Keep>(
+    place: &Place,
+    session: &Session,
+    mut playback: Playback<'_, R>,
+    stop: &Stop,
+    index: Index,
+) -> Result<Played<R>, IoError> {
     playback.epoch = index.epoch;
     playback.is_sorted = true;
     let source = Source {
         order: Some(Arc::from(index.entries)),
-        ..Source::new(place, &session.scanner, stop, blocks)
+        ..Source::new(place, &session.scanner, stop, index.blocks)
     };
     for (number, entry) in source.order.iter().flat_map(|order| order.iter()).enumerate() {
+        let at = || source.blocks[entry.block as usize].at();
         let records = source.records(entry.block as usize)?;
         let record = records.get(entry.number as usize);
         let message = record.and_then(|(_, body)| records::message(body));
-        let message = message.ok_or_else(|| place.changed(source.blocks[entry.block as usize].at()))?;
+        let mut message = message.ok_or_else(|| place.changed(at()))?;
+        message.time = entry.time;
         let taken = playback.message(&message, (0, number));
-        taken.map_err(|what| place.corrupt(what, source.blocks[entry.block as usize].at()))?;
+        taken.map_err(|what| place.corrupt(what, at()))?;
     }
     playback
         .end_stretch(None)
-        .map_err(|what| place.corrupt(what, length))?;
+        .map_err(|what| place.corrupt(what, index.length))?;
     let Source { blocks, order, .. } = source;
     playback.finish(place, blocks, order, stop)
-}
-
-/// The times of the messages that matter.
-#[derive(Default)]
-struct Index {
-    entries: Vec<Entry>,
-    /// Earliest time of any message.
-    epoch: Option<u64>,
-}
-
-impl Index {
-    fn take<R: Keep>(&mut self, event: Visit<'_>, playback: &mut Playback<'_, R>) -> Result<(), String> {
-        let Visit::Record { opcode, data, at } = event else {
-            return playback.take(event);
-        };
-        let Some(message) = playback.define(opcode, data)? else {
-            return Ok(());
-        };
-        self.epoch = Some(self.epoch.map_or(message.time, |epoch| epoch.min(message.time)));
-        match playback.topics.get(&message.channel) {
-            None => Err(playback.no_channel(message.channel)),
-            Some(Topic::Other) => Ok(()),
-            Some(topic) => {
-                let number = |n: usize| u32::try_from(n).map_err(|_| "too many messages".to_owned());
-                self.entries.push(Entry {
-                    time: message.time,
-                    is_label: matches!(topic, Topic::Label(_)),
-                    block: number(at.0)?,
-                    number: number(at.1)?,
-                });
-                Ok(())
-            }
-        }
-    }
 }
 
 impl<'a, R: Keep> Playback<'a, R> {
@@ -185,13 +205,15 @@ impl<'a, R: Keep> Playback<'a, R> {
             finished: Vec::new(),
             codes: Codes::default(),
             unlabeled: 0,
+            repeated: 0,
+            missing: 0,
             notes: Vec::new(),
             left_out: Vec::new(),
         })
     }
 
     /// Processes what a visit of the recording comes to.
-    fn take(&mut self, event: Visit<'_>) -> Result<(), String> {
+    pub(super) fn take(&mut self, event: Visit<'_>) -> Result<(), String> {
         match event {
             Visit::Damage(what) => {
                 self.fault(what.to_owned());
@@ -209,7 +231,11 @@ impl<'a, R: Keep> Playback<'a, R> {
     }
 
     /// Processes a schema or a channel; returns a message.
-    fn define<'m>(&mut self, opcode: u8, data: &'m [u8]) -> Result<Option<records::Message<'m>>, String> {
+    pub(super) fn define<'m>(
+        &mut self,
+        opcode: u8,
+        data: &'m [u8],
+    ) -> Result<Option<records::Message<'m>>, String> {
         let short = |what: &str| format!("not a whole recording: a {what} claims more than its record has");
         match opcode {
             op::SCHEMA => {
@@ -232,7 +258,7 @@ impl<'a, R: Keep> Playback<'a, R> {
         Ok(None)
     }
 
-    fn no_channel(&self, channel: u16) -> String {
+    pub(super) fn no_channel(&self, channel: u16) -> String {
         format!("a message on channel {channel}, which does not exist")
     }
 
@@ -244,6 +270,7 @@ impl<'a, R: Keep> Playback<'a, R> {
         // In order, no message comes after a label that was logged later, nor a label after anything logged no earlier.
         let in_order = match topic {
             Topic::Other => return Ok(()),
+            _ if self.is_sorted => true,
             Topic::Label(_) => message.time > self.latest || self.latest == 0,
             Topic::Scan | Topic::Echoes => message.time >= self.latest_scan(),
             Topic::Pose(_) | Topic::Markers => message.time >= self.labeled,
@@ -260,6 +287,10 @@ impl<'a, R: Keep> Playback<'a, R> {
             self.unlabeled += usize::from(self.poses.is_empty() && topic == Topic::Scan);
             return Ok(());
         };
+        if current.recent.is_repeated(&topic, message.data) {
+            self.repeated += 1;
+            return Ok(());
+        }
         let known = Known {
             scanner: self.scanner,
             bodies: &self.bodies,
@@ -330,6 +361,16 @@ impl<'a, R: Keep> Playback<'a, R> {
                 return self.fault_or(format!("{LABEL_TOPIC}: {what}"));
             }
         };
+        if let Some(current) = &self.current
+            && current.label_time == message.time
+            && current.label != label
+            && current.scans() == 0
+        {
+            let (first, second) = (current.number(), label.pose);
+            return self.fault_or(format!(
+                "{LABEL_TOPIC}: the labels of pose {first} and of pose {second} were logged at the same time"
+            ));
+        }
         if self
             .current
             .as_ref()
@@ -386,6 +427,7 @@ impl<'a, R: Keep> Playback<'a, R> {
             epoch: self.epoch.unwrap_or_default(),
         };
         let (number, scans) = (gathering.number(), gathering.scans());
+        self.missing += gathering.label.scans.saturating_sub(scans);
         let ended = match self.is_sorted && self.has_damage && gathering.miscounts() {
             // What cannot be read may have been anywhere, and a label among it.
             true => Err("some of its messages cannot be read".to_owned()),
@@ -427,6 +469,15 @@ impl<'a, R: Keep> Playback<'a, R> {
             );
             self.notes.insert(0, words);
         }
+        if self.repeated > 0 {
+            let (messages, count) = match self.repeated {
+                1 => ("1 message was".to_owned(), "it counts"),
+                n => (format!("{n} messages were"), "each counts"),
+            };
+            self.notes.push(format!(
+                "{messages} recorded more than once, byte for byte: {count} once"
+            ));
+        }
         self.notes.extend(self.codes.words());
         Ok(Played {
             stretches: self.finished,
@@ -441,6 +492,7 @@ impl<'a, R: Keep> Playback<'a, R> {
             },
             notes: self.notes,
             left_out: self.left_out,
+            missing: self.missing,
         })
     }
 }

@@ -6,10 +6,13 @@
 use super::blocks::Place;
 use super::error::IoError;
 use super::lost::{Habit, Sieve};
+use super::outlying::{Found, Outlying};
 use super::playback::{Played, play};
 use super::source::Source;
 use super::survey::{Survey, Surveyed};
 use super::topics::LABEL_TOPIC;
+use catoptric_model::dataset::RIG_SUBJECT;
+use catoptric_model::limits::FAR_M;
 use catoptric_model::motion::LONGEST_GAP_S;
 use catoptric_model::place::nearest;
 use catoptric_model::{PoseKind, PoseRecord, Session, Stop};
@@ -63,16 +66,22 @@ fn attempt(place: &Place, session: &Session, damage: Damage, stop: &Stop) -> Res
         source,
         notes: mut warnings,
         left_out,
+        ..
     } = played;
     warnings.extend(left_out);
     if stretches.is_empty() {
         return Err(nothing(place, &source, &warnings));
     }
-    let (sieves, lost) = sieves(&source, &stretches);
+    let (mut sieves, lost) = sieves(&source, &stretches);
     warnings.extend(lost);
+    let (unknown, outlying) = outlying(&source, &stretches, &mut sieves)?;
+    warnings.extend(outlying);
     let source = Arc::new(source);
     let complete = |(stretch, (surveyed, sieve)): (usize, (Surveyed, Sieve))| {
         let pose = surveyed.label.pose;
+        if let Some(why) = &unknown[stretch] {
+            return Ok(Err(format!("pose {pose}: {why}; it is left out")));
+        }
         let record = surveyed.complete(&source, stretch, &sieve)?;
         let record = record.map_err(|e| format!("{e}; it is left out"));
         Ok(record.and_then(|record| match untracked_board(&record, session) {
@@ -140,11 +149,19 @@ fn sieves(source: &Source, stretches: &[Surveyed]) -> (Vec<Sieve>, Vec<String>) 
             let unreported = stretch.lost.get(&body).copied().unwrap_or_default();
             let lost = unreported + sieve.mark(body, seen, &habits[body], before[body]);
             before[body] = seen.last().or(before[body]);
+            let subject = &source.bodies.all[body].subject;
+            if let Some(far) = stretch.far.get(&body) {
+                warnings.push(format!(
+                    "pose {}: motion capture put {subject:?} beyond {:.0} km in {far} frames, which are not used",
+                    stretch.label.pose,
+                    1e-3 * FAR_M
+                ));
+            }
             if lost > 0 {
                 warnings.push(format!(
                     "pose {}: motion capture had lost {:?} in {lost} of {} frames, which are not used",
                     stretch.label.pose,
-                    source.bodies.all[body].subject,
+                    subject,
                     seen.frames + unreported
                 ));
             }
@@ -152,6 +169,56 @@ fn sieves(source: &Source, stretches: &[Surveyed]) -> (Vec<Sieve>, Vec<String>) 
         sieves.push(sieve);
     }
     (sieves, warnings)
+}
+
+/// Looks for frames in which the rig or the board of a stretch is far from where it is in the others. Marks them as unused;
+/// returns why a stretch cannot be used, and a sentence for each stretch and body that has some.
+fn outlying(
+    source: &Source,
+    stretches: &[Surveyed],
+    sieves: &mut [Sieve],
+) -> Result<(Vec<Option<String>>, Vec<String>), IoError> {
+    let (mut unknown, mut warnings) = (vec![None; stretches.len()], Vec::new());
+    for (number, stretch) in stretches.iter().enumerate() {
+        if stretch.label.kind == PoseKind::Flight {
+            continue;
+        }
+        let subjects = [Some(RIG_SUBJECT), stretch.label.board.as_deref()];
+        let bodies = subjects
+            .into_iter()
+            .flatten()
+            .filter_map(|subject| source.bodies.position(subject));
+        for body in bodies {
+            let Some(center) = stretch.seen[body].sample.center() else {
+                continue;
+            };
+            let (mut found, mut sieve) = (Outlying::default(), sieves[number].clone());
+            source.frames(number, &[body], |of, frame| {
+                if sieve.passes(of, &frame) {
+                    found.add(&frame, &center);
+                }
+            })?;
+            let subject = &source.bodies.all[body].subject;
+            let Outlying { frames, count, .. } = found;
+            match found.found() {
+                Found::Moments if count > 0 => {
+                    sieves[number].mark_far(body, center);
+                    warnings.push(format!(
+                        "pose {}: motion capture put {subject:?} elsewhere for a moment in {count} of {frames} frames, which are \
+                         not used",
+                        stretch.label.pose
+                    ));
+                }
+                Found::Moments | Found::Moved => {}
+                Found::Unknown(why) => {
+                    unknown[number] = Some(format!(
+                        "motion capture put {subject:?} elsewhere in {count} of {frames} frames: {why}"
+                    ));
+                }
+            }
+        }
+    }
+    Ok((unknown, warnings))
 }
 
 /// Why a stretch with a board cannot be used, if motion capture never saw it.

@@ -6,6 +6,7 @@ use super::capture::{Capture, MOST_WAITING};
 use super::codes::{Codes, Limits};
 use super::error::IoError;
 use super::messages;
+use super::order::Recent;
 use super::records;
 use super::topics::Topic;
 use catoptric_model::session::ScannerSheet;
@@ -35,6 +36,7 @@ pub(super) struct Entry {
     /// When it was logged, in nanoseconds.
     pub(super) time: u64,
     pub(super) is_label: bool,
+    pub(super) is_scan: bool,
     /// Its block, and its index there.
     pub(super) block: u32,
     pub(super) number: u32,
@@ -75,6 +77,7 @@ struct Messages<'a> {
 /// The scans of a stretch.
 struct ScansOf<'a> {
     messages: Messages<'a>,
+    recent: Recent,
     left: usize,
 }
 
@@ -201,6 +204,9 @@ impl ScansOf<'_> {
         let source = self.messages.source;
         while let Some((topic, message)) = self.messages.next()? {
             if let Topic::Scan = topic {
+                if self.recent.is_repeated(topic, message) {
+                    continue;
+                }
                 let scan = messages::decode_scan(message);
                 let mut scan = scan.map_err(|_| source.place.changed(0))?;
                 let limits = Limits::of(&source.scanner, scan.limits_m);
@@ -229,6 +235,7 @@ impl ScanSource for Source {
     fn scans(&self, stretch: usize) -> Scans<'_> {
         Box::new(ScansOf {
             messages: self.messages(stretch),
+            recent: Recent::default(),
             left: self.stretches[stretch].scans,
         })
     }

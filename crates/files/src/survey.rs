@@ -72,6 +72,8 @@ pub(super) struct Surveyed {
     pub(super) seen: Vec<Seen>,
     /// Number of frames in which the tracker reported no pose of a body.
     pub(super) lost: BTreeMap<usize, usize>,
+    /// Number of frames in which it was farther away than anything is.
+    pub(super) far: BTreeMap<usize, usize>,
     pub(super) label: PoseLabel,
     /// Whether the label's number of scans was wrong, and with it the halves of the statistics.
     pub(super) is_miscounted: bool,
@@ -193,6 +195,7 @@ impl Keep for Survey {
             stretch.kept.follow(&mut stretch.capture, 0, known);
         }
         let lost = std::mem::take(&mut stretch.capture.lost);
+        let far = std::mem::take(&mut stretch.capture.far);
         let (is_miscounted, starts) = (stretch.miscounts(), stretch.uneven_starts(known));
         let (stretch, kept) = stretch.into_stretch(known);
         let (statistics, intensities) = (kept.gathered.finish(), kept.intensities);
@@ -219,11 +222,15 @@ impl Keep for Survey {
                 unwatched: Vec::new(),
                 seen,
                 lost,
+                far,
                 label,
                 is_miscounted,
             };
         };
-        let seen = all.iter().map(|body| body.seen).collect();
+        let seen = all
+            .iter_mut()
+            .map(|body| std::mem::take(&mut body.seen))
+            .collect();
         let rig = known.bodies.position(RIG_SUBJECT);
         let motion = kept.is_flight.then(|| Motion {
             start_s: stretch.start_s,
@@ -239,6 +246,7 @@ impl Keep for Survey {
             unwatched,
             seen,
             lost,
+            far,
             label,
             is_miscounted,
         }

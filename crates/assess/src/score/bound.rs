@@ -37,7 +37,8 @@ pub fn bounds(bound: &Matrix2<f64>) -> bool {
     largest_sd(bound) <= WEAKEST_SD
 }
 
-fn largest_sd(covariance: &Matrix2<f64>) -> f64 {
+/// Standard deviation along the axis where it is largest.
+pub(super) fn largest_sd(covariance: &Matrix2<f64>) -> f64 {
     covariance.symmetric_eigenvalues().max().max(0.0).sqrt()
 }
 

@@ -1,8 +1,9 @@
 //! The errors of each solved element, with its stated covariance and its bounds.
 
-use super::bound::Knowable;
+use super::bound::{Knowable, largest_sd};
 use super::distance;
 use super::statistics::mahalanobis_squared;
+use catoptric_calib::observability::WEAKEST_SD;
 use catoptric_model::{BeamEstimate, Calibration, Deflection, Session};
 use catoptric_sim::Truth;
 use catoptric_sim::truth::BeamClass;
@@ -31,12 +32,33 @@ pub struct ElementError {
     pub up: f64,
     /// Stated standard deviations of `across` and `up`.
     pub sigma: Option<[f64; 2]>,
+    /// Stated standard deviation along the axis where it is largest.
+    pub stated_sd: Option<f64>,
     /// eᵀP⁻¹e; `None` without a covariance.
     pub mahalanobis_squared: Option<f64>,
     /// Bound on the covariance of (`across`, `up`) for any estimate from the dataset.
     pub bound: Option<Matrix2<f64>>,
     /// The same for an estimate of this element from its own boards alone.
     pub alone_bound: Option<Matrix2<f64>>,
+}
+
+/// Standard deviation up to which a direction counts as solved, in radians: beyond it a linearized covariance has no meaning,
+/// and boards count as leaving the direction open.
+pub const USEFUL_SD: f64 = WEAKEST_SD;
+
+/// Largest standard deviation of (cos φ·δθ, δφ) that an element states; `None` without a covariance.
+pub(super) fn stated_sd(estimate: &BeamEstimate) -> Option<f64> {
+    let cos = estimate.elevation_rad?.cos();
+    let c = estimate.covariance_rad2?;
+    let to_tangent = Matrix2::new(cos, 0.0, 0.0, 1.0);
+    Some(largest_sd(
+        &(to_tangent * Matrix2::new(c[0][0], c[0][1], c[1][0], c[1][1]) * to_tangent),
+    ))
+}
+
+/// Whether an element is solved and does not state that it is hardly known.
+pub(super) fn usefully_solved(estimate: &BeamEstimate) -> bool {
+    solved(estimate).is_some() && stated_sd(estimate).is_none_or(|sd| sd <= USEFUL_SD)
 }
 
 /// Computes the errors of every solved element that is deflected once in truth.
@@ -78,6 +100,7 @@ pub(super) fn compare(
             distance_sd: distance::sd(session, calibration, estimate),
             across: cos * error.x,
             up: error.y,
+            stated_sd: stated_sd(estimate),
             sigma: covariance.map(|c| [cos * c[(0, 0)].sqrt(), c[(1, 1)].sqrt()]),
             mahalanobis_squared: covariance.map(|c| mahalanobis_squared(&error, &c)),
             bound: knowable

@@ -2,6 +2,7 @@
 
 use super::gate::Gate;
 use super::mistake::Mistake;
+use super::residual::Normalized;
 use super::verdict::{Honesty, Verdict};
 use super::{ElementError, Mounting, SurfaceResidual};
 use catoptric_sim::truth::BeamClass;
@@ -128,6 +129,9 @@ pub struct Score {
     pub distance_mm: DistanceError,
     /// Mean squared error of d in units of its standard deviation.
     pub distance_nees: f64,
+    /// Error of the stated range biases at the reference where it is largest in units of its standard deviation, in
+    /// millimeters.
+    pub range_bias_mm: f64,
     /// Error of the mounting, with the rig as tracked. `None` without a truth, a mounting or a tracked rig.
     pub mounting: Option<Mounting>,
     /// Error of a point, in the sensor frame.
@@ -176,9 +180,17 @@ pub struct Score {
     /// Whether there is a truth.
     #[serde(skip)]
     pub(super) has_truth: bool,
-    /// Solved elements that state a covariance.
+    /// Solved elements that state a covariance, and are known by it.
     #[serde(skip)]
     pub(super) blind_stated: usize,
+    /// Solved elements that state to be hardly known.
+    #[serde(skip)]
+    pub(super) useless: usize,
+    /// Residuals of each mirror's elements on the boards and on the walls, on blind data.
+    #[serde(skip)]
+    pub(super) boards_by_mirror: Vec<Normalized>,
+    #[serde(skip)]
+    pub(super) walls_by_mirror: Vec<Normalized>,
 }
 
 impl Score {

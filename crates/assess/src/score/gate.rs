@@ -125,7 +125,12 @@ pub fn worst_limit(freedom: f64, n: usize) -> f64 {
 /// The value that the median of squared errors of one degree of freedom exceeds with at most probability
 /// [`SIGNIFICANCE`]: at least half of them have to (Markov).
 pub fn median_limit() -> f64 {
-    exceeded(1.0, 0.5 * SIGNIFICANCE)
+    worst_median_limit(1)
+}
+
+/// The same for the largest of n medians.
+pub fn worst_median_limit(n: usize) -> f64 {
+    exceeded(1.0, 0.5 * SIGNIFICANCE / n.max(1) as f64)
 }
 
 /// The value that χ² exceeds with some probability.
@@ -155,5 +160,7 @@ mod tests {
         // −2·ln(0.005/400).
         assert!((worst_limit(2.0, 400) - 22.580).abs() < 1e-2);
         assert!((median_limit() - 9.141).abs() < 1e-3);
+        // A two-sided tail of 0.0025/8 = 0.0003125: the square of the normal quantile 3.6049 at 0.99984375.
+        assert!((worst_median_limit(8) - 12.995).abs() < 1e-2);
     }
 }

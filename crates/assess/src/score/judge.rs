@@ -1,11 +1,15 @@
-//! The gates of a score: completeness, honesty, distances, mounting and, on blind data, boards and walls.
+//! The gates of a score: completeness, honesty, distances, range biases, mounting, and boards that were held out.
 
-use super::gate::{
-    ENOUGH, Gate, MIN_SOLVED, Outcome, SIGNIFICANCE, elements, mean_limit, median_limit, worst_limit,
-};
-use super::{Score, honesty, wrap};
+use super::bound::largest_sd;
+use super::element::USEFUL_SD;
+use super::gate::{ENOUGH, Gate, MIN_SOLVED, Outcome, SIGNIFICANCE, elements, mean_limit, worst_limit};
+use super::range_bias::{self, WorstBias};
+use super::residual::ROUNDING_MM;
+use super::statistics::percentile;
+use super::{ElementError, Score, blind, honesty, mounting};
 use crate::validate::{Problem, Severity};
-use catoptric_model::{Calibration, Dataset, Status};
+use catoptric_model::{Calibration, Dataset};
+use catoptric_sim::Truth;
 
 /// Problems that are listed one by one.
 const LISTED: usize = 3;
@@ -55,7 +59,7 @@ pub(super) fn gates(
     score: &Score,
     dataset: &Dataset,
     calibration: &Calibration,
-    has_truth: bool,
+    truth: Option<&Truth>,
 ) -> Vec<Gate> {
     let mut gates = vec![valid(&[])];
     gates.push(match foreign(dataset, calibration) {
@@ -72,9 +76,11 @@ pub(super) fn gates(
             "it was made from this dataset".to_owned(),
         ),
     });
-    if !has_truth {
-        gates.push(omitted(dataset, calibration));
-        gates.extend(blind(score));
+    if truth.is_none() {
+        gates.push(blind::omitted(dataset, calibration));
+        gates.extend(blind::blind(score));
+        gates.extend(mounting_claim(dataset, calibration));
+        gates.extend(held_out(calibration));
         return gates;
     }
     if score.beams.deflected == Some(0) {
@@ -90,10 +96,14 @@ pub(super) fn gates(
     gates.extend(of_false(score));
     gates.push(solved(score, MIN_SOLVED));
     gates.push(covariance(score));
+    gates.extend(unstated(score));
     gates.extend(directions(score));
     gates.extend(open(score));
     gates.extend(distances(score));
-    gates.push(mounting(score));
+    gates.push(biases(dataset, calibration, truth));
+    gates.push(of_mounting(score));
+    gates.extend(mounting_claim(dataset, calibration));
+    gates.extend(held_out(calibration));
     gates
 }
 
@@ -125,7 +135,8 @@ pub(super) fn solved(score: &Score, min_solved: f64) -> Gate {
         (solved, knowable, "the boards determine")
     } else {
         let deflected = score.beams.solved + score.beams.abstained;
-        (score.beams.solved, deflected, "the calibration calls deflected")
+        let solved = score.beams.solved - score.useless;
+        (solved, deflected, "the calibration calls deflected")
     };
     let share = solved as f64 / all.max(1) as f64;
     let words = format!(
@@ -143,8 +154,32 @@ fn covariance(score: &Score) -> Gate {
     shares("covariance", "a covariance", stated, scored)
 }
 
+/// The gate on single elements that state no covariance while others do: they are taken to be known as well as the median of
+/// those, or as well as their own boards alone determine them.
+fn unstated(score: &Score) -> Option<Gate> {
+    let stated: Vec<f64> = score.scored().filter_map(|e| e.stated_sd).collect();
+    let median = percentile(&stated, 0.5);
+    if median.is_nan() {
+        return None;
+    }
+    let without = || score.scored().filter(|e| e.stated_sd.is_none());
+    let alone = |e: &ElementError| e.alone_bound.map_or(f64::INFINITY, |bound| largest_sd(&bound));
+    let sd = |e: &ElementError| alone(e).min(USEFUL_SD).max(median);
+    let square = |e: &ElementError| (e.across * e.across + e.up * e.up) / sd(e).powi(2);
+    let worst = without().max_by(|a, b| square(a).total_cmp(&square(b)))?;
+    let limit = worst_limit(2.0, without().count());
+    let words = format!(
+        "beam {} states no covariance and is {:.3}° off; {:.3}° is the limit for the worst of {}",
+        worst.beam,
+        libm::hypot(worst.across, worst.up).to_degrees(),
+        (limit.sqrt() * sd(worst)).to_degrees(),
+        counted(without().count())
+    );
+    Some(Gate::at_most("unstated", square(worst), limit, words).with_rate(SIGNIFICANCE))
+}
+
 /// A gate on the share of the scored elements that state something; without any there is nothing to judge.
-fn shares(name: &str, what: &str, with: usize, scored: usize) -> Gate {
+pub(super) fn shares(name: &str, what: &str, with: usize, scored: usize) -> Gate {
     let words = |with: usize| {
         format!(
             "{with} of {scored} scored elements state {what}; at least {:.0} % are required",
@@ -222,12 +257,19 @@ fn open(score: &Score) -> Option<Gate> {
     Some(Gate::at_most("open", share, 0.5, words).with_rate(2e-3))
 }
 
+/// Standard deviation up to which a distance counts as stated, in meters: as far as mirrors are from a scanner.
+const USEFUL_DISTANCE_SD_M: f64 = 0.05;
+
 /// The gates on d.
 fn distances(score: &Score) -> Vec<Gate> {
     let scored = score.scored().count();
     let with: Vec<_> = score.scored().filter(|e| e.has_distance).collect();
-    let mut gates = vec![shares("distances", "d", with.len(), scored)];
-    let deviation = |e: &&super::ElementError| (e.estimate.distance - e.truth.distance) / e.distance_sd;
+    let known = with
+        .iter()
+        .filter(|e| e.distance_sd <= USEFUL_DISTANCE_SD_M)
+        .count();
+    let mut gates = vec![shares("distances", "d", known, scored)];
+    let deviation = |e: &&ElementError| (e.estimate.distance - e.truth.distance) / e.distance_sd;
     let worst = with
         .iter()
         .max_by(|a, b| deviation(a).abs().total_cmp(&deviation(b).abs()));
@@ -258,13 +300,13 @@ fn counted(elements: usize) -> String {
 }
 
 /// Root mean square standard deviation of d, in millimeters.
-fn sd_of(with: &[&super::ElementError]) -> f64 {
+fn sd_of(with: &[&ElementError]) -> f64 {
     let sum: f64 = with.iter().map(|e| e.distance_sd * e.distance_sd).sum();
     1e3 * (sum / with.len() as f64).sqrt()
 }
 
 /// The gate on the mounting.
-fn mounting(score: &Score) -> Gate {
+fn of_mounting(score: &Score) -> Gate {
     let Some(found) = score.mounting else {
         return Gate::without(
             "mounting",
@@ -287,85 +329,55 @@ fn mounting(score: &Score) -> Gate {
     Gate::at_most("mounting", found.nees, limit, words).with_rate(SIGNIFICANCE)
 }
 
-/// Beams inside the fan of a facet as drawn that are not judged, in degrees of the scan: mirrors are off their drawing.
-const DRAWN_WITHIN_DEG: f64 = 3.0;
-
-/// The gate on elements that the drawing has deflected, without a truth: each needs a direction or a reason.
-fn omitted(dataset: &Dataset, calibration: &Calibration) -> Gate {
-    let scan = &dataset.session.scanner.scan;
-    let step = scan.angles().step_deg.abs();
-    let inside = |beam: usize| {
-        let azimuth = scan.azimuth(beam);
-        dataset
-            .session
-            .facets
-            .iter()
-            .filter(|f| scan.holds(f.beams, beam))
-            .any(|f| {
-                let edges = f
-                    .beams
-                    .map(|edge| wrap(scan.azimuth(edge) - azimuth).abs().to_degrees());
-                edges.iter().all(|apart| *apart >= DRAWN_WITHIN_DEG.max(step))
-            })
+/// The gate on the range biases.
+fn biases(dataset: &Dataset, calibration: &Calibration, truth: Option<&Truth>) -> Gate {
+    const NAME: &str = "range_bias";
+    let worst = range_bias::worst(&dataset.session, calibration, truth);
+    let Some(found) = worst else {
+        let why = range_bias::incomparable(calibration, truth);
+        return Gate::without(NAME, Outcome::NotTested, why.unwrap_or("no board has a color"));
     };
-    let missed = (0..scan.beams())
-        .filter(|&beam| inside(beam))
-        .filter(|&beam| match calibration.beam(beam).map(|b| b.status) {
-            None | Some(Status::Direct) => true,
-            Some(
-                Status::Solved
-                | Status::TooFewPoses
-                | Status::Unobservable
-                | Status::NotConverged
-                | Status::Rejected,
-            ) => false,
-        })
-        .count();
+    let (square, limit) = (found.square(), worst_limit(1.0, found.references));
+    let WorstBias {
+        range_m,
+        color,
+        incidence_deg,
+        error_mm,
+        sd_mm,
+        references,
+    } = found;
     let words = format!(
-        "{} deflected by a mirror as drawn, with neither a direction nor a reason",
-        elements(missed, "is", "are")
+        "on a board of color {color:?} at {range_m} m and {incidence_deg:.0}°, the range biases are {error_mm:+.2} mm off, {:.1} times their standard deviation of {sd_mm:.2} mm; {:.1} times is the limit for the worst of {references} references",
+        square.sqrt(),
+        limit.sqrt(),
     );
-    Gate::at_most("missed", missed as f64, 0.0, words)
+    Gate::at_most(NAME, square, limit, words).with_rate(SIGNIFICANCE)
 }
 
-/// The gates of a score without a truth: how much is stated, and the residuals on boards and walls.
-fn blind(score: &Score) -> Vec<Gate> {
-    let mut gates = vec![shares(
-        "covariance",
-        "a covariance",
-        score.blind_stated,
-        score.beams.solved,
-    )];
-    if score.beams.solved == 0 {
-        gates.push(Gate::without("solved", Outcome::Fail, "no element is solved"));
-        return gates;
-    }
-    let limit = median_limit();
-    let mut judged = false;
-    for (name, residual, normalized) in [
-        ("boards", &score.boards_mm, score.boards_normalized),
-        ("walls", &score.walls_mm, score.walls_normalized),
-    ] {
-        if normalized.is_nan() {
-            gates.push(Gate::without(
-                name,
-                Outcome::NotTested,
-                format!("no solved element reads {name}"),
-            ));
-            continue;
-        }
-        judged = true;
-        let words = format!(
-            "the points are {:.2} mm (rms) off the {name}, and the median element {:.1} times what noise, drift, markers, biases and covariances allow; {:.1} times is the limit",
-            residual.rms,
-            normalized.sqrt(),
-            limit.sqrt()
-        );
-        gates.push(Gate::at_most(name, normalized, limit, words).with_rate(SIGNIFICANCE));
-    }
-    if !judged {
-        let words = "no solved element reads a board or a wall: there is nothing to judge by";
-        gates.push(Gate::without("residuals", Outcome::NotJudged, words));
-    }
-    gates
+/// The gate on what the calibration claims to know of the mounting: no more than a few times less than the drawing.
+fn mounting_claim(dataset: &Dataset, calibration: &Calibration) -> Option<Gate> {
+    let estimate = calibration.rig_from_sensor.as_ref()?;
+    let over = mounting::over_drawing(estimate, &dataset.session.mount_tolerance)?;
+    let limit = mounting::MOST_OVER_DRAWING;
+    let words = format!(
+        "the mounting's stated standard deviations are up to {over:.1} times the drawing's tolerance; {limit} times is the limit of what is of use"
+    );
+    Some(Gate::at_most("mounting_claim", over, limit, words))
+}
+
+/// The gate on boards that the calibration was not fitted to, if it was cross-validated.
+///
+/// If all differences are one and the same, their mean square over the expected one is χ² with one degree of freedom.
+fn held_out(calibration: &Calibration) -> Option<Gate> {
+    let found = calibration.assessment.as_ref()?.held_out?;
+    let expected = libm::hypot(found.expected_mm, ROUNDING_MM);
+    let (square, limit) = ((found.rms_mm / expected).powi(2), mean_limit(1.0));
+    let words = format!(
+        "the {} boards that were held out are {:.2} mm (rms) off their prediction, {:.1} times the {expected:.2} mm expected; {:.1} times is the limit",
+        found.boards,
+        found.rms_mm,
+        square.sqrt(),
+        limit.sqrt()
+    );
+    Some(Gate::at_most("held_out", square, limit, words).with_rate(SIGNIFICANCE))
 }

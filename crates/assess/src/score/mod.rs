@@ -20,6 +20,7 @@
 //! that do not exist are NaN here and `null` in JSON, with the reason in `nulls`.
 
 mod allowed;
+mod blind;
 mod bound;
 pub mod counts;
 mod directions;
@@ -34,6 +35,7 @@ mod mistake;
 mod mistakes;
 mod mounting;
 mod nulls;
+mod range_bias;
 pub mod residual;
 mod statistics;
 mod verdict;
@@ -57,7 +59,7 @@ pub(crate) use statistics::mahalanobis_squared;
 pub use bound::{Knowable, knowable};
 pub use bound::{bounds, true_directions};
 pub use directions::POINT_RANGES_M;
-pub use element::ElementError;
+pub use element::{ElementError, USEFUL_SD};
 pub use figures::{ApartScore, BeamCounts, DistanceError, OpenCounts, PointError, Score, Spread};
 pub use gate::{Gate, MIN_SOLVED, Outcome};
 pub use mistake::Mistake;
@@ -101,6 +103,7 @@ pub fn score_by(
     // An entry that is not valid has no figures.
     let nothing = Calibration {
         beams: Vec::new(),
+        bias: None,
         ..calibration.clone()
     };
     let given = calibration;
@@ -165,7 +168,11 @@ pub fn score_by(
         beams: count(calibration, truth),
         open: knowable.map(|k| open(calibration, &elements, &k.open)),
         knowable: knowable.map(|k| k.well.len()),
-        knowable_solved: knowable.map(|k| elements.iter().filter(|e| k.well.contains(&e.beam)).count()),
+        knowable_solved: knowable.map(|k| {
+            let useful = |e: &&ElementError| e.stated_sd.is_none_or(|sd| sd <= USEFUL_SD);
+            let well = elements.iter().filter(|e| k.well.contains(&e.beam));
+            well.filter(useful).count()
+        }),
         stated: mahalanobis.len() as f64 / scored.len() as f64,
         statuses: statuses(dataset, calibration),
         direction_deg: in_sensor.spread_deg(),
@@ -180,6 +187,8 @@ pub fn score_by(
             max: largest(with_distance().map(|e| 1e3 * off(e).abs())),
         },
         distance_nees: mean(with_distance().map(|e| (off(e) / e.distance_sd).powi(2))),
+        range_bias_mm: range_bias::worst(&dataset.session, calibration, truth)
+            .map_or(f64::NAN, |worst| worst.error_mm),
         mounting,
         point_mm: in_sensor.point_mm,
         point_room_mm: in_room.point_mm,
@@ -208,13 +217,20 @@ pub fn score_by(
         blind_stated: calibration
             .beams
             .iter()
-            .filter(|b| element::solved(b).is_some() && b.covariance_rad2.is_some())
+            .filter(|b| element::usefully_solved(b) && b.covariance_rad2.is_some())
             .count(),
+        useless: calibration
+            .beams
+            .iter()
+            .filter(|b| element::solved(b).is_some() && !element::usefully_solved(b))
+            .count(),
+        boards_by_mirror: boards.by_mirror,
+        walls_by_mirror: walls.by_mirror,
     };
     score.elements = elements;
     if invalid {
         score.gates = vec![judge::valid(&problems)];
-        score.nulls = nulls::nulls(&score, calibration, truth.is_some());
+        score.nulls = nulls::nulls(&score, calibration, truth);
         if let Some((truth, knowable)) = reference {
             score.mistakes = mistakes_of_invalid(&score, dataset, given, truth, knowable);
             score.remarks = score.mistakes.iter().map(ToString::to_string).collect();

@@ -16,6 +16,9 @@ const DRAWN: [f64; 2] = [1e-3, 0.1 * std::f64::consts::PI / 180.0];
 /// Rounding of files, in meters and radians.
 const ROUNDING: f64 = 1e-6;
 
+/// Largest standard deviation of a mounting that is of use, in tolerances of the drawing, which any calibration can state.
+pub(super) const MOST_OVER_DRAWING: f64 = 3.0;
+
 /// The error of the mounting.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Mounting {
@@ -61,6 +64,13 @@ impl Mounting {
             states_covariance: estimate.covariance.is_some(),
         }
     }
+}
+
+/// The stated standard deviation that is largest over the drawing's tolerance, as their quotient; `None` without a covariance.
+pub(super) fn over_drawing(estimate: &MountEstimate, tolerance: &MountTolerance) -> Option<f64> {
+    let (stated, drawn) = (estimate.covariance?, of_tolerance(tolerance));
+    let over = (0..6).map(|i| (stated[i][i] / drawn[(i, i)]).sqrt());
+    Some(over.fold(0.0, f64::max))
 }
 
 /// The tolerance of the drawing as a covariance.

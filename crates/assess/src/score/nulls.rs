@@ -2,15 +2,18 @@
 
 use super::Score;
 use super::gate::ENOUGH;
+use super::range_bias;
 use catoptric_model::Calibration;
+use catoptric_sim::Truth;
 use std::collections::BTreeMap;
 
 /// Returns the keys of the figures that are not finite, with the reasons.
 pub(super) fn nulls(
     score: &Score,
     calibration: &Calibration,
-    has_truth: bool,
+    truth: Option<&Truth>,
 ) -> BTreeMap<&'static str, &'static str> {
+    let has_truth = truth.is_some();
     let no_mount = "the calibration has no rig_from_sensor";
     let too_few = "no rotation is determined by these directions";
     let none_scored = "no solved element is deflected and unsplit in truth";
@@ -69,6 +72,11 @@ pub(super) fn nulls(
             "distance_nees",
             score.distance_nees,
             because("no scored element has a distance_m"),
+        ),
+        (
+            "range_bias_mm",
+            score.range_bias_mm,
+            range_bias::incomparable(calibration, truth).unwrap_or("no board has a color"),
         ),
         ("stated", score.stated, because(none_scored)),
         ("point_mm", score.point_mm.at_1m, because(none_scored)),

@@ -11,6 +11,7 @@ use catoptric_model::{RangeBias, RawRange, Unreadable};
 use nalgebra::Unit;
 use rayon::prelude::*;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Distances of lifted points from the surfaces they were measured on, positive behind the surface, in millimeters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -28,7 +29,7 @@ pub struct SurfaceResidual {
 }
 
 /// Standard deviation of a mean of readings that are whole millimeters, in millimeters.
-const ROUNDING_MM: f64 = 0.3;
+pub(super) const ROUNDING_MM: f64 = 0.3;
 
 /// The surface that a beam is expected to hit.
 struct Surface {
@@ -44,6 +45,16 @@ pub(super) struct Judged {
     pub(super) residual: SurfaceResidual,
     /// Median over elements and stretches of the squared mean residual over its variance; NaN if it was not asked for.
     pub(super) normalized: f64,
+    /// The same for the elements of each mirror.
+    pub(super) by_mirror: Vec<Normalized>,
+}
+
+/// Size of the residuals of one mirror's elements in units of what is allowed.
+#[derive(Debug, Clone)]
+pub(super) struct Normalized {
+    pub(super) facet: String,
+    /// Median over elements and stretches of the squared mean residual over its variance.
+    pub(super) median: f64,
 }
 
 /// One element's residuals over one stretch.
@@ -195,14 +206,43 @@ where
     let visits: Vec<Vec<Visit>> = stretches.par_iter().map(of_stretch).collect::<Result<_, _>>()?;
     let visits: Vec<Visit> = visits.into_iter().flatten().collect();
     let believed = &dataset.session.believed;
-    let squares: Vec<f64> = visits
+    let squares: Vec<(usize, f64)> = visits
         .iter()
-        .filter_map(|v| v.normalized_square(believed.noise_sd(v.on.predicted, &v.on.color) * 1e3))
+        .filter_map(|v| {
+            let noise_sd_mm = believed.noise_sd(v.on.predicted, &v.on.color) * 1e3;
+            Some((v.beam, v.normalized_square(noise_sd_mm)?))
+        })
         .collect();
+    let all: Vec<f64> = squares.iter().map(|(_, square)| *square).collect();
     Ok(Judged {
         residual: summarize(&visits),
-        normalized: percentile(&squares, 0.5),
+        normalized: percentile(&all, 0.5),
+        by_mirror: by_mirror(dataset, calibration, &squares),
     })
+}
+
+/// The squared residuals of some beams by mirror: the one that the calibration names, else the one whose fan as drawn is
+/// nearest.
+fn by_mirror(dataset: &Dataset, calibration: &Calibration, squares: &[(usize, f64)]) -> Vec<Normalized> {
+    let session = &dataset.session;
+    let scan = &session.scanner.scan;
+    let place = |beam: usize| {
+        let named = calibration.beam(beam).and_then(|b| b.facet.as_ref());
+        let named = named.and_then(|name| session.facets.iter().position(|f| f.name == *name));
+        named
+            .or_else(|| (0..session.facets.len()).min_by_key(|f| scan.beside(session.facets[*f].beams, beam)))
+    };
+    let mut of_mirror: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    for (beam, square) in squares {
+        if let Some(facet) = place(*beam) {
+            of_mirror.entry(facet).or_default().push(*square);
+        }
+    }
+    let normalized = |(facet, squares): (usize, Vec<f64>)| Normalized {
+        facet: session.facets[facet].name.clone(),
+        median: percentile(&squares, 0.5),
+    };
+    of_mirror.into_iter().map(normalized).collect()
 }
 
 impl Visit {

@@ -1,5 +1,7 @@
 //! Tests of scores: the truth has no error, known errors yield the expected figures, and every element is counted once.
 
+mod claims;
+
 use super::element::wrap;
 use super::*;
 use crate::requirement::Requirement;
@@ -433,7 +435,7 @@ fn json_has_the_keys_of_the_interface() {
     assert_eq!(json["open"]["elements"], 0);
     assert_eq!(
         json["nulls"].as_object().map(serde_json::Map::len),
-        Some(4),
+        Some(5),
         "{}",
         json["nulls"]
     );

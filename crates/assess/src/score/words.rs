@@ -5,7 +5,7 @@ use super::honesty;
 use super::mistakes;
 use super::nulls::nulls;
 use super::verdict::{DOUBTFUL, Honesty, UNDER};
-use super::{Score, judge};
+use super::{Score, USEFUL_SD, judge};
 use catoptric_model::{Calibration, Dataset, Pose, Status};
 use catoptric_sim::Truth;
 use std::collections::BTreeMap;
@@ -41,7 +41,7 @@ pub(super) fn judge(
     rig: Option<&Pose>,
 ) -> Score {
     score.honesty = honesty::of(&score);
-    score.gates = judge::gates(&score, dataset, calibration, truth.is_some());
+    score.gates = judge::gates(&score, dataset, calibration, truth);
     let is_met = |g: &Gate| matches!(g.outcome, Outcome::Pass | Outcome::NotTested);
     let suspicious = !score.gates.iter().all(is_met)
         || score.honesty == Some(Honesty::UnderConfident)
@@ -52,7 +52,7 @@ pub(super) fn judge(
     score.remarks = score.mistakes.iter().map(ToString::to_string).collect();
     let remarks = warnings(&score, calibration, truth.is_some());
     score.remarks.extend(remarks);
-    score.nulls = nulls(&score, calibration, truth.is_some());
+    score.nulls = nulls(&score, calibration, truth);
     score.settled()
 }
 
@@ -85,6 +85,14 @@ fn warnings(score: &Score, calibration: &Calibration, has_truth: bool) -> Vec<St
         warnings.push(format!(
             "{} of {scored} scored elements have no covariance",
             scored - stated
+        ));
+    }
+    if score.useless > 0 {
+        warnings.push(format!(
+            "useless: {} a standard deviation above {:.0}°, and {} not count as solved",
+            elements(score.useless, "states", "state"),
+            USEFUL_SD.to_degrees(),
+            if score.useless == 1 { "does" } else { "do" }
         ));
     }
     let share = common_share(score);

@@ -10,18 +10,23 @@ const STRUCTURE: &str = "structure";
 /// then A_a, then E_c of each color of a board, and last the drift while the bare structure was ranged, if the scanner
 /// itself ranged it.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct CommonErrors<'a> {
+pub struct CommonErrors<'a> {
     session: &'a Session,
     colors: Vec<&'a str>,
 }
 
 impl<'a> CommonErrors<'a> {
     /// The uncertain numbers of a session.
-    pub(crate) fn of(session: &'a Session) -> Self {
+    pub fn of(session: &'a Session) -> Self {
         let mut colors: Vec<&str> = session.boards.iter().map(|b| b.color.as_str()).collect();
         colors.sort_unstable();
         colors.dedup();
         Self { session, colors }
+    }
+
+    /// Colors of the boards, sorted.
+    pub fn colors(&self) -> &[&'a str] {
+        &self.colors
     }
 
     /// Number of them.
@@ -33,7 +38,7 @@ impl<'a> CommonErrors<'a> {
     /// Error of a corrected range per standard deviation of each number, in meters.
     ///
     /// A_a is uncertain with A_a + B_a, the error at normal incidence, held fixed: its column is cos θ_N − 1.
-    pub(crate) fn row(&self, range: f64, cos_incidence: f64, color: &str) -> RowDVector<f64> {
+    pub fn row(&self, range: f64, cos_incidence: f64, color: &str) -> RowDVector<f64> {
         let mut row = RowDVector::zeros(self.len());
         for (number, error) in self.entries(range, cos_incidence, self.place(color)) {
             row[number] += error;
@@ -83,7 +88,7 @@ impl<'a> CommonErrors<'a> {
     }
 
     /// Name of each number, and its standard deviation in the unit of that name.
-    pub(crate) fn named(&self) -> Vec<(String, f64)> {
+    pub fn named(&self) -> Vec<(String, f64)> {
         let beliefs = &self.session.believed;
         let nodes = beliefs.bias.distance.range_m.iter();
         let nodes = nodes.map(|range| (format!("E_r at {range} m (mm)"), beliefs.distance_bias_sd_mm));

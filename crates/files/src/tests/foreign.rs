@@ -8,12 +8,12 @@ use mcap::records::MessageHeader;
 use std::collections::BTreeMap;
 
 /// A message: topic, when it was logged, and its bytes.
-type Logged = (String, u64, Vec<u8>);
+pub(super) type Logged = (String, u64, Vec<u8>);
 
-const BEAMS: usize = 20;
+pub(super) const BEAMS: usize = 20;
 
 /// Three stretches, at rest, each with jitter of its markers and its poses.
-fn original(session: &Session) -> Vec<Stretch> {
+pub(super) fn original(session: &Session) -> Vec<Stretch> {
     let stretch = |pose: usize| {
         let mut stretch = stretch(session, pose, 8, 30, 5 + pose as u64);
         let mut numbers = Numbers(77 + pose as u64);
@@ -27,7 +27,7 @@ fn original(session: &Session) -> Vec<Stretch> {
     (0..3).map(stretch).collect()
 }
 
-fn messages(bytes: &[u8]) -> Vec<Logged> {
+pub(super) fn messages(bytes: &[u8]) -> Vec<Logged> {
     let all = mcap::MessageStream::new(bytes).expect("ours");
     all.map(|message| {
         let message = message.expect("whole");
@@ -41,7 +41,7 @@ fn messages(bytes: &[u8]) -> Vec<Logged> {
 }
 
 /// The recording with other messages, on the channels of the original.
-fn written(bytes: &[u8], messages: &[Logged]) -> Vec<u8> {
+pub(super) fn written(bytes: &[u8], messages: &[Logged]) -> Vec<u8> {
     let mut out = io::Cursor::new(Vec::new());
     let mut writer = mcap::WriteOptions::new()
         .compression(None)
@@ -75,7 +75,7 @@ fn written(bytes: &[u8], messages: &[Logged]) -> Vec<u8> {
     out.into_inner()
 }
 
-fn dataset(session: &Session, bytes: Vec<u8>) -> Dataset {
+pub(super) fn dataset(session: &Session, bytes: Vec<u8>) -> Dataset {
     parse_dataset(session.clone(), bytes).expect("it is read")
 }
 

@@ -5,6 +5,7 @@ mod datasets;
 mod foreign;
 mod recordings;
 mod surveys;
+mod unsteady;
 
 use super::error::IoError;
 use super::playback::parse_recording;

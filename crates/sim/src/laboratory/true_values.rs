@@ -6,6 +6,7 @@ use crate::build::trajectory::Trajectory;
 use crate::error::SimError;
 use crate::laboratory::truth::{self, TrueBeam, TrueFacet, TruePose, Truth};
 use crate::light::optics::{End, Mirrors, Setting};
+use crate::scene::ErrorModel;
 use catoptric_model::{Deflection, PoseData};
 use rayon::prelude::*;
 
@@ -30,6 +31,7 @@ impl Laboratory {
             room_from_rig: PoseData::from(&room_from_rig(&self.scene.room)),
             rig_from_sensor: PoseData::from(&self.structure.rig_from_sensor),
             bias: self.sensor.bias().clone(),
+            detector_errors: matches!(self.scene.errors.model, ErrorModel::Physical | ErrorModel::Both),
             facets: facets
                 .iter()
                 .map(|f| TrueFacet {

@@ -3,6 +3,7 @@
 pub use crate::receive::reading::BeamClass;
 
 use crate::scene::Mishap;
+use crate::scene::omit::is_false;
 use catoptric_model::beam::{self, Deflection};
 use catoptric_model::limits;
 use catoptric_model::{PoseData, PoseKind, RangeBias};
@@ -30,6 +31,9 @@ pub struct Truth {
     pub rig_from_sensor: PoseData,
     /// Biases of the sensor.
     pub bias: RangeBias,
+    /// Whether the detector has errors of its own, which follow from the received power and are not part of `bias`.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub detector_errors: bool,
     /// The mirrors as built.
     pub facets: Vec<TrueFacet>,
     /// What the structure does to the light of every beam, boards aside.

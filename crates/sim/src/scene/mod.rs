@@ -11,7 +11,7 @@ pub(crate) mod facet;
 mod flight;
 mod meshes;
 mod mishap;
-mod omit;
+pub(crate) mod omit;
 mod parameter;
 mod pattern;
 mod preset;

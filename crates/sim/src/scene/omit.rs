@@ -1,6 +1,6 @@
 //! Default values that are omitted from files.
 
-pub(super) fn is_false(value: &bool) -> bool {
+pub(crate) fn is_false(value: &bool) -> bool {
     !value
 }
 
