@@ -41,6 +41,8 @@ fn rectangle(scene: &Scene, center: Point3<f64>, normal: Vector3<f64>, half: [f6
 fn rectangle_facet(name: String, center_mm: Vector3<f64>, normal: Vector3<f64>, size_mm: [f64; 2]) -> Facet {
     Facet {
         name,
+        curve: None,
+        bow_um: 0.0,
         two_sided: false,
         reflectivity: None,
         coating: None,
@@ -70,6 +72,8 @@ fn random_scene(draws: &mut Draws, round: usize) -> Scene {
             let facing = -at.normalize() + draws.normal3() * 0.4;
             let center = Vector3::new(at.x, at.y, 0.1 * at.z);
             Facet {
+                curve: None,
+                bow_um: 0.0,
                 two_sided: k % 2 == 0,
                 reflectivity: None,
                 coating: None,

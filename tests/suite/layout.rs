@@ -169,6 +169,8 @@ fn one_facet() -> Scene {
     scene.superstructure.facet.push(Facet {
         name: "mirror".to_owned(),
         shape: FacetShape::Polygon(PolygonShape { corners_mm }),
+        curve: None,
+        bow_um: 0.0,
         two_sided: false,
         reflectivity: None,
         coating: None,

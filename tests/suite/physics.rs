@@ -135,6 +135,8 @@ fn traced(
         .enumerate()
         .map(|(i, corners)| Facet {
             name: format!("facet-{i}"),
+            curve: None,
+            bow_um: 0.0,
             two_sided: false,
             reflectivity: None,
             coating: None,
@@ -242,6 +244,8 @@ fn a_45_degree_mirror_and_a_wall_add_their_two_legs() {
     let mut scene = scene(BARE);
     scene.superstructure.facet.push(Facet {
         name: "fold".to_owned(),
+        curve: None,
+        bow_um: 0.0,
         two_sided: false,
         reflectivity: None,
         coating: None,

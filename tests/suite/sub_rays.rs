@@ -199,6 +199,8 @@ fn light_that_hits_nothing_has_no_position() {
     scene.superstructure.max_bounces = 1;
     let facet = |name: &str, center_mm: [f64; 3], normal: [f64; 3]| Facet {
         name: name.to_owned(),
+        curve: None,
+        bow_um: 0.0,
         two_sided: false,
         reflectivity: None,
         coating: None,

@@ -7,6 +7,7 @@ use crate::method::{BATCH, GENERALIZED, Method, Scope};
 use crate::options::Options;
 use crate::prepare::{believable, prepare};
 use crate::screen;
+use catoptric_model::session::NominalFacet;
 use catoptric_model::{Calibration, Dataset, Stop, calibration};
 
 /// Calibrates a recorded experiment: one entry for every beam of the scanner, in order.
@@ -76,10 +77,28 @@ pub fn calibrate_until(
         Scope::Together(extent) => {
             // Each element is solved separately first, which decides whether its readings are usable and which boards it hits.
             calibration.beams = element::estimates(&work, &GENERALIZED, &candidates, &built)?;
-            let assigned = joint::assigned(&work, &candidates, &built, &calibration.beams);
+            let mut assigned = joint::assigned(&work, &candidates, &built, &calibration.beams);
+            let facets = &dataset.session.facets;
+            assigned.retain(|element| facets[element.facet].curve.is_none());
+            calibration.warnings.extend(curved(facets));
             joint::together(*extent, &work, mount, &built, &assigned, &mut calibration);
         }
     }
     stop.check()?;
     Ok(calibration)
+}
+
+/// A sentence about the facets that are drawn as not flat, if there are any.
+fn curved(facets: &[NominalFacet]) -> Option<String> {
+    let names: Vec<String> = facets
+        .iter()
+        .filter(|f| f.curve.is_some())
+        .map(|f| format!("{:?}", f.name))
+        .collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "not flat as drawn: {}; their elements share no plane, and each was solved individually",
+            names.join(", ")
+        )
+    })
 }

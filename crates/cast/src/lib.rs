@@ -1,6 +1,7 @@
-//! Rays against surfaces: polygons, boxes, cylinders and triangle meshes, one ray at a time or many in lanes.
+//! Rays against surfaces: polygons, curved mirrors, boxes, cylinders and triangle meshes, one ray at a time or many in lanes.
 //!
-//! Facets, boards and walls are exact plane polygons; posts and the housing are exact boxes and cylinders. All are in one
+//! Facets, boards and walls are exact plane polygons, and curved facets exact quadrics over them; posts and the housing are
+//! exact boxes and cylinders. All are in one
 //! bounding volume hierarchy, eight children wide, whether a ray is cast alone or in a packet; a mesh has its own of the
 //! same kind below it. A ray that leaves a mirror excludes that mirror by index, never by an epsilon. Indices are built and
 //! traversed in f32 and conservatively; what is hit, and how far away, is decided in f64.
@@ -34,6 +35,8 @@
 //! | intersection filter | the index to leave out, `except` |
 //! | `RTC_SCENE_FLAG_ROBUST` | always: edges are watertight, in f64 |
 
+#[cfg(test)]
+mod curved_tests;
 mod hit;
 mod index;
 mod lanes;
@@ -56,5 +59,5 @@ pub use packet::{PACKET, Rays};
 pub use ray::{Ray, placed};
 pub use shape::Shape;
 pub use skin::{CYLINDER_FACES, Triangle, volume};
-pub use solid::{Block, Cylinder, Polygon, area_vector};
+pub use solid::{Block, Curved, Cylinder, Polygon, area_vector};
 pub use world::World;

@@ -1,10 +1,10 @@
-//! The surfaces that a ray can hit: polygon, box, cylinder or mesh.
+//! The surfaces that a ray can hit: polygon, curved mirror, box, cylinder or mesh.
 
 use crate::hit::NONE;
 use crate::mesh::Triangles;
 use crate::ray::Ray;
 use crate::solid::block::to_glam;
-use crate::solid::{Block, Cylinder, Polygon};
+use crate::solid::{Block, Curved, Cylinder, Polygon};
 use nalgebra::{Point3, Unit, Vector3};
 use parry3d::bounding_volume::Aabb;
 use parry3d::math::Vector;
@@ -21,6 +21,8 @@ pub enum Shape {
     Cylinder(Cylinder),
     /// A mesh.
     Mesh(Arc<Triangles>),
+    /// A curved mirror.
+    Curved(Arc<Curved>),
 }
 
 /// Padding of a bounding box, in meters: a plane polygon's box is flat, and rounding must not make a ray miss it.
@@ -33,6 +35,7 @@ impl Shape {
             Self::Block(block) => padded(block.corners().into_iter()),
             Self::Cylinder(cylinder) => padded(cylinder.corners().into_iter()),
             Self::Mesh(mesh) => padded(mesh.vertices().iter().copied()),
+            Self::Curved(curved) => padded(curved.corners()),
         }
     }
 
@@ -46,6 +49,7 @@ impl Shape {
                 let hit = mesh.cast(ray)?;
                 Some((hit.distance, hit.triangle))
             }
+            Self::Curved(curved) => Some((curved.cast(ray)?, NONE)),
         }
     }
 
@@ -56,6 +60,10 @@ impl Shape {
             Self::Block(block) => block.cast(ray),
             Self::Cylinder(cylinder) => cylinder.cast(ray),
             Self::Mesh(mesh) => mesh.intersect(ray),
+            Self::Curved(curved) => {
+                let distance = curved.cast(ray)?;
+                Some((distance, curved.normal(ray, distance)))
+            }
         }
     }
 
@@ -78,7 +86,12 @@ impl Shape {
                     && (a.radius, a.half_height) == (b.radius, b.half_height)
             }
             (Self::Mesh(a), Self::Mesh(b)) => Arc::ptr_eq(a, b),
-            (Self::Polygon(_) | Self::Block(_) | Self::Cylinder(_) | Self::Mesh(_), _) => false,
+            (Self::Curved(a), Self::Curved(b)) => {
+                a.outline.corners == b.outline.corners && a.surface == b.surface
+            }
+            (Self::Polygon(_) | Self::Block(_) | Self::Cylinder(_) | Self::Mesh(_) | Self::Curved(_), _) => {
+                false
+            }
         }
     }
 
@@ -90,6 +103,14 @@ impl Shape {
         };
         self.intersect(&ray)
             .is_some_and(|(_, normal)| normal.dot(&ray.direction) > 0.0)
+    }
+
+    /// Returns the distance at which a ray that leaves the shape hits it again: only a curved mirror can be.
+    pub(crate) fn hit_again(&self, ray: &Ray) -> Option<(f64, u32)> {
+        match self {
+            Self::Curved(curved) => Some((curved.cast_again(ray)?, NONE)),
+            Self::Polygon(_) | Self::Block(_) | Self::Cylinder(_) | Self::Mesh(_) => None,
+        }
     }
 
     /// Returns the distance at which a ray hits the shape.

@@ -21,13 +21,15 @@ const BOX_FACES: [[usize; 4]; 6] = [
 ];
 
 impl Shape {
-    /// Returns the surface as triangles, in meters: closed for a body, a single sheet for a polygon.
+    /// Returns the surface as triangles, in meters: closed for a body, a single sheet for a polygon or
+    /// a curved mirror.
     pub fn triangles(&self) -> Vec<Triangle> {
         match self {
             Self::Polygon(polygon) => polygon.triangles(),
             Self::Block(block) => block.triangles(),
             Self::Cylinder(cylinder) => cylinder.triangles(),
             Self::Mesh(mesh) => mesh.skin(),
+            Self::Curved(curved) => curved.triangles(),
         }
     }
 }

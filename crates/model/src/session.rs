@@ -7,9 +7,11 @@ use crate::beam::Deflection;
 use crate::bias::{DistanceBias, RangeBias};
 use crate::board::{BoardPlane, Rectangle};
 use crate::characterization::{Characterization, NoiseRow};
+use crate::curve::Curve;
 use crate::frame::{Pose, PoseData};
 use crate::glass::GlassSheet;
 use crate::limits;
+use crate::mirror::MirrorPlane;
 use crate::noise::Noise;
 use crate::scan::{ScanAngles, ScanDirection, ScanError, ScanGeometry};
 use nalgebra::{Point3, Translation3, Unit, Vector3};
@@ -276,6 +278,9 @@ pub struct NominalFacet {
     /// Corners in the nominal sensor frame, in millimeters, counter-clockwise seen from the reflecting side.
     #[schemars(length(min = 3), inner(inner(range(min = -limits::FAR_MM, max = limits::FAR_MM))))]
     pub corners_mm: Vec<[f64; 3]>,
+    /// What it is instead of flat.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub curve: Option<Curve>,
     /// First and last beam that hit this facet, according to the drawing.
     #[schemars(inner(range(max = limits::LAST_BEAM)))]
     pub beams: [usize; 2],
@@ -370,6 +375,15 @@ impl NominalFacet {
             Point3::from(center),
             Unit::try_new(normal, f64::MIN_POSITIVE)?,
         ))
+    }
+}
+
+impl NominalFacet {
+    /// The plane that touches a mirror that is not flat where a beam from the origin hits it; `None` for a flat mirror, or
+    /// where the beam misses its reflecting side.
+    pub fn touched(&self, u: &Unit<Vector3<f64>>) -> Option<MirrorPlane> {
+        let normal = self.plane()?.normal;
+        self.curve?.over(&self.corners(), &normal, 0.0)?.plane_along(u)
     }
 }
 

@@ -193,6 +193,8 @@ fn facet(side: &str, index: usize, sign: f64, &(width, distance_mm, turn, elevat
     let last = first + width;
     Facet {
         name: format!("{side}-{}", index + 1),
+        curve: None,
+        bow_um: 0.0,
         two_sided: false,
         reflectivity: None,
         coating: None,

@@ -1,6 +1,7 @@
 //! Chooses the boards that an element hits: those that hold its spot at the current estimate and whose range agrees.
 
 use crate::element::attempt::{Attempt, MIN_BOARDS, Workspace};
+use crate::element::facet_plane::plane_at;
 use crate::readings::observations::{azimuth, cone_half_angle};
 use catoptric_model::session::NominalFacet;
 use catoptric_model::{BeamEstimate, Deflection, MirrorPlane, beam};
@@ -70,7 +71,8 @@ pub(crate) fn boards_hit(
     mirror: &MirrorPlane,
 ) -> Option<Vec<usize>> {
     let session = &work.dataset.session;
-    let by_plane = mirror.deflect(beam::direction(azimuth(session, estimate.beam)))?;
+    let u = beam::direction(azimuth(session, estimate.beam));
+    let by_plane = plane_at(facet, mirror, &u).deflect(u)?;
     boards_at(
         work,
         estimate.beam,
@@ -89,7 +91,8 @@ pub(crate) fn boards_at(
     at: &Deflection,
 ) -> Option<Vec<usize>> {
     let session = &work.dataset.session;
-    let by_plane = mirror.deflect(beam::direction(azimuth(session, beam)))?;
+    let u = beam::direction(azimuth(session, beam));
+    let by_plane = plane_at(facet, mirror, &u).deflect(u)?;
     Some(choose(
         &Attempt::new(work, session, beam, facet, &by_plane),
         at,

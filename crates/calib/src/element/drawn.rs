@@ -1,5 +1,6 @@
 //! The baseline that a calibration has to improve on: the drawing, with nothing measured but d.
 
+use crate::element::facet_plane::plane_at;
 use crate::element::solve::BareDistance;
 use crate::readings::bare::Bare;
 use crate::readings::observations::azimuth;
@@ -22,9 +23,10 @@ pub(crate) fn as_drawn(
             BeamEstimate::without_angles(beam, Status::Rejected, Some(reason.clone()))
         }
         ScreenClass::Deflected(near) => {
-            let found = near
-                .iter()
-                .find_map(|f| Some((f, drawn[*f].deflect(beam::direction(azimuth(session, beam)))?)));
+            let found = near.iter().find_map(|f| {
+                let u = beam::direction(azimuth(session, beam));
+                Some((f, plane_at(&session.facets[*f], &drawn[*f], &u).deflect(u)?))
+            });
             let Some((facet, deflection)) = found else {
                 let reason = Some("the drawing has no mirror that faces it".to_owned());
                 return BeamEstimate::without_angles(beam, Status::Rejected, reason);

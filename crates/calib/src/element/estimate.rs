@@ -3,6 +3,7 @@
 
 use crate::element::attempt::{Attempt, ElementFit, Failure, MIN_BOARDS, Workspace, lost};
 use crate::element::choose::choose;
+use crate::element::facet_plane::plane_at;
 use crate::element::initial::{self, FARTHEST_START};
 use crate::element::single::blocks;
 use crate::element::solve::{self, SoleElement, Solution};
@@ -106,7 +107,8 @@ fn estimate(
         facet: Some(facet.name.clone()),
         ..BeamEstimate::without_angles(beam, status, Some(reason))
     };
-    let Some(nominal) = mirror.deflect(beam::direction(azimuth)) else {
+    let u = beam::direction(azimuth);
+    let Some(nominal) = plane_at(facet, mirror, &u).deflect(u) else {
         let reason = format!("the plane of facet {:?} does not face it", facet.name);
         return without(Status::Rejected, reason);
     };

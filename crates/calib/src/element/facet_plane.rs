@@ -18,6 +18,11 @@ pub(crate) fn plane_as_drawn(facet: &NominalFacet) -> Result<MirrorPlane, CalibE
     Ok(MirrorPlane::through(plane.point, plane.normal))
 }
 
+/// The plane of a facet where a beam meets it: that which its drawn curve touches there, or the facet's own.
+pub(crate) fn plane_at(facet: &NominalFacet, plane: &MirrorPlane, u: &Unit<Vector3<f64>>) -> MirrorPlane {
+    facet.touched(u).unwrap_or(*plane)
+}
+
 /// The planes of all facets as estimated from their solved elements, or as drawn if there are too few.
 pub(crate) fn as_built(
     session: &Session,
@@ -30,12 +35,16 @@ pub(crate) fn as_built(
         .collect()
 }
 
-/// The plane that most of a facet's solved elements agree on: medians, which are robust to a few outliers.
+/// The plane that most of a facet's solved elements agree on: medians, which are robust to a few outliers. A mirror that is
+/// drawn as not flat has none.
 pub(crate) fn plane_as_built(
     session: &Session,
     facet: &NominalFacet,
     solved: &[BeamEstimate],
 ) -> Option<MirrorPlane> {
+    if facet.curve.is_some() {
+        return None;
+    }
     let mut planes: Vec<MirrorPlane> = Vec::new();
     for estimate in solved.iter().filter(|e| e.facet.as_ref() == Some(&facet.name)) {
         let Some(deflection) = estimate.deflection() else {

@@ -2,7 +2,7 @@
 
 use crate::calibrate::calibrate;
 use crate::element::choose;
-use crate::element::facet_plane::{plane_as_built, plane_as_drawn};
+use crate::element::facet_plane::{plane_as_built, plane_as_drawn, plane_at};
 use crate::error::CalibError;
 use crate::judge::covariance::MountUncertainty;
 use crate::method::Method;
@@ -230,7 +230,8 @@ impl Fan {
         };
         for beam in session.scanner.scan.run(facet.beams) {
             let azimuth = azimuth(session, beam);
-            let Some(deflection) = plane.deflect(beam::direction(azimuth)) else {
+            let u = beam::direction(azimuth);
+            let Some(deflection) = plane_at(facet, plane, &u).deflect(u) else {
                 let reason = "the facet's plane does not face it".to_owned();
                 fan.excluded.push((beam, reason));
                 continue;

@@ -72,6 +72,7 @@ fn session() -> Session {
                 [75.6, 12.0, 12.0],
                 [64.4, 12.0, -12.0],
             ],
+            curve: None,
             beams: [516, 564],
         }],
         boards: vec![BoardSheet {

@@ -42,7 +42,12 @@ struct Line {
 impl Bare {
     /// Fits the planes of the measured distances.
     pub(crate) fn of(session: &Session) -> Self {
-        let of_facet = |facet: &NominalFacet| (facet.name.clone(), Line::through(&measured(session, facet)));
+        // Behind a mirror that is not flat there is no plane.
+        let line = |facet: &NominalFacet| match facet.curve {
+            None => Line::through(&measured(session, facet)),
+            Some(_) => None,
+        };
+        let of_facet = |facet: &NominalFacet| (facet.name.clone(), line(facet));
         Self {
             facets: session.facets.iter().map(of_facet).collect(),
         }

@@ -31,6 +31,7 @@ mod tests {
         NominalFacet {
             name: String::new(),
             corners_mm: Vec::new(),
+            curve: None,
             beams: [first, last],
         }
     }

@@ -306,6 +306,7 @@ impl World {
                     corner(0.05, 0.05),
                     corner(-0.05, 0.05),
                 ],
+                curve: None,
                 beams: self.served[f],
             }
         });

@@ -49,8 +49,8 @@ impl World {
         &self.shapes
     }
 
-    /// Returns the nearest hit of a ray, ignoring the surface `except`, as a rule the mirror that the ray leaves. Of surfaces
-    /// at exactly the same distance, the one with the lowest index counts.
+    /// Returns the nearest hit of a ray, ignoring the surface `except`, as a rule the mirror that the ray leaves; a curved
+    /// mirror can be hit again. Of surfaces at exactly the same distance, the one with the lowest index counts.
     pub fn cast(&self, ray: &Ray, except: Option<usize>) -> Option<Hit> {
         self.cast_at(Level::new(), ray, except)
     }
@@ -62,8 +62,12 @@ impl World {
             let boxes = inlined(#[inline(always)] |node: &Node, limit: f32| line.boxes(simd, node, limit));
             let visit = inlined(#[inline(always)] |child: Child| {
                 let number = child.number();
-                if except != Some(number)
-                    && let Some((to_shape, of_mesh)) = self.shapes[number].hit(ray)
+                let found = if except == Some(number) {
+                    self.shapes[number].hit_again(ray)
+                } else {
+                    self.shapes[number].hit(ray)
+                };
+                if let Some((to_shape, of_mesh)) = found
                     && (to_shape, numbered(number)) < (distance, surface)
                 {
                     (distance, surface, triangle) = (to_shape, numbered(number), of_mesh);
@@ -76,25 +80,26 @@ impl World {
             surface,
             triangle,
             distance,
-            closing: self.closing(surface, triangle, ray),
+            closing: self.closing(surface, triangle, ray, distance),
         })
     }
 
     /// Returns the dot product of a ray's direction and the normal of the surface at the hit; `triangle` matters for a mesh.
-    pub(crate) fn closing(&self, surface: u32, triangle: u32, ray: &Ray) -> f64 {
+    pub(crate) fn closing(&self, surface: u32, triangle: u32, ray: &Ray, distance: f64) -> f64 {
         match &self.shapes[surface as usize] {
             Shape::Mesh(mesh) => mesh.closing(triangle, ray),
-            Shape::Polygon(_) | Shape::Block(_) | Shape::Cylinder(_) => {
-                self.normal(surface, triangle, ray).dot(&ray.direction)
+            Shape::Polygon(_) | Shape::Block(_) | Shape::Cylinder(_) | Shape::Curved(_) => {
+                self.normal(surface, triangle, ray, distance).dot(&ray.direction)
             }
         }
     }
 
     /// Returns the normal of the surface at the hit; `triangle` matters for a mesh.
-    fn normal(&self, surface: u32, triangle: u32, ray: &Ray) -> Unit<Vector3<f64>> {
+    fn normal(&self, surface: u32, triangle: u32, ray: &Ray, distance: f64) -> Unit<Vector3<f64>> {
         match &self.shapes[surface as usize] {
             Shape::Polygon(polygon) => polygon.normal,
             Shape::Mesh(mesh) => mesh.normal(triangle, ray),
+            Shape::Curved(curved) => curved.normal(ray, distance),
             // The ray is known to hit it, so the fallback is never used.
             body @ (Shape::Block(_) | Shape::Cylinder(_)) => {
                 body.intersect(ray).map_or(-ray.direction, |(_, normal)| normal)
@@ -108,7 +113,7 @@ impl World {
             surface: hit.surface as usize,
             distance: hit.distance,
             point: ray.origin + ray.direction.into_inner() * hit.distance,
-            normal: self.normal(hit.surface, hit.triangle, ray),
+            normal: self.normal(hit.surface, hit.triangle, ray, hit.distance),
             closing: hit.closing,
         }
     }

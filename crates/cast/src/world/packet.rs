@@ -13,7 +13,7 @@ use crate::packet::cast::{Caster, Packet, cast_all};
 use crate::packet::in_rows::InRows;
 use crate::packet::rays::Rays;
 use crate::packet::rows::{HALF, LANES, Rows, half};
-use crate::ray::FARTHEST;
+use crate::ray::{FARTHEST, Ray};
 use crate::rounding::upwards;
 use crate::shape::Shape;
 use crate::solid::polygon::{EDGE_SLACK, Polygon};
@@ -120,6 +120,9 @@ impl World {
             |child: Child| {
                 if except != Some(child.number()) {
                     self.intersect(simd, packet, child.number(), nearest);
+                } else if let curved @ Shape::Curved(_) = &self.shapes[child.number()] {
+                    let again = |ray: &Ray| Some(curved.hit_again(ray)?.0);
+                    nearest.each(simd, packet, numbered(child.number()), again);
                 }
                 nearest.limit
             },
@@ -145,14 +148,7 @@ impl World {
                 mesh.hits_of_packet::<_, R, true>(simd, packet, take);
                 nearest.set_limit(simd);
             }
-            other => {
-                for ray in 0..packet.rays.count {
-                    if let Some(distance) = other.distance(&packet.rays.get(ray)) {
-                        nearest.take(ray, distance, numbered(surface));
-                    }
-                }
-                nearest.set_limit(simd);
-            }
+            other => nearest.each(simd, packet, numbered(surface), |ray| other.distance(ray)),
         }
     }
 }
@@ -185,7 +181,10 @@ impl<const R: usize> Nearest<R> {
             Shape::Mesh(_) => (self.triangle.get(number), self.closing.get(number)),
             _ => {
                 let ray = rays.get(number);
-                (NONE, world.closing(surface, NONE, &ray))
+                (
+                    NONE,
+                    world.closing(surface, NONE, &ray, self.distance.get(number)),
+                )
             }
         };
         Some(Hit {
@@ -194,6 +193,23 @@ impl<const R: usize> Nearest<R> {
             distance: self.distance.get(number),
             closing,
         })
+    }
+
+    /// Casts the rays one by one into a surface.
+    #[inline(always)]
+    fn each<S: Simd>(
+        &mut self,
+        simd: S,
+        packet: &Packet<'_, R>,
+        surface: u32,
+        cast: impl Fn(&Ray) -> Option<f64>,
+    ) {
+        for ray in 0..packet.rays.count {
+            if let Some(distance) = cast(&packet.rays.get(ray)) {
+                self.take(ray, distance, surface);
+            }
+        }
+        self.set_limit(simd);
     }
 
     /// Records a hit on a surface other than a mesh, if it is nearer, or as near with a lower index. Returns whether it is.

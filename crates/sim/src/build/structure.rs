@@ -8,9 +8,9 @@ use crate::build::coating::Finish;
 use crate::error::SimError;
 use crate::noise::{Draws, Purpose};
 use crate::scene::{Facet, Glass, MeshShape, Post, PostShape, Scene};
-use catoptric_cast::{Block, Cylinder, Polygon, Shape, Triangles};
-use catoptric_model::Pose;
+use catoptric_cast::{Block, Curved, Cylinder, Polygon, Shape, Triangles, area_vector};
 use catoptric_model::frame::yaw_pitch_roll;
+use catoptric_model::{Curve, Pose};
 use nalgebra::{Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
@@ -19,10 +19,12 @@ use std::sync::Arc;
 pub struct BuiltFacet {
     /// Name.
     pub name: String,
-    /// The reflecting face.
+    /// The reflecting face; of a mirror that is not flat, the outline in the plane that it touches.
     pub face: Polygon,
-    /// The surface of the bare structure behind the mirror.
+    /// The surface of the bare structure behind the mirror, likewise.
     pub backing: Polygon,
+    /// Face and bare structure of a mirror that is not flat.
+    pub bent: Option<Bent>,
     /// Distance from the bare structure to the reflecting face, in meters.
     pub thickness: f64,
     /// Glass in front of the reflecting surface.
@@ -32,6 +34,17 @@ pub struct BuiltFacet {
     /// The second reflecting side of a two-sided mirror.
     pub back: Option<Back>,
     slope: Slope,
+}
+
+/// A mirror that is not flat.
+#[derive(Debug, Clone)]
+pub struct Bent {
+    /// How it bends.
+    pub curve: Curve,
+    /// The reflecting face.
+    pub face: Arc<Curved>,
+    /// The surface of the bare structure, parallel to the face.
+    pub backing: Arc<Curved>,
 }
 
 /// The second reflecting side of a mirror.
@@ -169,6 +182,7 @@ impl BuiltFacet {
             },
             name,
             backing,
+            bent: None,
             thickness,
             glass,
             finish,
@@ -192,18 +206,39 @@ impl BuiltFacet {
             && self.glass == other.glass
             && self.finish == other.finish
             && self.face.corners == other.face.corners
+            && self.bent.as_ref().map(|b| b.face.surface) == other.bent.as_ref().map(|b| b.face.surface)
+    }
+
+    /// The reflecting face as light meets it.
+    pub fn face_shape(&self) -> Shape {
+        match &self.bent {
+            None => Shape::Polygon(self.face.clone()),
+            Some(bent) => Shape::Curved(Arc::clone(&bent.face)),
+        }
+    }
+
+    /// The bare structure as light meets it once the mirror is removed.
+    pub fn backing_shape(&self) -> Shape {
+        match &self.bent {
+            None => Shape::Polygon(self.backing.clone()),
+            Some(bent) => Shape::Curved(Arc::clone(&bent.backing)),
+        }
     }
 
     /// Normal of the reflecting surface at a point on it.
     pub fn normal_at(&self, point: &Point3<f64>) -> Unit<Vector3<f64>> {
+        let normal = match &self.bent {
+            None => self.face.normal,
+            Some(bent) => bent.face.surface.normal_at(point),
+        };
         if self.slope.height == [0.0; 7] {
-            return self.face.normal;
+            return normal;
         }
         let offset = point - self.slope.center;
         let [x, y] = self.slope.axes;
         let [a, b] = self.slope.gradient(x.dot(&offset), y.dot(&offset));
         // The axes carry the length scale of the coordinates; the slope is dimensionless.
-        Unit::new_normalize(self.face.normal.into_inner() - x.normalize() * a - y.normalize() * b)
+        Unit::new_normalize(normal.into_inner() - x.normalize() * a - y.normalize() * b)
     }
 }
 
@@ -332,16 +367,54 @@ fn build_facet(
         true => Some(Back::of(&face, thickness).ok_or_else(|| fail("its corners lie on a line"))?),
         false => None,
     };
+    let bent = match facet.bent(&drawn) {
+        None => None,
+        Some(curve) => {
+            let steep = || fail("its curve does not reach over its outline");
+            let place = BentPlace {
+                curve,
+                drawn: &drawn,
+                place: &place,
+            };
+            Some(place.bent(&face, &backing, thickness).ok_or_else(steep)?)
+        }
+    };
     Ok(BuiltFacet {
         name: facet.name.clone(),
         face,
         backing,
+        bent,
         thickness,
         glass: scene.superstructure.mirror.glass,
         finish: Finish::of(&scene.superstructure.mirror, Some(facet)),
         back,
         slope,
     })
+}
+
+/// A curve over a drawn outline, and where the outline was built.
+struct BentPlace<'a> {
+    curve: Curve,
+    drawn: &'a [Point3<f64>],
+    place: &'a Pose,
+}
+
+impl BentPlace<'_> {
+    /// The face as built and the bare structure behind it; `None` if the curve does not reach over the outline.
+    fn bent(&self, face: &Polygon, backing: &Polygon, thickness: f64) -> Option<Bent> {
+        let normal = Unit::try_new(area_vector(self.drawn), f64::MIN_POSITIVE)?;
+        let over = |outline: &Polygon, ahead: f64| {
+            let surface = self.curve.over(self.drawn, &normal, ahead)?.moved(self.place);
+            Some(Arc::new(Curved::new(outline.clone(), surface)?))
+        };
+        // The bare structure stays in place, and a thicker mirror is ahead of it.
+        let drawn = (self.place * self.drawn.first()? - backing.corners.first()?).dot(&backing.normal);
+        Some(Bent {
+            curve: self.curve,
+            face: over(face, thickness - drawn)?,
+            backing: over(backing, -drawn)?,
+        })
+    }
 }
 
 /// The shape of a post: placed by the drawing, then transformed by `frame_from_drawing`.
@@ -426,6 +499,7 @@ mod tests {
         let facet = BuiltFacet {
             name: String::new(),
             backing: face.clone(),
+            bent: None,
             thickness: 0.0,
             face,
             glass: None,

@@ -2,9 +2,9 @@
 
 use crate::build::room::room_from_rig;
 use crate::build::structure;
-use crate::scene::{FacetShape, Scene};
+use crate::scene::{Facet, Scene};
 use catoptric_cast::Ray;
-use catoptric_cast::Shape;
+use catoptric_cast::{Curved, Polygon, Shape};
 use catoptric_model::beam;
 use catoptric_model::frame::yaw_pitch_roll;
 use catoptric_model::{Deflection, MirrorPlane, Pose, ScanGeometry};
@@ -69,6 +69,9 @@ pub(super) enum Meets {
 pub(super) struct Face {
     pub(super) corners: Vec<Point3<f64>>,
     pub(super) plane: MirrorPlane,
+    /// Its surface, if it is not flat; that of the triangles stands for it where bodies meet.
+    curved: Option<Curved>,
+    pub(super) triangles: Vec<Self>,
 }
 
 /// An opaque box: its frame and half extents.
@@ -91,16 +94,19 @@ enum Solid {
     Other(Option<Shape>),
 }
 
+fn from_origin(u: &Unit<Vector3<f64>>) -> Ray {
+    Ray {
+        origin: Point3::origin(),
+        direction: *u,
+    }
+}
+
 impl Solid {
     /// Distance at which a beam hits it from outside.
     fn distance(&self, u: &Unit<Vector3<f64>>) -> Option<f64> {
-        let ray = Ray {
-            origin: Point3::origin(),
-            direction: *u,
-        };
         match self {
             Self::Block(block) => block.distance(u),
-            Self::Other(shape) => shape.as_ref()?.distance(&ray),
+            Self::Other(shape) => shape.as_ref()?.distance(&from_origin(u)),
         }
     }
 }
@@ -110,7 +116,25 @@ impl Face {
     pub(super) fn new(corners: Vec<Point3<f64>>) -> Option<Self> {
         let normal = Unit::try_new(catoptric_cast::area_vector(&corners), f64::MIN_POSITIVE)?;
         let plane = MirrorPlane::through(*corners.first()?, normal);
-        Some(Self { corners, plane })
+        Some(Self {
+            corners,
+            plane,
+            curved: None,
+            triangles: Vec::new(),
+        })
+    }
+
+    /// A facet with its curve or bow.
+    fn of(facet: &Facet, scan: &ScanGeometry) -> Option<Self> {
+        let mut face = facet.shape.corners(scan).and_then(Self::new)?;
+        if let Some(curve) = facet.bent(&face.corners) {
+            let surface = curve.over(&face.corners, &face.plane.normal, 0.0)?;
+            let curved = Curved::new(Polygon::new(face.corners.clone())?, surface)?;
+            let triangles = curved.triangles().into_iter();
+            face.triangles = triangles.filter_map(|t| Self::new(t.to_vec())).collect();
+            face.curved = Some(curved);
+        }
+        Some(face)
     }
 
     /// Whether a point of the plane is inside the convex outline.
@@ -123,14 +147,25 @@ impl Face {
 
     /// Distance at which a beam hits the outline, from either side.
     pub(super) fn distance(&self, u: &Unit<Vector3<f64>>) -> Option<f64> {
+        if let Some(curved) = &self.curved {
+            return curved.cast(&from_origin(u));
+        }
         let d = self.plane.offset / self.plane.normal.dot(u);
         (d.is_finite() && d > 0.0 && self.contains(&Point3::from(u.into_inner() * d))).then_some(d)
     }
 
     /// How the facet deflects a beam that hits its reflecting side.
     pub(super) fn deflect(&self, u: &Unit<Vector3<f64>>) -> Option<Deflection> {
-        self.distance(u)?;
-        self.plane.deflect(*u)
+        self.met_at(u)?.deflect(*u)
+    }
+
+    /// The plane that it has where a beam hits it, from either side.
+    pub(super) fn met_at(&self, u: &Unit<Vector3<f64>>) -> Option<MirrorPlane> {
+        let distance = self.distance(u)?;
+        Some(self.curved.as_ref().map_or(self.plane, |curved| {
+            let point = Point3::from(u.into_inner() * distance);
+            MirrorPlane::through(point, curved.surface.normal_at(&point))
+        }))
     }
 }
 
@@ -160,8 +195,7 @@ impl Block {
 impl Obstacles {
     pub(super) fn of(scene: &Scene, scan: &ScanGeometry) -> Self {
         let drawn = &scene.superstructure;
-        let face = |shape: &FacetShape| shape.corners(scan).and_then(Face::new);
-        let facets = drawn.facet.iter().map(|f| face(&f.shape)).collect();
+        let facets = drawn.facet.iter().map(|f| Face::of(f, scan)).collect();
         let posts = drawn.post.iter().map(|post| match (post.size_mm, &post.shape) {
             (Some(size), None) => {
                 let center = Vector3::from(post.center_mm) * 1e-3;
@@ -189,12 +223,13 @@ impl Obstacles {
     pub(super) fn met_by(&self, u: &Unit<Vector3<f64>>) -> Option<Meets> {
         let facets = self.facets.iter().enumerate().filter_map(|(i, face)| {
             let face = face.as_ref()?;
-            let side = if face.plane.normal.dot(u) < 0.0 {
+            let distance = face.distance(u)?;
+            let side = if face.met_at(u)?.normal.dot(u) < 0.0 {
                 Meets::Facet(i)
             } else {
                 Meets::Back(i)
             };
-            Some((face.distance(u)?, side))
+            Some((distance, side))
         });
         let posts = self.posts.iter().enumerate();
         let posts = posts.filter_map(|(i, post)| Some((post.distance(u)?, Meets::Post(i))));

@@ -1,6 +1,6 @@
 //! Checks that mirrors stand clear of each other and of the scanner: where one body passes through another.
 //!
-//! A mirror is its reflecting face as drawn. Posts are left out: they carry mirrors, which pass through them. Faces may share an edge or a corner, and an edge may
+//! A mirror is its reflecting face as drawn; one that is not flat is made of triangles. Posts are left out: they carry mirrors, which pass through them. Faces may share an edge or a corner, and an edge may
 //! lie on another face: what is less than [`CLEARANCE_M`] deep is a touch, as drawings round their numbers.
 
 use super::outline::{Face, Obstacles};
@@ -36,15 +36,22 @@ pub(super) fn check(scene: &Scene, obstacles: &Obstacles, found: &mut Findings) 
         // One other mirror is enough: a row of mirrors that is too close is one mistake, not a mistake for each pair.
         let other = obstacles.facets[..i].iter().enumerate().find_map(|(k, other)| {
             let other = other.as_ref().filter(|_| balls[i].touches(&balls[k]))?;
-            Some((k, face.meets(other).or_else(|| other.meets(face))?))
+            Some((k, meeting(&face.pieces(), &other.pieces())?))
         });
         if let Some((k, at)) = other {
             add(&format!("facet {:?}", drawn.facet[k].name), at);
         }
-        if let Some(at) = boxes.iter().find_map(|part| face.inside(part)) {
+        let into = |part: &HousingBox| face.pieces().into_iter().find_map(|piece| piece.inside(part));
+        if let Some(at) = boxes.iter().find_map(into) {
             add("the scanner's housing", at);
         }
     }
+}
+
+/// Where one of some faces passes through one of others.
+fn meeting(some: &[&Face], others: &[&Face]) -> Option<Point3<f64>> {
+    let mut pairs = some.iter().flat_map(|a| others.iter().map(move |b| (a, b)));
+    pairs.find_map(|(a, b)| a.meets(b).or_else(|| b.meets(a)))
 }
 
 /// A ball around a face, since most faces are far from each other.
@@ -56,8 +63,9 @@ struct Ball {
 impl Ball {
     /// Around nothing, it touches nothing.
     fn around(face: &Option<Face>) -> Self {
-        let corners: &[Point3<f64>] = face.as_ref().map_or(&[], |face| &face.corners);
-        let center = middle(corners);
+        let pieces = face.as_ref().map(Face::pieces).unwrap_or_default();
+        let corners: Vec<Point3<f64>> = pieces.iter().flat_map(|f| f.corners.iter().copied()).collect();
+        let center = middle(&corners);
         let radius = corners.iter().map(|c| (c - center).norm()).fold(0.0, f64::max);
         Self { center, radius }
     }
@@ -98,6 +106,15 @@ fn windows(housing: &[HousingBox]) -> Vec<HousingBox> {
 }
 
 impl Face {
+    /// Itself, or the triangles that stand for it.
+    fn pieces(&self) -> Vec<&Self> {
+        if self.triangles.is_empty() {
+            vec![self]
+        } else {
+            self.triangles.iter().collect()
+        }
+    }
+
     /// Where this face passes through another one; `None` where they touch or stand apart.
     fn meets(&self, other: &Self) -> Option<Point3<f64>> {
         let normal = other.plane.normal.into_inner();

@@ -26,8 +26,12 @@ pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     let obstacles = Obstacles::of(scene, scan);
     let before = found.0.len();
     for (i, facet) in scene.superstructure.facet.iter().enumerate() {
-        let path = structure.key("facet").index(i).key("shape");
-        facet.shape.check(scan, &path, found);
+        let path = structure.key("facet").index(i);
+        let faults = found.0.len();
+        facet.shape.check(scan, &path.key("shape"), found);
+        if found.0.len() == faults {
+            facet.check_bend(&scene.superstructure.mirror, scan, &path, found);
+        }
     }
     // Of an invalid facet this would only repeat what has been reported.
     if found.0.len() == before {

@@ -9,6 +9,7 @@ use crate::laboratory::placement;
 use crate::light::optics::{Mirrors, Setting};
 use crate::noise::{Draws, Purpose};
 use crate::scene::{ErrorModel, Marker, NoiseTable};
+use catoptric_cast::Shape;
 use catoptric_model::glass::GlassSheet;
 use catoptric_model::noise::Noise;
 use catoptric_model::session::{self, Session};
@@ -139,8 +140,9 @@ impl Laboratory {
         Ok(nominal
             .facets
             .iter()
+            .zip(&self.scene.superstructure.facet)
             .zip(served)
-            .filter_map(|(facet, beams)| {
+            .filter_map(|((facet, drawn), beams)| {
                 Some(session::NominalFacet {
                     name: facet.name.clone(),
                     corners_mm: facet
@@ -149,6 +151,8 @@ impl Laboratory {
                         .iter()
                         .map(|c| (c.coords * 1e3).into())
                         .collect(),
+                    // A bow is what nobody drew.
+                    curve: drawn.curve,
                     beams: beams?,
                 })
             })
@@ -215,11 +219,24 @@ impl Laboratory {
             };
             let mut draws = Draws::new(self.seed, Purpose::BareDistance, index as u64);
             let of_all = 1e-3 * (sd_mm * draws.normal() + experiment.bare_distance_error_mm);
-            let normal = built.face.normal;
+            let face = built.face_shape();
             for beam in scan.run(scan.widened(sheet.beams, NEAR_FACET)) {
                 let u = beam::direction(scan.azimuth(beam));
-                let facing = normal.dot(&u).abs();
-                let to_face = normal.dot(&built.face.corners[0].coords) / normal.dot(&u);
+                // The plane of a flat mirror also says how far the structure beyond its edge is.
+                let plane = built.face.normal;
+                let (to_face, facing) = match &face {
+                    Shape::Curved(curved) => match curved.surface.plane_along(&u) {
+                        Some(touched) => {
+                            let facing = touched.normal.dot(&u);
+                            (touched.offset / facing, facing.abs())
+                        }
+                        None => continue,
+                    },
+                    _ => (
+                        plane.dot(&built.face.corners[0].coords) / plane.dot(&u),
+                        plane.dot(&u).abs(),
+                    ),
+                };
                 draws.seek(1 + beam as u64);
                 let own = 1e-3 * noise_sd_mm * draws.normal();
                 distance_m[beam] = to_face + built.thickness / facing + of_all + own;
@@ -248,7 +265,11 @@ impl Laboratory {
                 .filter(|f| away(f, beam) <= NEAR_FACET)
         };
         Ok((0..scan.beams())
-            .map(|beam| Some(nearest(beam)?.plane()?.normal))
+            .map(|beam| {
+                let facet = nearest(beam)?;
+                let touched = facet.touched(&beam::direction(scan.azimuth(beam)));
+                Some(touched.map_or(facet.plane()?.normal, |plane| plane.normal))
+            })
             .collect())
     }
 

@@ -39,6 +39,7 @@ impl Laboratory {
                     normal: f.face.normal.into_inner().into(),
                     offset_m: f.face.normal.dot(&f.face.origin.coords),
                     corners_m: f.face.corners.iter().map(|c| c.coords.into()).collect(),
+                    curve: f.bent.as_ref().map(|bent| bent.curve),
                 })
                 .collect(),
             beams,

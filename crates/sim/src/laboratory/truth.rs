@@ -6,7 +6,7 @@ use crate::scene::Mishap;
 use crate::scene::omit::is_false;
 use catoptric_model::beam::{self, Deflection};
 use catoptric_model::limits;
-use catoptric_model::{PoseData, PoseKind, RangeBias};
+use catoptric_model::{Curve, PoseData, PoseKind, RangeBias};
 use nalgebra::{Unit, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -42,7 +42,7 @@ pub struct Truth {
     pub poses: Vec<TruePose>,
 }
 
-/// A mirror as built, in the true sensor frame.
+/// A mirror as built, in the true sensor frame; of one that is not flat, the plane that it touches.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TrueFacet {
@@ -57,6 +57,9 @@ pub struct TrueFacet {
     /// Corners, in meters.
     #[schemars(inner(inner(range(min = -limits::FAR_M, max = limits::FAR_M))))]
     pub corners_m: Vec<[f64; 3]>,
+    /// How a mirror that is not flat bends away from that plane: as drawn, or the cylinder of its bow.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub curve: Option<Curve>,
 }
 
 /// What the structure does to the light of a beam. Angles are those of the chief ray.

@@ -50,6 +50,11 @@ impl Lens {
         }
     }
 
+    /// Area of the lens, in square meters.
+    pub(crate) fn area(&self) -> f64 {
+        PI * self.aperture * self.aperture
+    }
+
     /// Whether the part of the lens is counted from which mirrors show a spot.
     pub(crate) fn vignettes(&self) -> bool {
         self.vignetting

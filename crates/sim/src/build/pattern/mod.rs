@@ -1,5 +1,6 @@
 //! Expands patterns into facets: rings, mirror images, lists of copies.
 
+use crate::scene::facet::bent;
 use crate::scene::{Exchange, Facet, Pattern, Scene};
 use catoptric_model::ScanGeometry;
 use catoptric_model::place::{KeyPath, Problem, Segment, nearest};
@@ -127,26 +128,27 @@ fn find<'a>(facets: &'a [Facet], name: &str, path: &KeyPath) -> Result<&'a Facet
 
 /// A facet seen in a mirror, or in two one after the other.
 pub fn mirrored(facet: &Facet, name: String, across: &[Exchange], scan: &ScanGeometry) -> Facet {
-    let mut shape = facet.shape.clone();
-    for exchange in across {
-        shape.exchange(*exchange, scan);
-    }
-    Facet {
+    let mut image = Facet {
         name,
-        shape,
         ..facet.clone()
+    };
+    for exchange in across {
+        let was = image.clone();
+        image.shape.exchange(*exchange, scan);
+        image.carry_curve(&was, scan, &bent::image(*exchange));
     }
+    image
 }
 
 /// A facet turned about the scanner's axis, counter-clockwise, by an angle in degrees.
 pub fn turned(facet: &Facet, name: String, turn_deg: f64, scan: &ScanGeometry) -> Facet {
-    let mut shape = facet.shape.clone();
-    shape.turn(turn_deg, scan);
-    Facet {
+    let mut copy = Facet {
         name,
-        shape,
         ..facet.clone()
-    }
+    };
+    copy.shape.turn(turn_deg, scan);
+    copy.carry_curve(facet, scan, &bent::turn(turn_deg));
+    copy
 }
 
 #[cfg(test)]

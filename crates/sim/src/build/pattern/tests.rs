@@ -8,6 +8,8 @@ fn facet(name: &str, shape: FacetShape) -> Facet {
     Facet {
         name: name.to_owned(),
         shape,
+        curve: None,
+        bow_um: 0.0,
         two_sided: false,
         reflectivity: None,
         coating: None,

@@ -16,6 +16,8 @@ fn drawn(corners_mm: &[&[[f64; 3]]]) -> Scene {
         }
         Facet {
             name: format!("m{i}"),
+            curve: None,
+            bow_um: 0.0,
             two_sided: true,
             reflectivity: None,
             coating: None,

@@ -6,6 +6,7 @@ mod follow;
 mod path;
 mod rig;
 mod setting;
+mod spread;
 mod together;
 
 pub use edit::{Edit, Trail};

@@ -6,11 +6,12 @@
 
 use super::path::{Course, End, Meeting};
 use super::setting::Setting;
+use super::spread::Spread;
 #[cfg(doc)]
 use crate::build::coating::Finishes;
 use catoptric_cast::Ray;
 use catoptric_cast::Rays;
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -40,6 +41,8 @@ pub(crate) struct BeamPaths<'a> {
     pub(crate) passed: &'a [f64],
     /// The last legs of those that leave, as indices into [`Rig::leaving`].
     pub(crate) leaving: Range<usize>,
+    /// How curved mirrors spread the light of all sub-rays; empty if all mirrors are flat.
+    pub(crate) spreads: &'a [Option<Spread>],
     facets: &'a [usize],
     meetings: &'a [Meeting],
 }
@@ -50,6 +53,7 @@ struct Compiled {
     runs: Vec<Run>,
     lengths: Vec<f64>,
     passed: Vec<f64>,
+    spreads: Vec<Option<Spread>>,
     leaving: Vec<Ray>,
     /// Mirrors hit by each run, run by run.
     facets: Vec<usize>,
@@ -133,6 +137,7 @@ impl Rig {
             runs: &all.runs[from.runs..to.runs],
             lengths: &all.lengths[from.lengths..to.lengths],
             passed: all.passed.get(from.lengths..to.lengths).unwrap_or_default(),
+            spreads: all.spreads.get(from.lengths..to.lengths).unwrap_or_default(),
             leaving: from.leaving..to.leaving,
             facets: &all.facets[from.facets..to.facets],
             meetings: &all.meetings[from.meetings..to.meetings],
@@ -164,10 +169,10 @@ impl Compiled {
     ) -> (Self, f64, bool) {
         let rays: Vec<Ray> = rays.collect();
         let mut compiled = Self::default();
-        let mut bounces: Vec<(usize, usize, Meeting)> = Vec::new();
+        let mut bounces: Vec<(usize, usize, Point3<f64>, Meeting)> = Vec::new();
         let mut reach: f64 = 0.0;
         let courses = bare.follow_beam(&rays, bare.contents.max_bounces, |ray, bounce| {
-            bounces.push((ray, bounce.facet, bounce.meeting));
+            bounces.push((ray, bounce.facet, bounce.point, bounce.meeting));
             let places = [bounce.point, bounce.after.origin];
             reach = places.iter().map(|p| p.coords.norm()).fold(reach, f64::max);
         });
@@ -176,7 +181,7 @@ impl Compiled {
         let facets = &bare.contents.facets;
         let ghosts = bounces
             .iter()
-            .any(|(_, f, _)| facets[*f].glass.is_some_and(|g| g.ghost));
+            .any(|(_, f, ..)| facets[*f].glass.is_some_and(|g| g.ghost));
         let mut met = 0;
         for (ray, course) in rays.iter().zip(&courses) {
             // A ray that leaves at once is cast into the room from where it starts, whatever is near.
@@ -207,6 +212,11 @@ impl Compiled {
                     .passed
                     .push(finishes.passed(&ray.direction, long_axis, met));
             }
+            if bare.contents.bends {
+                let met = bounces[own.clone()].iter();
+                let met = met.map(|(_, facet, point, meeting)| (*facet, *point, meeting.after));
+                compiled.spreads.push(bare.spread(ray, met));
+            }
             compiled.depart(course, then, own.clone().map(|i| bounces[i].1));
             compiled
                 .meetings
@@ -230,6 +240,7 @@ impl Compiled {
         self.runs.extend_from_slice(&beam.runs);
         self.lengths.extend_from_slice(&beam.lengths);
         self.passed.extend_from_slice(&beam.passed);
+        self.spreads.extend_from_slice(&beam.spreads);
         self.leaving.extend_from_slice(&beam.leaving);
         self.facets.extend_from_slice(&beam.facets);
         self.meetings.extend_from_slice(&beam.meetings);

@@ -84,6 +84,8 @@ pub(super) struct Contents<'a> {
     pub(super) max_bounces: usize,
     diffuse_reflectivity: f64,
     finishes: Option<Finishes>,
+    /// Whether any mirror is not flat.
+    pub(super) bends: bool,
 }
 
 /// The end of a leg of a ray, in the frame in which the surface is kept.
@@ -243,6 +245,7 @@ impl<'a> Setting<'a> {
             flies,
             mirrors,
             of_structure,
+            bends: facets.iter().any(|f| f.bent.is_some()),
             facets,
             max_bounces: (scene.superstructure.max_bounces as usize).min(MAX_BOUNCES),
             diffuse_reflectivity: scene.superstructure.mirror.scattered(),
@@ -534,7 +537,7 @@ fn structure_list<'a>(
         match mirrors {
             Mirrors::Attached => list.mirror(facet, index, &dull),
             Mirrors::Removed => {
-                let bare = Shape::Polygon(facet.backing.clone());
+                let bare = facet.backing_shape();
                 list.add(&facet.name, bare, Role::Structure, Side::None, dull.clone());
             }
         }
@@ -595,8 +598,7 @@ impl List {
             Some(Back::Face) => Side::Both,
             _ => Side::Face,
         };
-        let face = Shape::Polygon(mirror.face.clone());
-        self.add(&mirror.name, face, role, side, dull.clone());
+        self.add(&mirror.name, mirror.face_shape(), role, side, dull.clone());
         if let Some(Back::Body { face, rim }) = &mirror.back {
             let back = Shape::Polygon(face.clone());
             self.add(&mirror.name, back, role, Side::Back, dull.clone());

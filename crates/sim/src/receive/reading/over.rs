@@ -190,6 +190,10 @@ impl Sensor {
                             .unwrap_or(&target)
                             .received(sub_ray.weight, range, cos_incidence)
                             * within.overlap(sub_ray, range);
+                    let power = match paths.spreads.get(number) {
+                        Some(Some(spread)) => power * spread.gain(range, self.lens.area()),
+                        _ => power,
+                    };
                     if is_chief(sub_ray) {
                         chief = Some((number, range, cos_incidence));
                     }

@@ -144,6 +144,10 @@ impl Sensor {
         path: &RayPath,
     ) -> Option<Arrival> {
         let End::Hit(hit) = path.end else { return None };
+        let met = path.facets().iter().zip(path.points()).zip(path.meetings());
+        let met = met.map(|((facet, point), meeting)| (*facet, *point, meeting.after));
+        let spread = within.setting.spread(ray, met);
+        let overlap = within.overlap(sub_ray, path.length);
         Some(Arrival {
             surface: hit.surface,
             bounces: path.facets().len(),
@@ -153,7 +157,7 @@ impl Sensor {
                 share: sub_ray.weight,
                 range: path.length,
                 mirrors: self.passed(within, ray, path.meetings(), path.silvered) * path.gain,
-                seen: within.overlap(sub_ray, path.length),
+                seen: spread.map_or(overlap, |s| overlap * s.gain(path.length, self.lens.area())),
             },
             gain: path.gain,
         })

@@ -1,4 +1,4 @@
-//! Facets: plane mirrors, each with one of several shapes.
+//! Facets: mirrors, each with one of several outlines in a plane, and flat or bent away from that plane.
 //!
 //! A shape is one file: its keys, its corners, its copies and the checks of its numbers. To add one, write its file, and
 //! its variant and its arms here; no other code knows about shapes.
@@ -12,6 +12,7 @@
 //! rotation by τ:               azimuths α → α + τ
 //! ```
 
+pub(crate) mod bent;
 pub(crate) mod outline;
 mod plate;
 mod polygon;
@@ -25,24 +26,32 @@ pub use rectangle::RectangleShape;
 pub use wedge::Wedge;
 
 use super::coating::Coating;
-use super::omit::is_false;
+use super::omit::{is_false, is_zero};
 use super::pattern::Exchange;
 use crate::findings::Findings;
-use catoptric_model::ScanGeometry;
 use catoptric_model::place::KeyPath;
+use catoptric_model::{Curve, ScanGeometry};
 use nalgebra::Point3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use turn::Turn;
 
-/// A plane mirror.
+/// A mirror.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Facet {
     /// Name.
     pub name: String,
-    /// Its outline.
+    /// Its outline, in a plane.
     pub shape: FacetShape,
+    /// What it is instead of flat: a surface that touches the plane of its outline.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub curve: Option<Curve>,
+    /// How far a mirror that is meant to be flat has bent along its longer side: depth of its middle below its ends, in
+    /// micrometers, negative if its middle is raised. The session does not tell it.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    #[schemars(range(min = -10000.0, max = 10000.0))]
+    pub bow_um: f64,
     /// Whether the back of its body, `mirror.thickness_mm` behind the face, reflects too.
     #[serde(default, skip_serializing_if = "is_false")]
     pub two_sided: bool,
