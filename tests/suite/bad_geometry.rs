@@ -76,6 +76,24 @@ fn facets_must_be_mirrors() {
 }
 
 #[test]
+fn a_facet_smaller_than_its_spot_is_a_warning() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/gallery/altimeter.toml");
+    let with = |sets: &[&str]| {
+        let sets: Vec<String> = sets.iter().map(|s| (*s).to_owned()).collect();
+        check::warnings(&scene::load(&path, &sets).unwrap_or_else(|e| panic!("{e}")))
+    };
+    assert_eq!(with(&[]), []);
+    // Eleven beams of a scanner without width; of the measured one, none. 45 mm away it is 4.6 mm wide along the scan.
+    let found = with(&["scanner.preset=ust-20lx-measured"]);
+    assert!(
+        found.len() == 1
+            && found[0].message.contains("has no whole beam")
+            && found[0].message.contains("4.6 mm"),
+        "{found:?}"
+    );
+}
+
+#[test]
 fn a_facet_that_no_light_reaches_is_a_warning() {
     let warns = |from: &str, to: &str, words: &str| {
         let text = VALID.replacen(from, to, 1);

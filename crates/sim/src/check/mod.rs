@@ -12,6 +12,7 @@ mod mishap;
 mod outline;
 mod overlap;
 mod session;
+mod spot;
 mod stage;
 mod structure;
 mod values;
@@ -22,7 +23,8 @@ use crate::findings::Findings;
 use crate::scene::Scene;
 use catoptric_model::place::{KeyPath, Problem};
 
-/// What is probably not meant, and hinders nothing: mirrors that no beam reaches, and noise that holds for nothing.
+/// What is probably not meant, and hinders nothing: mirrors that no beam reaches or none as a whole, and noise that holds
+/// for nothing.
 pub fn warnings(scene: &Scene) -> Vec<Problem> {
     let mut found = Findings(Vec::new());
     values::warn(scene, &mut found);

@@ -154,6 +154,13 @@ impl Face {
         (d.is_finite() && d > 0.0 && self.contains(&Point3::from(u.into_inner() * d))).then_some(d)
     }
 
+    /// Whether a ray hits the outline, from either side; of a curved facet, that in its plane.
+    pub(super) fn holds(&self, ray: &Ray) -> bool {
+        let normal = &self.plane.normal;
+        let d = (self.plane.offset - normal.dot(&ray.origin.coords)) / normal.dot(&ray.direction);
+        d.is_finite() && d > 0.0 && self.contains(&(ray.origin + ray.direction.into_inner() * d))
+    }
+
     /// How the facet deflects a beam that hits its reflecting side.
     pub(super) fn deflect(&self, u: &Unit<Vector3<f64>>) -> Option<Deflection> {
         self.met_at(u)?.deflect(*u)

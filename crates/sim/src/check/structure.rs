@@ -2,6 +2,7 @@
 
 use super::outline::{Face, Meets, Obstacles};
 use super::overlap;
+use super::spot;
 use super::values::distinct;
 use crate::findings::Findings;
 use crate::scene::facet::outline::{reach, rounded, spread};
@@ -77,7 +78,7 @@ pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     }
 }
 
-/// Warns of facets that no beam reaches.
+/// Warns of facets that no beam reaches, or none with all of its light.
 pub(super) fn warn(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
     let obstacles = Obstacles::of(scene, scan);
     let met = obstacles.met_by_beams();
@@ -86,6 +87,7 @@ pub(super) fn warn(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
             check_reach(scene, scan, i, face, &met, found);
         }
     }
+    spot::warn(scene, scan, &obstacles, &met, found);
 }
 
 fn check_housing(scanner: &Scanner, found: &mut Findings) {
