@@ -118,7 +118,7 @@ impl<R: Keep> Gathering<R> {
                 scan.angle_min, scan.angle_increment
             ));
         }
-        codes.replace(&mut scan.ranges, Limits::of(scanner, scan.limits_m));
+        codes.replace(&mut scan.ranges, Limits::of(scanner, scan.limits_m)?);
         if self.label.kind == PoseKind::Flight {
             self.stamps.push(scan.stamp);
         }
