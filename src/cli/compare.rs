@@ -8,7 +8,7 @@ use super::score::figure;
 use catoptric::compare::{CONTRADICTION, Row};
 use catoptric::junit::Suite;
 use catoptric::score::Honesty;
-use catoptric::{Comparison, Contestant, compare_with, read_reference};
+use catoptric::{Comparison, Contestant, compare_with};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -34,7 +34,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let rules = arguments.judging.rules()?;
     let junit = arguments.judging.place(&arguments.calibrations)?;
     let dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
-    let truth = read_reference(&arguments.dataset, arguments.judging.blind)?;
+    let truth = context.read_reference(&arguments.dataset, arguments.judging.blind)?;
     let contestants: Vec<Contestant> = arguments
         .calibrations
         .iter()

@@ -3,7 +3,9 @@
 use super::error::CliError;
 use super::progress::Reporter;
 use catoptric::files::names::printable;
-use catoptric::{Control, Damage, Dataset, Stop, read_dataset_with};
+use catoptric::files::unverified_truth;
+use catoptric::sim::Truth;
+use catoptric::{Control, Damage, Dataset, Stop, read_dataset_with, read_reference};
 use clap::{ArgAction, Args};
 use std::ffi::OsString;
 use std::io::Write;
@@ -65,6 +67,17 @@ impl Context {
             self.say(&format!("warning: {warning}"));
         }
         Ok(dataset)
+    }
+
+    /// Reads the truth to judge by, and says if nothing shows that it is the one that was written.
+    pub(super) fn read_reference(&self, dataset: &Path, blind: bool) -> Result<Option<Truth>, CliError> {
+        let truth = read_reference(dataset, blind)?;
+        if truth.is_some()
+            && let Some(warning) = unverified_truth(dataset)?
+        {
+            self.say(&format!("warning: {warning}"));
+        }
+        Ok(truth)
     }
 
     /// Prints what of a scene is probably not meant.

@@ -1,7 +1,9 @@
 //! Ctrl-C, SIGTERM and SIGHUP: the first one requests long work to stop and clean up, the next one ends the program
 //! immediately, with all programs it has started. A signal that is ignored when the program starts stays ignored.
 
+use catoptric::files::waiting::waits_for_input;
 use catoptric::{Stop, study};
+use std::io::Write;
 use std::sync::atomic::{AtomicI32, Ordering};
 use std::sync::{LazyLock, Mutex, Once, PoisonError};
 use std::time::{Duration, Instant};
@@ -56,12 +58,26 @@ fn received(signal: i32) {
             SIGNAL.store(signal, Ordering::SeqCst);
             current.1 = Some(Instant::now());
             current.0.request();
+            let _ = std::thread::Builder::new().spawn(move || end_a_wait(signal));
         }
         Some(first) if first.elapsed() < SAME => {}
         Some(_) => {
             study::end_programs();
             std::process::exit(BY_SIGNAL + signal);
         }
+    }
+}
+
+/// Ends the program once it waits for input, where no request to stop is seen.
+fn end_a_wait(signal: i32) {
+    loop {
+        if waits_for_input() {
+            study::end_programs();
+            // If stderr is closed, there is nowhere left to report to.
+            let _ = writeln!(anstream::stderr(), "{} while waiting for input", word());
+            std::process::exit(BY_SIGNAL + signal);
+        }
+        std::thread::sleep(Duration::from_millis(20));
     }
 }
 

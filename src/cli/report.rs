@@ -8,7 +8,7 @@ use super::outputs::Replacing;
 use catoptric::apply::{CloudSketch, Lift};
 use catoptric::files::Content;
 use catoptric::report::MAX_POINTS;
-use catoptric::{CloudFrame, Error, Verdict, files, read_calibration, read_reference, report, score};
+use catoptric::{CloudFrame, Error, Verdict, files, read_calibration, report, score};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -36,7 +36,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
     let outputs = arguments.replacing.outputs(&arguments.calibrations);
     let out = outputs.file(&arguments.out, &Content::Page)?;
     let dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
-    let truth = read_reference(&arguments.dataset, arguments.blind)?;
+    let truth = context.read_reference(&arguments.dataset, arguments.blind)?;
     let mut results = Vec::new();
     for path in &arguments.calibrations {
         context.check()?;

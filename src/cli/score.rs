@@ -6,7 +6,7 @@ use super::judging::{Judging, conclude, write_junit};
 use super::output::{print, quoted};
 use catoptric::files::names::printable_name;
 use catoptric::junit::Suite;
-use catoptric::{Score, read_reference, score_with};
+use catoptric::{Score, score_with};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &Arguments, context: &Context) -> Result<(), CliErr
         .judging
         .place(std::slice::from_ref(&arguments.calibration))?;
     let dataset = context.read_dataset(&arguments.dataset, arguments.reading)?;
-    let truth = read_reference(&arguments.dataset, arguments.judging.blind)?;
+    let truth = context.read_reference(&arguments.dataset, arguments.judging.blind)?;
     let calibration = arguments.judging.read(&arguments.calibration, junit.as_ref())?;
     let mut result = score_with(&dataset, &calibration, truth.as_ref(), &rules)?;
     if let Some(limit) = arguments.max_rms_deg {

@@ -6,7 +6,7 @@ use super::judging::{conclude, junit_place, unread, write_junit};
 use super::output::{counted, print, print_json, quoted};
 use super::outputs::Replacing;
 use catoptric::junit::Suite;
-use catoptric::validate::{Problem, Severity};
+use catoptric::validate::{Problem, Severity, validate_for};
 use catoptric::{Calibration, Error, Verdict, files, validate};
 use clap::Args;
 use serde_json::json;
@@ -20,6 +20,9 @@ const SCHEMA_VERSION: u32 = 1;
 pub(crate) struct Arguments {
     /// The calibration.
     calibration: PathBuf,
+    /// Also check it for use with a dataset: its scanner and the names of its mirrors.
+    #[arg(long, value_name = "DATASET")]
+    dataset: Option<PathBuf>,
     /// Print the problems as JSON.
     #[arg(long)]
     json: bool,
@@ -44,7 +47,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), CliError> {
             return Err(error.into());
         }
     };
-    let problems = validate(&calibration);
+    let session = arguments
+        .dataset
+        .as_deref()
+        .map(files::read_session)
+        .transpose()?;
+    let problems = match &session {
+        Some(session) => validate_for(&calibration, session),
+        None => validate(&calibration),
+    };
     let name = path.display().to_string();
     write_junit(junit, &[Suite::of_problems(&name, &problems)])?;
     let errors = problems.iter().filter(|p| p.severity == Severity::Error).count();

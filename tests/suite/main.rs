@@ -3,6 +3,7 @@
 
 mod bad_geometry;
 mod bad_input;
+mod borders;
 mod characterize;
 #[path = "../../examples/ci/calibrator.rs"]
 mod ci_example;

@@ -191,29 +191,74 @@ fn programs_of_a_study_end_with_it() {
     }
 }
 
-/// The second signal does not wait for the run, and its programs end all the same.
+fn fifo(path: &Path) {
+    assert!(Command::new("mkfifo").arg(path).status().unwrap().success());
+}
+
+/// Input that never comes: nobody opens the pipe, somebody opens it and writes nothing, standard input stays open.
 #[test]
-fn a_second_signal_ends_at_once() {
+fn a_signal_ends_the_wait_for_input() {
     let folder = workplace();
     let at = folder.path();
-    // A reader that waits for rays that never come.
-    assert!(
-        Command::new("mkfifo")
-            .arg(at.join("rays.csv"))
-            .status()
-            .unwrap()
-            .success()
-    );
+    fifo(&at.join("rays.csv"));
+    fifo(&at.join("pipe.toml"));
+    let trace: &[&str] = &["trace", "scene.toml", "--rays", "rays.csv", "--out", "paths.csv"];
+    for (arguments, opened) in [
+        (trace, Some("rays.csv")),
+        (trace, None),
+        (&["check", "pipe.toml"], None),
+        (&["check", "/dev/stdin"], None),
+        (&["validate", "/dev/stdin"], None),
+    ] {
+        for (signal, code, word) in [("INT", 130, "interrupted"), ("TERM", 143, "terminated")] {
+            let mut child = heeding_signals()
+                .args(arguments)
+                .current_dir(at)
+                .stdin(Stdio::piped())
+                .stdout(Stdio::piped())
+                .stderr(Stdio::piped())
+                .spawn()
+                .unwrap();
+            // A writer that only opens the pipe returns once the program reads it.
+            let _writer = opened.map(|pipe| std::fs::OpenOptions::new().write(true).open(at.join(pipe)));
+            std::thread::sleep(Duration::from_millis(300));
+            assert!(
+                child.try_wait().unwrap().is_none(),
+                "{arguments:?} waits for input"
+            );
+            send(signal, &child);
+            let sent = Instant::now();
+            let stdin = child.stdin.take();
+            let output = child.wait_with_output().unwrap();
+            drop(stdin);
+            assert_eq!(
+                output.status.code(),
+                Some(code),
+                "{arguments:?}: {}",
+                stderr(&output)
+            );
+            assert_eq!(stderr(&output), format!("{word} while waiting for input\n"));
+            // The promise is 0.1 s; machines on which tests run are busy.
+            assert!(sent.elapsed() < Duration::from_secs(5), "{arguments:?}");
+            assert!(names(at).iter().all(|name| !name.contains(".partial-")));
+        }
+    }
+}
+
+/// The second signal does not wait for the run.
+#[test]
+fn a_second_signal_ends_at_once() {
+    // More than a pipe holds, which nobody reads.
     let mut child = heeding_signals()
-        .args(["trace", "scene.toml", "--rays", "rays.csv", "--out", "paths.csv"])
-        .current_dir(at)
+        .args(["schema", "scene"])
+        .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    std::thread::sleep(Duration::from_secs(2));
+    std::thread::sleep(Duration::from_secs(1));
     send("TERM", &child);
     std::thread::sleep(Duration::from_millis(500));
-    assert!(child.try_wait().unwrap().is_none(), "it waits for its rays");
+    assert!(child.try_wait().unwrap().is_none(), "it waits for its reader");
     send("TERM", &child);
-    assert_eq!(child.wait_with_output().unwrap().status.code(), Some(143));
+    assert_eq!(child.wait().unwrap().code(), Some(143));
 }

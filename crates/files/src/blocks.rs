@@ -4,6 +4,7 @@
 
 use super::error::IoError;
 use super::records;
+use super::waiting;
 use catoptric_model::Stop;
 use crc32fast::Hasher;
 use mcap::records::op;
@@ -80,7 +81,7 @@ impl Place {
     /// A reader at the beginning of its bytes.
     pub(super) fn open(&self) -> io::Result<Box<dyn Read + '_>> {
         Ok(match self {
-            Self::File(path) => Box::new(BufReader::with_capacity(1 << 16, File::open(path)?)),
+            Self::File(path) => Box::new(BufReader::with_capacity(1 << 16, waiting::open(path)?)),
             Self::Memory(_, bytes) => Box::new(&bytes[..]),
         })
     }

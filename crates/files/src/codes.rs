@@ -24,20 +24,23 @@ pub(super) struct Codes {
 }
 
 impl Limits {
-    /// The narrower of the limits of a session and of a message. A message without a plausible longest range has none.
-    pub(super) fn of(scanner: &ScannerSheet, [low, high]: [f64; 2]) -> Self {
+    /// The narrower of the limits of a session and of a message; a message whose limits are both 0 states none.
+    ///
+    /// # Errors
+    /// Limits of the message that no scanner has, as text.
+    pub(super) fn of(scanner: &ScannerSheet, [low, high]: [f64; 2]) -> Result<Self, String> {
         let own = [scanner.range_min_m, scanner.range_max_m].map(|limit| f64::from(single(limit)));
-        if low.is_finite() && low >= 0.0 && high > low {
-            Self {
-                low: own[0].max(low),
-                high: own[1].min(high),
+        let [low, high] = match [low, high] {
+            [0.0, 0.0] => own,
+            // False for NaN; the longest range may be infinite.
+            [low, high] if low >= 0.0 && low.is_finite() && high > low => [own[0].max(low), own[1].min(high)],
+            [low, high] => {
+                return Err(format!(
+                    "range_min is {low} and range_max {high}; 0 or more and something larger are allowed, or 0 for both"
+                ));
             }
-        } else {
-            Self {
-                low: own[0],
-                high: own[1],
-            }
-        }
+        };
+        Ok(Self { low, high })
     }
 }
 
@@ -82,6 +85,32 @@ impl Codes {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn limits_that_no_scanner_has_are_refused() {
+        let scanner = crate::tests::session(3).scanner;
+        let [own_low, own_high] =
+            [scanner.range_min_m, scanner.range_max_m].map(|limit| f64::from(single(limit)));
+        let of = |limits| Limits::of(&scanner, limits).map(|l| [l.low, l.high]);
+        assert_eq!(of([0.0, 0.0]), Ok([own_low, own_high]));
+        assert_eq!(of([0.0, f64::INFINITY]), Ok([own_low, own_high]));
+        assert_eq!(of([0.05, 20.0]), Ok([0.05, 20.0]));
+        for [low, high] in [
+            [f64::NAN, 20.0],
+            [0.05, f64::NAN],
+            [-0.05, 20.0],
+            [20.0, 0.05],
+            [1.0, 1.0],
+            [f64::INFINITY, f64::INFINITY],
+            [f64::NEG_INFINITY, 20.0],
+        ] {
+            let error = of([low, high]).expect_err("refused");
+            assert!(
+                error.starts_with(&format!("range_min is {low} and range_max {high};")),
+                "{error}"
+            );
+        }
+    }
 
     #[test]
     fn codes_are_no_ranges_and_limits_are_ranges() {

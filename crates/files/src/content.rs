@@ -1,6 +1,6 @@
 //! What a file holds, by its beginning: this decides whether it may be written over.
 
-use std::fs::File;
+use super::waiting;
 use std::io::{self, Read};
 use std::path::Path;
 
@@ -177,7 +177,7 @@ impl Content {
     /// The error of the operating system if it cannot be read.
     pub fn of_file(path: &Path) -> io::Result<Self> {
         let mut head = Vec::new();
-        File::open(path)?.take(HEAD as u64).read_to_end(&mut head)?;
+        waiting::open(path)?.take(HEAD as u64).read_to_end(&mut head)?;
         Ok(Self::of(&head))
     }
 

@@ -21,6 +21,7 @@ use super::paths::unread;
 use super::playback::read_recording;
 use super::reading::{Damage, Records, records};
 use super::recording::{Encoded, RecordingEncoder, RecordingWriter};
+use super::waiting;
 use catoptric_model::{Dataset, Session, Stop, Stretch, session};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -336,7 +337,7 @@ pub(super) fn read_manifest(dataset: &Path) -> Result<Option<Manifest>, IoError>
         ));
     }
     let path = dataset.join(MANIFEST);
-    match fs::read(&path) {
+    match waiting::read(&path) {
         Ok(bytes) => {
             let manifest = parse_manifest(&bytes, &path)?;
             Ok(Some(manifest))
@@ -361,7 +362,7 @@ pub(super) fn read_checked(
     hashes: Option<&BTreeMap<String, String>>,
 ) -> Result<Vec<u8>, IoError> {
     let path = dataset.join(name);
-    let bytes = fs::read(&path).map_err(|e| IoError::read(&path, e))?;
+    let bytes = waiting::read(&path).map_err(|e| IoError::read(&path, e))?;
     // An editor may have changed the ends of lines, which mean nothing.
     let plain = String::from_utf8_lossy(&bytes).replace("\r\n", "\n");
     check(dataset, name, &sha256(plain.as_bytes()), hashes)

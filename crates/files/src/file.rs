@@ -6,6 +6,7 @@ use super::json::to_json;
 use super::leftovers;
 use super::output::{Output, There};
 use super::paths::parent;
+use super::waiting;
 use catoptric_model::Stop;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -206,7 +207,7 @@ pub fn sha256(bytes: &[u8]) -> String {
 /// Once a stop is requested, it ends with an error.
 pub(super) fn sha256_file(path: &Path, stop: &Stop) -> io::Result<String> {
     let mut hasher = Sha256::new();
-    let mut file = File::open(path)?;
+    let mut file = waiting::open(path)?;
     let mut buffer = vec![0; 1 << 16];
     loop {
         stop.check().map_err(io::Error::other)?;

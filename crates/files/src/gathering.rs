@@ -124,7 +124,7 @@ impl<R: Keep> Gathering<R> {
         if counts > 0 && counts != beams {
             return Err(format!("{beams} beams, intensities of {counts}"));
         }
-        codes.replace(&mut scan.ranges, Limits::of(scanner, scan.limits_m));
+        codes.replace(&mut scan.ranges, Limits::of(scanner, scan.limits_m)?);
         if self.label.kind == PoseKind::Flight {
             self.stamps.push(scan.stamp);
         }

@@ -2,9 +2,9 @@
 
 use super::error::IoError;
 use super::paths::unread;
+use super::waiting;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::fs;
 use std::path::Path;
 
 /// A value as indented JSON with a trailing newline; numbers that are not finite become null.
@@ -28,7 +28,7 @@ pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T, IoErr
 
 /// The bytes of a file.
 pub(super) fn bytes_of(path: &Path) -> Result<Vec<u8>, IoError> {
-    fs::read(path).map_err(|e| IoError::read(path, unread(path, e)))
+    waiting::read(path).map_err(|e| IoError::read(path, unread(path, e)))
 }
 
 /// Reads a value from the bytes of a JSON file, with or without a byte order mark; `path` names it in errors.

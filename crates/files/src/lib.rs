@@ -26,9 +26,11 @@ mod leftovers;
 pub mod names;
 #[cfg(feature = "recording")]
 mod order;
+#[cfg(feature = "recording")]
 mod outlying;
 pub mod output;
 pub mod paths;
+pub mod waiting;
 
 #[cfg(feature = "recording")]
 pub mod cdr;
@@ -117,7 +119,7 @@ pub use recording::RecordingWriter;
 pub use results::{parse_calibration, parse_characterization};
 pub use results::{read_calibration, read_calibration_for, read_characterization};
 #[cfg(all(feature = "recording", feature = "scene"))]
-pub use truth::{parse_truth, read_reference, read_truth};
+pub use truth::{parse_truth, read_reference, read_truth, unverified_truth};
 
 #[cfg(all(test, feature = "recording", feature = "scene"))]
 mod tests;

@@ -1,18 +1,26 @@
 //! The order of the messages of a recording: by the times at which they were logged, or by their own stamps where log times
 //! jitter; and messages that were recorded more than once.
 
-use super::blocks::{Block, Place, Visit};
-use super::error::IoError;
-use super::gathering::Keep;
+use super::blocks::Block;
 use super::messages;
-use super::playback::Playback;
-use super::source::Entry;
+use super::records;
 use super::topics::Topic;
-use catoptric_model::Stop;
 use std::collections::VecDeque;
 
 /// Scans, or frames of one body, among which a repeated one is looked for: recorders that write all twice are not far apart.
 const MOST_RECENT: usize = 8;
+
+/// A message of a recording that is not in order.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Entry {
+    /// When it was logged, in nanoseconds.
+    pub(super) time: u64,
+    pub(super) is_label: bool,
+    pub(super) is_scan: bool,
+    /// Its block, and its index there.
+    pub(super) block: u32,
+    pub(super) number: u32,
+}
 
 /// The times of the messages that matter.
 #[derive(Default)]
@@ -28,47 +36,27 @@ pub(super) struct Index {
 }
 
 impl Index {
-    /// Reads a recording for the times of its messages.
-    pub(super) fn of<R: Keep>(
-        place: &Place,
-        playback: &mut Playback<'_, R>,
-        stop: &Stop,
-    ) -> Result<Self, IoError> {
-        let mut index = Self::default();
-        let partial = playback.partial;
-        let (blocks, length) = place.visit(stop, partial, |event| index.take(event, playback))?;
-        (index.blocks, index.length) = (blocks, length);
-        Ok(index)
-    }
-
-    fn take<R: Keep>(&mut self, event: Visit<'_>, playback: &mut Playback<'_, R>) -> Result<(), String> {
-        let Visit::Record { opcode, data, at } = event else {
-            return playback.take(event);
-        };
-        let Some(message) = playback.define(opcode, data)? else {
-            return Ok(());
-        };
-        self.epoch = Some(self.epoch.map_or(message.time, |epoch| epoch.min(message.time)));
-        match playback.topics.get(&message.channel) {
-            None => Err(playback.no_channel(message.channel)),
-            Some(Topic::Other) => Ok(()),
-            Some(topic) => {
-                let number = |n: usize| u32::try_from(n).map_err(|_| "too many messages".to_owned());
-                let is_label = matches!(topic, Topic::Label(_));
-                self.entries.push(Entry {
-                    time: message.time,
-                    is_label,
-                    is_scan: matches!(topic, Topic::Scan),
-                    block: number(at.0)?,
-                    number: number(at.1)?,
-                });
-                self.stamps.push(match is_label {
-                    true => None,
-                    false => messages::decode_stamp(message.data).ok(),
-                });
-                Ok(())
-            }
-        }
+    /// Adds a message on a topic that is read, given the index of its block and its index there.
+    pub(super) fn push(
+        &mut self,
+        topic: &Topic,
+        message: &records::Message<'_>,
+        at: (usize, usize),
+    ) -> Result<(), String> {
+        let number = |n: usize| u32::try_from(n).map_err(|_| "too many messages".to_owned());
+        let is_label = matches!(topic, Topic::Label(_));
+        self.entries.push(Entry {
+            time: message.time,
+            is_label,
+            is_scan: matches!(topic, Topic::Scan),
+            block: number(at.0)?,
+            number: number(at.1)?,
+        });
+        self.stamps.push(match is_label {
+            true => None,
+            false => messages::decode_stamp(message.data).ok(),
+        });
+        Ok(())
     }
 
     /// Ordered by log times; of equal times labels come first.

@@ -5,6 +5,7 @@
 
 use super::scene::{self, SceneErrors};
 use super::tree::{self, Node, Source, Value};
+use super::waiting;
 use super::{format, parameters};
 use catoptric_model::place::{Problem, Segment};
 use catoptric_sim::build::pattern;
@@ -38,7 +39,7 @@ impl ParametricScene {
     /// As [`scene::load`].
     pub fn load(path: &Path, sets: &[String]) -> Result<Self, SceneErrors> {
         let scene = scene::load(path, sets)?;
-        let text = std::fs::read_to_string(path).map_err(|source| SceneErrors::Read {
+        let text = waiting::read_text(path).map_err(|source| SceneErrors::Read {
             path: path.to_owned(),
             source,
             help: None,

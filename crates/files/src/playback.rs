@@ -17,9 +17,9 @@ use super::codes::Codes;
 use super::error::IoError;
 use super::gathering::{Gathering, Keep, Known, Whole};
 use super::messages;
-use super::order::Index;
+use super::order::{Entry, Index};
 use super::records;
-use super::source::{Entry, Position, Source, Start};
+use super::source::{Position, Source, Start};
 use super::topics::{LABEL_TOPIC, Text, Topic};
 use catoptric_model::session::ScannerSheet;
 use catoptric_model::{PoseLabel, Session, Stop, Stretch};
@@ -41,11 +41,11 @@ pub(super) struct Played<R: Keep> {
 }
 
 /// The state of reading a recording.
-pub(super) struct Playback<'a, R: Keep> {
+struct Playback<'a, R: Keep> {
     scanner: &'a ScannerSheet,
     bodies: Bodies,
     schemas: BTreeMap<u16, String>,
-    pub(super) topics: BTreeMap<u16, Topic>,
+    topics: BTreeMap<u16, Topic>,
     /// Names of all topics.
     names: BTreeSet<String>,
     /// Time of the first message, in nanoseconds.
@@ -57,7 +57,7 @@ pub(super) struct Playback<'a, R: Keep> {
     is_unordered: bool,
     is_sorted: bool,
     /// Whether a stretch with a fault is left out instead of the whole recording.
-    pub(super) partial: bool,
+    partial: bool,
     /// Whether some of the recording cannot be read.
     has_damage: bool,
     current: Option<Gathering<R>>,
@@ -113,8 +113,13 @@ pub(super) fn play<R: Keep>(
     }
     // Log times that jitter may put messages into a neighboring stretch.
     let mut playback = Playback::<R>::new(place, session, partial)?;
-    let index = Index::of(place, &mut playback, stop)?;
-    let Some((index, jitter_ns)) = index.by_stamps(session.scanner.scan.scan_period_s()) else {
+    let index = match indexed(place, &mut playback, stop) {
+        Ok(index) => index.by_stamps(session.scanner.scan.scan_period_s()),
+        Err(error @ IoError::Stopped(_)) => return Err(error),
+        // What was found first is reported.
+        Err(_) => None,
+    };
+    let Some((index, jitter_ns)) = index else {
         return as_logged;
     };
     match sorted(place, session, playback, stop, index) {
@@ -149,8 +154,30 @@ fn as_logged<R: Keep>(
     }
     // Once more, for the times of all messages, and then in order.
     let mut playback = Playback::<R>::new(place, session, partial)?;
-    let index = Index::of(place, &mut playback, stop)?;
+    let index = indexed(place, &mut playback, stop)?;
     sorted(place, session, playback, stop, index.by_log_time())
+}
+
+/// Reads a recording for the times of its messages.
+fn indexed<R: Keep>(place: &Place, playback: &mut Playback<'_, R>, stop: &Stop) -> Result<Index, IoError> {
+    let mut index = Index::default();
+    let partial = playback.partial;
+    let (blocks, length) = place.visit(stop, partial, |event| {
+        let Visit::Record { opcode, data, at } = event else {
+            return playback.take(event);
+        };
+        let Some(message) = playback.define(opcode, data)? else {
+            return Ok(());
+        };
+        index.epoch = Some(index.epoch.map_or(message.time, |epoch| epoch.min(message.time)));
+        match playback.topics.get(&message.channel) {
+            None => Err(playback.no_channel(message.channel)),
+            Some(Topic::Other) => Ok(()),
+            Some(topic) => index.push(topic, &message, at),
+        }
+    })?;
+    (index.blocks, index.length) = (blocks, length);
+    Ok(index)
 }
 
 /// Reads the messages of a recording in the order of an index, made with the help of a playback.
@@ -213,7 +240,7 @@ impl<'a, R: Keep> Playback<'a, R> {
     }
 
     /// Processes what a visit of the recording comes to.
-    pub(super) fn take(&mut self, event: Visit<'_>) -> Result<(), String> {
+    fn take(&mut self, event: Visit<'_>) -> Result<(), String> {
         match event {
             Visit::Damage(what) => {
                 self.fault(what.to_owned());
@@ -231,11 +258,7 @@ impl<'a, R: Keep> Playback<'a, R> {
     }
 
     /// Processes a schema or a channel; returns a message.
-    pub(super) fn define<'m>(
-        &mut self,
-        opcode: u8,
-        data: &'m [u8],
-    ) -> Result<Option<records::Message<'m>>, String> {
+    fn define<'m>(&mut self, opcode: u8, data: &'m [u8]) -> Result<Option<records::Message<'m>>, String> {
         let short = |what: &str| format!("not a whole recording: a {what} claims more than its record has");
         match opcode {
             op::SCHEMA => {
@@ -258,7 +281,7 @@ impl<'a, R: Keep> Playback<'a, R> {
         Ok(None)
     }
 
-    pub(super) fn no_channel(&self, channel: u16) -> String {
+    fn no_channel(&self, channel: u16) -> String {
         format!("a message on channel {channel}, which does not exist")
     }
 

@@ -8,12 +8,12 @@ use super::names::defused;
 use super::npy::{self, Float};
 use super::output::Output;
 use super::paths::unread;
+use super::waiting;
 use catoptric_cast::Ray;
 use catoptric_model::limits::FAR_M;
 use catoptric_model::place::nearest;
 use catoptric_sim::trace::{Fate, Vertex};
 use nalgebra::{Point3, Unit, Vector3};
-use std::fs::File;
 use std::io::{BufReader, Cursor, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
@@ -89,7 +89,7 @@ impl RayReader {
     /// [`IoError`] if it cannot be read or does not have the header of rays.
     pub fn open(path: &Path) -> Result<Self, IoError> {
         Format::of(path)?;
-        let file = File::open(path).map_err(|e| IoError::read(path, unread(path, e)))?;
+        let file = waiting::open(path).map_err(|e| IoError::read(path, unread(path, e)))?;
         Self::of(Box::new(file), path)
     }
 

@@ -13,6 +13,7 @@ use super::mesh;
 use super::parameters;
 use super::paths::{parent, similar};
 use super::tree::{self, Node, Source};
+use super::waiting;
 use catoptric_model::limits::FAR_M;
 use catoptric_model::place::Problem;
 use catoptric_sim::Scene;
@@ -113,7 +114,7 @@ pub fn load(path: &Path, sets: &[String]) -> Result<Scene, SceneErrors> {
 /// # Errors
 /// As [`load`].
 pub fn load_text(path: &Path, sets: &[String]) -> Result<(String, Scene), SceneErrors> {
-    let bytes = std::fs::read(path).map_err(|source| SceneErrors::Read {
+    let bytes = waiting::read(path).map_err(|source| SceneErrors::Read {
         help: similar(path, &source),
         path: path.to_owned(),
         source,

@@ -6,7 +6,7 @@ use super::capture::{Capture, MOST_WAITING};
 use super::codes::{Codes, Limits};
 use super::error::IoError;
 use super::messages;
-use super::order::Recent;
+use super::order::{Entry, Recent};
 use super::records;
 use super::topics::Topic;
 use catoptric_model::session::ScannerSheet;
@@ -28,18 +28,6 @@ pub(super) struct Start {
     pub(super) end: Position,
     /// Its scans.
     pub(super) scans: usize,
-}
-
-/// A message of a recording that is not in order.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Entry {
-    /// When it was logged, in nanoseconds.
-    pub(super) time: u64,
-    pub(super) is_label: bool,
-    pub(super) is_scan: bool,
-    /// Its block, and its index there.
-    pub(super) block: u32,
-    pub(super) number: u32,
 }
 
 /// A recording with the index of its contents.
@@ -210,6 +198,7 @@ impl ScansOf<'_> {
                 let scan = messages::decode_scan(message);
                 let mut scan = scan.map_err(|_| source.place.changed(0))?;
                 let limits = Limits::of(&source.scanner, scan.limits_m);
+                let limits = limits.map_err(|_| source.place.changed(0))?;
                 Codes::default().replace(&mut scan.ranges, limits);
                 return Ok(scan.ranges);
             }

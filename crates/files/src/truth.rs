@@ -67,6 +67,22 @@ pub fn read_reference(dataset: &Path, blind: bool) -> Result<Option<Truth>, IoEr
     })
 }
 
+/// Why a truth may not be the one of its dataset: a sentence, if it has one and no manifest that could show that it was
+/// changed.
+///
+/// # Errors
+/// As [`read_truth`], except for the truth itself, which is not read.
+pub fn unverified_truth(dataset: &Path) -> Result<Option<String>, IoError> {
+    let path = dataset.join(TRUTH);
+    let is_unverified = path.exists() && read_manifest(dataset)?.is_none();
+    Ok(is_unverified.then(|| {
+        format!(
+            "{} is not verified: there is no {MANIFEST} that would show a change of it",
+            path.display()
+        )
+    }))
+}
+
 /// Checks that the beams of a truth are among those of the scanner of its dataset.
 fn check(truth: &Truth, session: &Session) -> Result<(), String> {
     let beams = session.scanner.scan.beams();

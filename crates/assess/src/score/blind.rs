@@ -1,8 +1,7 @@
 //! The gates of a score without a truth: what the drawing has deflected, how much is stated, and the residuals on boards and
 //! walls, of all mirrors and of each.
 
-use super::gate::{Gate, Outcome, SIGNIFICANCE, elements, median_limit, worst_median_limit};
-use super::judge::shares;
+use super::gate::{Gate, Outcome, SIGNIFICANCE, elements, median_limit, shares, worst_median_limit};
 use super::residual::Normalized;
 use super::{Score, wrap};
 use catoptric_model::{Calibration, Dataset, Status};

@@ -138,6 +138,25 @@ fn exceeded(freedom: f64, probability: f64) -> f64 {
     ChiSquared::new(freedom).map_or(f64::NAN, |d| d.inverse_cdf(1.0 - probability))
 }
 
+/// A gate on the share of the scored elements that state something; without any there is nothing to judge.
+pub(super) fn shares(name: &str, what: &str, with: usize, scored: usize) -> Gate {
+    let words = |with: usize| {
+        format!(
+            "{with} of {scored} scored elements state {what}; at least {:.0} % are required",
+            100.0 * ENOUGH
+        )
+    };
+    match (with, scored) {
+        (_, 0) => Gate::without(name, Outcome::NotTested, "no element is scored"),
+        (0, _) => Gate {
+            found: 0.0,
+            at_least: Some(ENOUGH),
+            ..Gate::without(name, Outcome::NotJudged, words(0))
+        },
+        (with, scored) => Gate::at_least(name, with as f64 / scored as f64, ENOUGH, words(with)),
+    }
+}
+
 /// "1 element is", "2 elements are".
 pub fn elements(count: usize, one: &str, many: &str) -> String {
     if count == 1 {

@@ -2,7 +2,7 @@
 
 use super::bound::largest_sd;
 use super::element::USEFUL_SD;
-use super::gate::{ENOUGH, Gate, MIN_SOLVED, Outcome, SIGNIFICANCE, elements, mean_limit, worst_limit};
+use super::gate::{Gate, MIN_SOLVED, Outcome, SIGNIFICANCE, elements, mean_limit, shares, worst_limit};
 use super::range_bias::{self, WorstBias};
 use super::residual::ROUNDING_MM;
 use super::statistics::percentile;
@@ -176,25 +176,6 @@ fn unstated(score: &Score) -> Option<Gate> {
         counted(without().count())
     );
     Some(Gate::at_most("unstated", square(worst), limit, words).with_rate(SIGNIFICANCE))
-}
-
-/// A gate on the share of the scored elements that state something; without any there is nothing to judge.
-pub(super) fn shares(name: &str, what: &str, with: usize, scored: usize) -> Gate {
-    let words = |with: usize| {
-        format!(
-            "{with} of {scored} scored elements state {what}; at least {:.0} % are required",
-            100.0 * ENOUGH
-        )
-    };
-    match (with, scored) {
-        (_, 0) => Gate::without(name, Outcome::NotTested, "no element is scored"),
-        (0, _) => Gate {
-            found: 0.0,
-            at_least: Some(ENOUGH),
-            ..Gate::without(name, Outcome::NotJudged, words(0))
-        },
-        (with, scored) => Gate::at_least(name, with as f64 / scored as f64, ENOUGH, words(with)),
-    }
 }
 
 /// The gates on the honesty of the covariance.

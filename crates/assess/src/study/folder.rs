@@ -153,7 +153,7 @@ impl Tables {
 }
 
 fn parsed<T>(path: &Path, parse: impl FnOnce(&str) -> Result<T, String>) -> Result<T, StudyError> {
-    let text = std::fs::read_to_string(path).map_err(|source| IoError::Read {
+    let text = catoptric_files::waiting::read_text(path).map_err(|source| IoError::Read {
         path: path.to_owned(),
         source,
     })?;

@@ -3,14 +3,67 @@
 use super::problem::OfBeam;
 use super::sane::{ANGLE_SD_RAD, MIRROR_DISTANCE_M};
 use super::sane::{check_covariance, is_unit};
-use catoptric_model::{BeamEstimate, Status};
+use catoptric_model::{BeamEstimate, Calibration, Status};
 use nalgebra::SVector;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+/// What angles beyond their limits look like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Wraps {
+    /// Radians to which whole turns were added: nothing is far beyond a turn.
+    Turns,
+    /// Degrees.
+    Degrees,
+}
+
+impl Wraps {
+    /// By all angles of a calibration: one alone can be both.
+    pub(super) fn of(calibration: &Calibration) -> Self {
+        let angles = calibration
+            .beams
+            .iter()
+            .flat_map(|b| [b.azimuth_rad, b.elevation_rad]);
+        let largest = angles.flatten().map(f64::abs).filter(|a| a.is_finite());
+        match largest.fold(0.0, f64::max) <= PI + MOST_TURNS * TAU {
+            true => Self::Turns,
+            false => Self::Degrees,
+        }
+    }
+
+    /// What a value beyond its limit would be.
+    fn hint(self, value: f64, limit: f64) -> Option<String> {
+        let turns = (value / TAU).round();
+        let within = value - turns * TAU;
+        match self {
+            Self::Turns if turns.abs() == MOST_TURNS && within.abs() <= limit + ROUNDED => {
+                let (too, change) = if turns > 0.0 {
+                    ("much", "minus")
+                } else {
+                    ("little", "plus")
+                };
+                Some(format!(
+                    "it looks like a whole turn too {too}: {change} 2π it is {within:.4} rad"
+                ))
+            }
+            Self::Degrees if value.abs() > TAU => Some(format!(
+                "it looks like degrees: {value}° is {:.4} rad",
+                value.to_radians()
+            )),
+            Self::Turns | Self::Degrees => None,
+        }
+    }
+}
+
+/// Whole turns that angles in radians may have too much; degrees are hardly ever all below that.
+const MOST_TURNS: f64 = 1.0;
+
+/// Rounding to nine digits may move an angle this far beyond its limit.
+const ROUNDED: f64 = 1e-9;
+
 /// Checks one element.
-pub(super) fn check_element(at: &mut OfBeam, b: &BeamEstimate) {
+pub(super) fn check_element(at: &mut OfBeam, b: &BeamEstimate, wraps: Wraps) {
     check_status(at, b);
-    check_angles(at, b);
+    check_angles(at, b, wraps);
     check_covariances(at, b);
 }
 
@@ -62,23 +115,17 @@ fn check_status(at: &mut OfBeam, b: &BeamEstimate) {
     }
 }
 
-fn check_angles(at: &mut OfBeam, b: &BeamEstimate) {
+fn check_angles(at: &mut OfBeam, b: &BeamEstimate, wraps: Wraps) {
     for (key, value, limit, limit_name) in [
         ("azimuth_rad", b.azimuth_rad, PI, "π"),
         ("elevation_rad", b.elevation_rad, FRAC_PI_2, "π/2"),
     ] {
         match value {
             Some(value) if !value.is_finite() => at.error(key, format!("is {value}, not a number")),
-            // Rounding to nine digits may move an angle this far beyond its limit.
-            Some(value) if value.abs() > limit + 1e-9 => {
-                let hint = if value.abs() > TAU {
-                    format!(
-                        "; it looks like degrees: {value}° is {:.4} rad",
-                        value.to_radians()
-                    )
-                } else {
-                    String::new()
-                };
+            Some(value) if value.abs() > limit + ROUNDED => {
+                let hint = wraps
+                    .hint(value, limit)
+                    .map_or_else(String::new, |hint| format!("; {hint}"));
                 at.error(key, format!("is {value}, outside ±{limit_name}{hint}"));
             }
             _ => {}

@@ -6,8 +6,9 @@ mod sane;
 mod shared;
 
 use catoptric_model::calibration::{self, Calibration};
+use catoptric_model::place::nearest;
 use catoptric_model::{ScanGeometry, Session};
-use element::check_element;
+use element::{Wraps, check_element};
 use problem::Problems;
 use shared::{check_bias, check_facet, check_mount};
 use std::collections::BTreeSet;
@@ -43,7 +44,7 @@ pub fn validate(calibration: &Calibration) -> Vec<Problem> {
 }
 
 /// Everything wrong with a calibration for use with a dataset of this session: as [`validate`], and it must be of the same
-/// scanner, which is the session's if it states none.
+/// scanner, which is the session's if it states none, and name no mirrors but the session's.
 pub fn validate_for(calibration: &Calibration, session: &Session) -> Vec<Problem> {
     let mut found = check(calibration, Some(session));
     if let Err(error) = calibration.check_scanner(session) {
@@ -51,7 +52,39 @@ pub fn validate_for(calibration: &Calibration, session: &Session) -> Vec<Problem
         problems.error("scanner", format!("does not fit: {error}"));
         found.extend(problems.list);
     }
+    found.extend(unknown_facets(calibration, session));
     found
+}
+
+/// Names of facets that the session does not have. One without any facets, of a laboratory that did not list them, knows none.
+fn unknown_facets(calibration: &Calibration, session: &Session) -> Vec<Problem> {
+    let mut problems = Problems::default();
+    if session.facets.is_empty() {
+        return problems.list;
+    }
+    let names = || session.facets.iter().map(|f| f.name.as_str());
+    let wrong = |name: &str| {
+        let help = match nearest(name, names()) {
+            Some(near) => format!("did you mean {near:?}?"),
+            None => format!(
+                "it has {}",
+                names().map(|n| format!("{n:?}")).collect::<Vec<_>>().join(", ")
+            ),
+        };
+        (!names().any(|known| known == name))
+            .then(|| format!("is {name:?}, a mirror that the session does not have; {help}"))
+    };
+    for (place, estimate) in calibration.beams.iter().enumerate() {
+        if let Some(message) = estimate.facet.as_deref().and_then(wrong) {
+            problems.of_beam(place, estimate.beam).error("facet", message);
+        }
+    }
+    for (place, facet) in calibration.facets.iter().enumerate() {
+        if let Some(message) = wrong(&facet.facet) {
+            problems.error(&format!("facets[{place}].facet"), message);
+        }
+    }
+    problems.list
 }
 
 fn check(calibration: &Calibration, session: Option<&Session>) -> Vec<Problem> {
@@ -94,6 +127,7 @@ fn check(calibration: &Calibration, session: Option<&Session>) -> Vec<Problem> {
     if calibration.beams.is_empty() {
         problems.error("beams", "lists no element".to_owned());
     }
+    let wraps = Wraps::of(calibration);
     let mut seen = BTreeSet::new();
     for (place, estimate) in calibration.beams.iter().enumerate() {
         let mut at = problems.of_beam(place, estimate.beam);
@@ -111,7 +145,7 @@ fn check(calibration: &Calibration, session: Option<&Session>) -> Vec<Problem> {
         if !seen.insert(estimate.beam) {
             at.error("beam", "is listed more than once".to_owned());
         }
-        check_element(&mut at, estimate);
+        check_element(&mut at, estimate, wraps);
     }
     let mut names = BTreeSet::new();
     for (place, facet) in calibration.facets.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! Validation of what elements share: facets, the mounting of the sensor, range biases.
 
 use super::problem::Problems;
-use super::sane::MIRROR_DISTANCE_M;
+use super::sane::{ANGLE_SD_RAD, MIRROR_DISTANCE_M};
 use super::sane::{check_covariance, is_near, is_unit};
 use catoptric_model::RangeBias;
 use catoptric_model::calibration::{FacetEstimate, MountEstimate};
@@ -27,12 +27,32 @@ pub(super) fn check_facet(problems: &mut Problems, key: &str, facet: &FacetEstim
             ),
         );
     }
-    if let Err(message) = check_covariance(&facet.covariance) {
+    let checked =
+        check_covariance(&facet.covariance).and_then(|()| check_meaning(&facet.covariance, |i| i < 2));
+    if let Err(message) = checked {
         problems.error(
             &format!("{key}.covariance"),
             format!("of {:?} {message}", facet.facet),
         );
     }
+}
+
+/// Checks the standard deviations of a covariance, of lengths and of angles: as large as what they describe, they mean nothing.
+fn check_meaning<const N: usize>(rows: &[[f64; N]; N], is_angle: fn(usize) -> bool) -> Result<(), String> {
+    for (i, row) in rows.iter().enumerate() {
+        let sd = row[i].sqrt();
+        let (most, unit) = if is_angle(i) {
+            (ANGLE_SD_RAD[1], "rad")
+        } else {
+            (MIRROR_DISTANCE_M, "m")
+        };
+        if sd > most {
+            return Err(format!(
+                "means a standard deviation of {sd:.3} {unit} in row {i}, which is meaningless"
+            ));
+        }
+    }
+    Ok(())
 }
 
 pub(super) fn check_mount(problems: &mut Problems, mount: &MountEstimate) {
@@ -49,10 +69,11 @@ pub(super) fn check_mount(problems: &mut Problems, mount: &MountEstimate) {
             format!("has length {length}, a unit quaternion has length 1"),
         );
     }
-    if let Some(covariance) = mount.covariance
-        && let Err(message) = check_covariance(&covariance)
-    {
-        problems.error("rig_from_sensor.covariance", message);
+    if let Some(covariance) = mount.covariance {
+        let checked = check_covariance(&covariance).and_then(|()| check_meaning(&covariance, |i| i > 2));
+        if let Err(message) = checked {
+            problems.error("rig_from_sensor.covariance", message);
+        }
     }
 }
 

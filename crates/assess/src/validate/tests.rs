@@ -191,3 +191,106 @@ fn the_rest_of_the_file_is_checked_too() {
         "bias.distance"
     );
 }
+
+#[test]
+fn whole_turns_are_recognized_and_are_no_degrees() {
+    use std::f64::consts::TAU;
+    for (turn, words) in [(TAU, "much: minus"), (-TAU, "little: plus")] {
+        let problems = after(|c, _| {
+            for b in &mut c.beams {
+                b.azimuth_rad = b.azimuth_rad.map(|a| a + turn);
+            }
+        });
+        assert!(problems.len() > 300);
+        for problem in &problems {
+            assert!(
+                problem
+                    .message
+                    .contains(&format!("; it looks like a whole turn too {words} 2π it is ")),
+                "{problem}"
+            );
+        }
+    }
+    let problem = after(|c, i| c.beams[i].elevation_rad = Some(TAU + 0.5));
+    assert!(one(&problem).message.ends_with("minus 2π it is 0.5000 rad"));
+    // The nearest whole turn leaves it beyond its limit.
+    let problem = after(|c, i| c.beams[i].elevation_rad = Some(2.0));
+    assert_eq!(one(&problem).message, "is 2, outside ±π/2");
+}
+
+#[test]
+fn straight_up_and_down_are_elevations() {
+    use std::f64::consts::FRAC_PI_2;
+    for elevation in [FRAC_PI_2, -FRAC_PI_2, 1.570796327, -1.570796327] {
+        assert_eq!(after(|c, i| c.beams[i].elevation_rad = Some(elevation)), []);
+    }
+    assert_eq!(after(|c, i| c.beams[i].elevation_rad = Some(-1.5708)).len(), 1);
+}
+
+#[test]
+fn mirrors_that_the_session_does_not_have_are_named() {
+    let s = sample();
+    let session = &s.dataset.session;
+    let known = session.facets[0].name.clone();
+    let with = |name: &str| {
+        let mut calibration = noisy(&s.truth, 1e-3, 1);
+        let b = calibration.beams.iter_mut().find(|b| b.facet.is_some());
+        b.expect("some are deflected").facet = Some(name.to_owned());
+        calibration.facets = vec![FacetEstimate {
+            facet: name.to_owned(),
+            normal: [0.0, 0.0, 1.0],
+            offset_m: 0.05,
+            covariance: [[0.0; 3]; 3],
+        }];
+        validate_for(&calibration, session)
+    };
+    assert_eq!(with(&known), []);
+    let problems = with(&format!("{known}x"));
+    let keys: Vec<&str> = problems
+        .iter()
+        .map(|p| p.key.rsplit('.').next().unwrap_or_default())
+        .collect();
+    assert_eq!(keys, ["facet", "facet"]);
+    for problem in &problems {
+        assert_eq!(problem.severity, Severity::Error);
+        let words = format!("is \"{known}x\", a mirror that the session does not have; did you mean ");
+        assert!(problem.message.starts_with(&words), "{problem}");
+    }
+    let words = format!("it has \"{known}\", ");
+    assert!(with("quite another")[0].message.contains(&words));
+    let mut unlisted = session.clone();
+    unlisted.facets.clear();
+    assert_eq!(validate_for(&noisy(&s.truth, 1e-3, 1), &unlisted), []);
+}
+
+#[test]
+fn covariances_of_mountings_and_mirrors_that_mean_nothing_are_refused() {
+    for (row, sd, unit) in [(0, 11.0, "11.000 m"), (5, 32.0, "32.000 rad")] {
+        let problems = after(|c, _| {
+            let mut covariance = [[0.0; 6]; 6];
+            covariance[row][row] = sd * sd;
+            c.rig_from_sensor.as_mut().expect("it has one").covariance = Some(covariance);
+        });
+        assert_eq!(
+            one(&problems).message,
+            format!("means a standard deviation of {unit} in row {row}, which is meaningless")
+        );
+    }
+    let facet = |row: usize, variance: f64| {
+        let problems = after(|c, _| {
+            let mut covariance = [[0.0; 3]; 3];
+            covariance[row][row] = variance;
+            c.facets.push(FacetEstimate {
+                facet: "port".to_owned(),
+                normal: [0.0, 0.0, 1.0],
+                offset_m: 0.05,
+                covariance,
+            });
+        });
+        problems.len()
+    };
+    assert_eq!(
+        [facet(0, 9.0), facet(0, 10.0), facet(2, 99.0), facet(2, 101.0)],
+        [0, 1, 0, 1]
+    );
+}

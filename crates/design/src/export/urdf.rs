@@ -74,3 +74,14 @@ fn escape(text: &str) -> String {
         .replace('>', "&gt;")
         .replace('"', "&quot;")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_cannot_end_an_attribute() {
+        assert_eq!(escape("\"/><a b='&amp;'"), "&quot;/&gt;&lt;a b='&amp;amp;'");
+        assert_eq!(escape("plain-1"), "plain-1");
+    }
+}

@@ -16,9 +16,9 @@ pub use ply::to_ply;
 use super::error::IoError;
 use super::extension::{by_extension, listed};
 use super::paths::unread;
+use super::waiting;
 use catoptric_sim::Mesh;
 use row::{Fault, Row};
-use std::fs;
 use std::path::Path;
 
 catoptric_model::closed_set! {
@@ -56,7 +56,7 @@ impl MeshFormat {
 /// or [`IoError::Content`] if it is not a valid mesh.
 pub fn read_mesh(path: impl AsRef<Path>) -> Result<Mesh, IoError> {
     let path = path.as_ref();
-    let bytes = fs::read(path).map_err(|e| IoError::read(path, unread(path, e)))?;
+    let bytes = waiting::read(path).map_err(|e| IoError::read(path, unread(path, e)))?;
     parse_mesh(&bytes, path)
 }
 
@@ -128,6 +128,33 @@ mod tests {
             assert_eq!(corners_of(mesh), corners_of(&meshes[0]));
             assert_eq!(mesh.vertices().len(), 4, "corners are shared");
             assert_eq!(parse_mesh(&to_ply(mesh), "x.ply").expect("our own"), *mesh);
+        }
+    }
+
+    /// A U of 6 m by 4 m whose notch is 2 m wide and 3 m deep: a fan from its first corner would cover the notch.
+    #[test]
+    fn the_notch_of_a_concave_face_stays_open_in_every_text() {
+        let corners = [[0, 0], [6, 0], [6, 4], [4, 4], [4, 1], [2, 1], [2, 4], [0, 4]];
+        let vertices = |before: &str| corners.map(|[x, y]| format!("{before}{x} {y} 0\n")).concat();
+        let obj = format!("{}f 1 2 3 4 5 6 7 8\n", vertices("v "));
+        let ply = format!(
+            "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n\
+             property list uchar int vertex_indices\nend_header\n{}8 0 1 2 3 4 5 6 7\n",
+            vertices("")
+        );
+        for (name, text) in [("u.obj", obj), ("u.ply", ply)] {
+            let mesh = parse_mesh(text.as_bytes(), name).expect("a mesh");
+            let (mut area, mut in_notch) = (0.0, false);
+            for [a, b, c] in corners_of(&mesh) {
+                let cross = |p: [f64; 3], q: [f64; 3], r: [f64; 3]| {
+                    (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+                };
+                area += 0.5 * cross(a, b, c);
+                let inside = [3.0, 2.5, 0.0];
+                let sides = [cross(a, b, inside), cross(b, c, inside), cross(c, a, inside)];
+                in_notch |= sides.iter().all(|s| *s > 0.0) || sides.iter().all(|s| *s < 0.0);
+            }
+            assert!((area - 18.0).abs() < 1e-12 && !in_notch, "{name}: {area}");
         }
     }
 

@@ -29,7 +29,7 @@ fn scan(step_deg: f64, beams: usize) -> ScanGeometry {
 }
 
 /// A session with a rig, two boards and a scanner with a given number of beams.
-fn session(beams: usize) -> Session {
+pub(crate) fn session(beams: usize) -> Session {
     let marker = |name: &str, position_mm| Marker {
         name: name.to_owned(),
         position_mm,

@@ -257,3 +257,108 @@ fn a_stretch_in_which_too_few_frames_agree_is_left_out() {
         found.warnings
     );
 }
+
+/// The last of the seven numbers of a scan's sheet is at this place of a message.
+fn with_number(data: &[u8], place: usize, number: f32) -> Vec<u8> {
+    let at = 4 + 8 + (4 + messages::LASER_FRAME.len() + 1).next_multiple_of(4) + 4 * place;
+    let mut data = data.to_vec();
+    data[at..at + 4].copy_from_slice(&number.to_le_bytes());
+    data
+}
+
+/// Changes every scan of a recording.
+fn with_scans(bytes: &[u8], change: impl Fn(&[u8]) -> Vec<u8>) -> Vec<u8> {
+    let mut changed = messages(bytes);
+    for (_, _, data) in changed.iter_mut().filter(|m| m.0 == "/scan") {
+        *data = change(data);
+    }
+    written(bytes, &changed)
+}
+
+#[test]
+fn codes_of_drivers_and_limits_of_messages_are_no_ranges() {
+    let session = session(3);
+    let mut lab = stretch(&session, 0, 4, 9, 5);
+    let single = |x: f64| f64::from(messages::single(x));
+    lab.ranges = [0.0, 65.533, 1.5].map(single).repeat(4);
+    let bytes = record(&session, &[lab]);
+    let found = dataset(&session, bytes.clone());
+    for scan in found.poses[0].scans() {
+        let scan = scan.expect("there");
+        assert!(
+            scan[0].is_nan() && scan[1] == f64::INFINITY && scan[2] == 1.5,
+            "{scan:?}"
+        );
+    }
+    let words = "33.33 % of the readings (4) are 0, 33.33 % of the readings (4) are beyond the longest range: they count as missing";
+    assert_eq!(found.warnings, [words]);
+    // The message's own limits are narrower than the session's.
+    let near = dataset(&session, with_scans(&bytes, |scan| with_number(scan, 6, 1.25)));
+    let scan = near.poses[0].scans().next().expect("one").expect("there");
+    assert_eq!(scan[2], f64::INFINITY);
+    // Limits that no scanner has, with their place.
+    for (place, number, words) in [
+        (5, f32::NAN, "range_min is NaN and range_max 60"),
+        (6, f32::NAN, "and range_max NaN"),
+        (5, -1.0, "range_min is -1 and range_max 60"),
+        (5, 61.0, "range_min is 61 and range_max 60"),
+    ] {
+        let changed = with_scans(&bytes, |scan| with_number(scan, place, number));
+        let error = parse_dataset(session.clone(), changed)
+            .map(|_| ())
+            .expect_err("refused")
+            .to_string();
+        assert!(
+            error.contains("/scan: pose 0: ") && error.contains(words),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn an_azimuth_of_many_turns_is_that_of_another_scanner() {
+    let session = session(3);
+    let bytes = record(&session, &[stretch(&session, 0, 2, 3, 5)]);
+    for azimuth in [3e38, -3e38, 1e6] {
+        let changed = with_scans(&bytes, |scan| with_number(scan, 0, azimuth));
+        let error = parse_dataset(session.clone(), changed)
+            .map(|_| ())
+            .expect_err("refused")
+            .to_string();
+        assert!(
+            error.contains("pose 0: beams from ") && error.contains("session.toml has"),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn a_recording_of_a_flight_alone_is_read() {
+    let session = session(BEAMS);
+    let mut flight = stretch(&session, 4, 8, 60, 3);
+    flight.label = PoseLabel::of(4, PoseKind::Flight, 8);
+    let found = dataset(&session, record(&session, std::slice::from_ref(&flight)));
+    assert_eq!(found.warnings, [""; 0]);
+    let [pose] = &found.poses[..] else {
+        panic!("{} stretches", found.poses.len());
+    };
+    assert_eq!((pose.label.kind, pose.label.pose), (PoseKind::Flight, 4));
+    let seen = flight.tracks[0]
+        .frames
+        .iter()
+        .filter(|f| f.pose.is_some())
+        .count();
+    assert_eq!(pose.motion.as_ref().expect("it moves").frames.len(), seen);
+    assert_eq!(pose.scans().count(), 8);
+}
+
+#[test]
+fn a_byte_order_mark_changes_no_session() {
+    let session = session(3);
+    let text = toml::to_string(&session).expect("TOML");
+    let marked = [b"\xef\xbb\xbf", text.as_bytes()].concat();
+    assert_eq!(
+        crate::parse_session(&marked, "session.toml").expect("read"),
+        session
+    );
+}

@@ -285,6 +285,19 @@ mod tests {
     use catoptric_sim::Scene;
 
     #[test]
+    fn a_name_leads_into_no_other_folder() {
+        for (name, file) in [
+            ("left-1", "left-1"),
+            ("../../etc/passwd", "______etc_passwd"),
+            ("a\\b:c", "a_b_c"),
+            ("..", "__"),
+            ("ä\0", "__"),
+        ] {
+            assert_eq!(file_name(name), file);
+        }
+    }
+
+    #[test]
     fn text_and_marks_have_contrast_in_light_and_dark() {
         let scene: Scene =
             toml::from_str(include_str!("../../../../scenes/prototype.toml")).expect("a scene");
