@@ -221,7 +221,12 @@ fn corners(drawing: &layout::Drawing) -> String {
             format!("({:.3}, {:.3}, {:.3})", c.x, c.y, c.z)
         });
         let corners: Vec<String> = corners.collect();
-        format!("  {}: corners {} mm\n", facet.name, corners.join(", "))
+        let curve = facet.bent.as_ref().map_or_else(String::new, |bent| {
+            let (radius, name) = bent.curve.radius_mm();
+            let side = if radius > 0.0 { "concave" } else { "convex" };
+            format!(", a {side} {name} of radius {:.3} mm over them", radius.abs())
+        });
+        format!("  {}: corners {} mm{curve}\n", facet.name, corners.join(", "))
     });
     facets.collect()
 }

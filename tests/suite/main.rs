@@ -13,6 +13,7 @@ mod common;
 mod compare;
 mod consistency;
 mod corpus;
+mod curved;
 mod detection;
 mod determinism;
 mod docs;

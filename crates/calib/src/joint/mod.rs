@@ -8,6 +8,7 @@
 mod answer;
 mod assemble;
 mod assess;
+mod bow;
 mod doubt;
 mod estimate;
 mod fan;
@@ -186,8 +187,9 @@ fn solve(
     }
     let doubts = assessment.iter().flat_map(|a| &a.doubts);
     let doubts = doubts.map(|doubt| format!("the readings contradict the session: {}", doubt.message));
-    let warnings = unconverged(solution).into_iter().chain(doubts).collect();
     let names = |facet: usize| session.facets[facet].name.clone();
+    let warnings = unconverged(solution).into_iter().chain(doubts);
+    let warnings = warnings.chain(joint.bows(solution, &names)).collect();
     Ok(Outcome {
         beams: answers
             .iter()

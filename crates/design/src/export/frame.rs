@@ -5,6 +5,7 @@
 
 use super::Solid;
 use crate::layout::{Detail, Drawing, analyze, center, plate_thickness};
+use catoptric_sim::build::Bent;
 use catoptric_sim::scene::{MeshShape, MeshUnits, Post, PostShape};
 use catoptric_sim::{Mesh, Scene, SimError};
 use nalgebra::{Point3, Unit, Vector3};
@@ -63,6 +64,7 @@ pub(super) fn frame(drawing: &Drawing, thickness: f64) -> Vec<Solid> {
     for facet in &drawing.facets {
         let face = &facet.face;
         let m = face.normal.into_inner();
+        let thickness = thickness + facet.bent.as_ref().map_or(0.0, Bent::behind);
         let middle = center(&face.corners);
         let outline = |depth: f64, within: f64| -> Vec<Point3<f64>> {
             let moved = |c: &Point3<f64>| {

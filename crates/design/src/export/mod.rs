@@ -81,6 +81,9 @@ pub fn solids(scene: &Scene, drawing: &Drawing, part: ExportPart) -> Vec<Solid> 
     let mut solids = Vec::new();
     if part != ExportPart::Frame {
         solids.extend(drawing.facets.iter().map(|facet| {
+            if let Some(bent) = &facet.bent {
+                return Solid::shell(&facet.name, bent, thickness);
+            }
             let back: Vec<_> = (facet.face.corners.iter())
                 .map(|c| c - facet.face.normal.into_inner() * thickness)
                 .collect();

@@ -1,6 +1,7 @@
 //! Closed bodies as triangle meshes.
 
 use catoptric_cast::Triangle;
+use catoptric_sim::build::Bent;
 use nalgebra::{Point3, Unit, Vector3};
 
 /// A closed body in the sensor frame; its triangles are counterclockwise seen from outside.
@@ -25,6 +26,27 @@ impl Solid {
             let j = (i + 1) % top.len();
             triangles.push([bottom[i], bottom[j], top[j]]);
             triangles.push([bottom[i], top[j], top[i]]);
+        }
+        Self {
+            name: name.to_owned(),
+            triangles,
+        }
+    }
+
+    /// Returns the body of a curved mirror: its face, as near as its triangles are, and a back that is as far behind it along
+    /// the normal of its outline.
+    pub(super) fn shell(name: &str, bent: &Bent, thickness: f64) -> Self {
+        let behind = bent.face.outline.normal.into_inner() * thickness;
+        let mut triangles = bent.face.triangles();
+        let back = triangles
+            .iter()
+            .map(|[a, b, c]| [a - behind, c - behind, b - behind]);
+        let back: Vec<Triangle> = back.collect();
+        triangles.extend(back);
+        let rim = bent.face.rim();
+        for (a, b) in rim.iter().zip(rim.iter().cycle().skip(1)) {
+            triangles.push([a - behind, b - behind, *b]);
+            triangles.push([a - behind, *b, *a]);
         }
         Self {
             name: name.to_owned(),

@@ -3,6 +3,7 @@
 use crate::layout::{Drawing, plate_thickness};
 use catoptric_cast::area_vector;
 use catoptric_files::names::defused;
+use catoptric_model::Curve;
 use catoptric_sim::Scene;
 use nalgebra::Vector3;
 
@@ -30,13 +31,26 @@ const HEADER: [&str; 20] = [
     "reflectivity",
 ];
 
+/// More columns, of a drawing with mirrors that are not flat: the surface that touches the plane, negative radii of convex
+/// ones, its axis and where it touches the plane from the middle of the outline.
+const CURVED: [&str; 6] = [
+    "curve",
+    "radius_mm",
+    "half_angle_deg",
+    "axis_deg",
+    "touches_x_mm",
+    "touches_y_mm",
+];
+
 /// Returns the drawing table as CSV, in the sensor frame; corners are counterclockwise seen from the reflecting side.
 ///
 /// # Errors
 /// An error of the CSV writer; writing to memory causes none.
 pub fn drawing_table(scene: &Scene, drawing: &Drawing) -> Result<Vec<u8>, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(HEADER)?;
+    let bends = drawing.facets.iter().any(|f| f.bent.is_some());
+    let curved: &[&str] = if bends { &CURVED } else { &[] };
+    writer.write_record(HEADER.iter().chain(curved))?;
     let superstructure = &scene.superstructure;
     let as_built = &superstructure.as_built;
     for facet in &drawing.facets {
@@ -74,10 +88,36 @@ pub fn drawing_table(scene: &Scene, drawing: &Drawing) -> Result<Vec<u8>, csv::E
             ];
             let mut row = vec![defused(&facet.name).into_owned(), (number + 1).to_string()];
             row.extend(numbers.map(|n| rounded(n).to_string()));
+            if bends {
+                row.extend(curve(facet.bent.as_ref().map(|bent| &bent.curve)));
+            }
             writer.write_record(&row)?;
         }
     }
     writer.into_inner().map_err(|e| e.into_error().into())
+}
+
+/// The entries of [`CURVED`]; empty where a mirror has no such number.
+fn curve(curve: Option<&Curve>) -> [String; 6] {
+    let Some(curve) = curve else {
+        return ["flat", "", "", "", "", ""].map(str::to_owned);
+    };
+    let (radius_mm, name) = curve.radius_mm();
+    let [x, y] = curve.touches_mm();
+    let (half_angle_deg, axis_deg) = match curve {
+        Curve::Cylinder(c) => (None, Some(c.axis_deg)),
+        Curve::Cone(c) => (Some(c.half_angle_deg), Some(c.axis_deg)),
+        Curve::Sphere(_) | Curve::Paraboloid(_) => (None, None),
+    };
+    let text = |number: Option<f64>| number.map_or_else(String::new, |n| rounded(n).to_string());
+    [
+        name.to_owned(),
+        text(Some(radius_mm)),
+        text(half_angle_deg),
+        text(axis_deg),
+        text(Some(x)),
+        text(Some(y)),
+    ]
 }
 
 /// Rounds to the nearest 10⁻⁶, a nanometer or a microdegree, without a negative zero.

@@ -3,6 +3,7 @@
 use super::field::{Cell, cells};
 use super::footprint::{Footprint, Outlines};
 use super::size::HOUSING;
+use super::stretch::Stretch;
 use super::traced::{Class, exit, trace};
 use catoptric_cast::Triangle;
 use catoptric_model::{Pose, ScanGeometry};
@@ -58,6 +59,8 @@ pub struct DrawnRay {
     pub points: Vec<Point3<f64>>,
     /// Direction from the last point; `None` if the ray ends there.
     pub exit: Option<Unit<Vector3<f64>>>,
+    /// How curved mirrors stretch its cell.
+    pub stretch: Option<Stretch>,
 }
 
 impl Drawing {
@@ -86,6 +89,7 @@ impl Drawing {
                     facets: t.chief.facets().to_vec(),
                     points,
                     exit: exit(&t.chief),
+                    stretch: Stretch::of(&structure, t.chief.facets(), sensor.scan().azimuth(t.beam)),
                 }
             });
             let outlines = Outlines::new(&sensor, &structure);

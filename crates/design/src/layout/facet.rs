@@ -1,7 +1,7 @@
 //! Facet by facet: its elements, the extent of its fan, its margins, and the effect of its errors.
 
 use super::element::LayoutElement;
-use super::field::{Cell, SPHERE_SR};
+use super::field::SPHERE_SR;
 use super::footprint::Footprint;
 use super::sensitivity::{RANGE_M, Shift, shifts};
 use super::traced::{Class, Traced, exit};
@@ -69,11 +69,11 @@ pub(crate) fn facets(
     structure: &Structure,
     elements: &[LayoutElement],
     traced: &[&Traced],
-    cells: &[Cell],
+    solid_angle: &dyn Fn(usize) -> f64,
     footprints: &[&Footprint],
 ) -> Vec<FacetView> {
     (0..structure.facets.len())
-        .map(|facet| view(scan, structure, facet, elements, traced, cells, footprints))
+        .map(|facet| view(scan, structure, facet, elements, traced, solid_angle, footprints))
         .collect()
 }
 
@@ -83,7 +83,7 @@ fn view(
     facet: usize,
     elements: &[LayoutElement],
     traced: &[&Traced],
-    cells: &[Cell],
+    solid_angle: &dyn Fn(usize) -> f64,
     footprints: &[&Footprint],
 ) -> FacetView {
     let built = &structure.facets[facet];
@@ -97,7 +97,7 @@ fn view(
         let values = || own.iter().filter_map(|(e, _)| value(e));
         Some([values().reduce(f64::min)?, values().reduce(f64::max)?])
     };
-    let angles = own.iter().map(|(e, _)| cells[e.beam].solid_angle());
+    let angles = own.iter().map(|(e, _)| solid_angle(e.beam));
     // An empty sum is −0.
     let solid_angle_sr = angles.fold(0.0, |sum, angle| sum + angle);
     let sees = |f: &&&Footprint| f.facet == facet && elements[f.beam].class.sees();
@@ -110,10 +110,17 @@ fn view(
         .filter(sees)
         .filter_map(|f| f.across_mm)
         .reduce(f64::min);
+    // A curved mirror that moves also shows another part of itself, which these figures know nothing of.
+    let all_flat = |t: &Traced| {
+        t.chief
+            .facets()
+            .iter()
+            .all(|f| structure.facets[*f].bent.is_none())
+    };
     let moved: Vec<(f64, f64)> = elements
         .iter()
         .zip(traced)
-        .filter(|(e, t)| e.class.sees() && meets(t))
+        .filter(|(e, t)| e.class.sees() && meets(t) && all_flat(t))
         .map(|(e, t)| {
             let faces = t.chief.facets().iter().map(|&f| &structure.facets[f].face);
             let all = shifts(scan.azimuth(e.beam), faces, RANGE_M);

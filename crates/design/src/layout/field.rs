@@ -4,8 +4,10 @@
 //! reflections (facets as planes, without slope errors). Whether a direction is in a cell is evaluated in the scan,
 //! where cells are plain rectangles. Sequences of facets are processed one after the other, undeflected elements first.
 //! Every cell is divided into parts, and a part counts unless an earlier sequence covers it, so that cells without
-//! overlap keep their solid angle exactly.
+//! overlap keep their solid angle exactly. An element whose light hits a curved facet is a sequence of its own, whose cell is
+//! stretched as the mirror stretches it.
 
+use super::stretch::Stretch;
 use super::traced::{Traced, exit};
 use catoptric_model::ScanGeometry;
 use catoptric_sim::build::Structure;
@@ -53,9 +55,11 @@ impl Cell {
 /// The seeing elements whose chief rays hit the same facets in the same order.
 pub(crate) struct FacetSequence {
     /// The facets in order.
-    pub(crate) facets: Vec<usize>,
+    facets: Vec<usize>,
     /// The product of the reflections: from directions in the scan to exit directions.
-    pub(crate) turn: Matrix3<f64>,
+    turn: Matrix3<f64>,
+    /// Instead of that, for a single element that hits a curved facet.
+    stretch: Option<Stretch>,
     /// Number of its elements below each beam: `below[j] - below[i]` of them are in i..j.
     below: Vec<usize>,
     pub(crate) beams: Vec<usize>,
@@ -98,11 +102,15 @@ pub(crate) fn cells(sensor: &Sensor) -> Vec<Cell> {
 
 impl FacetSequences {
     pub(crate) fn new(structure: &Structure, scan: &ScanGeometry, traced: &[&Traced]) -> Self {
-        let mut beams: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
+        let mut beams: BTreeMap<(Vec<usize>, Option<usize>), Vec<usize>> = BTreeMap::new();
         for t in traced.iter().filter(|t| t.sees) {
-            beams.entry(t.chief.facets().to_vec()).or_default().push(t.beam);
+            let facets = t.chief.facets();
+            let bent = facets.iter().any(|f| structure.facets[*f].bent.is_some());
+            let own = if bent { Some(t.beam) } else { None };
+            beams.entry((facets.to_vec(), own)).or_default().push(t.beam);
         }
-        let sequence = |(facets, beams): (Vec<usize>, Vec<usize>)| {
+        let sequence = |((facets, own), beams): ((Vec<usize>, Option<usize>), Vec<usize>)| {
+            let stretch = own.and_then(|beam| Stretch::of(structure, &facets, scan.azimuth(beam)));
             let turn = facets.iter().fold(Matrix3::identity(), |turn, &facet| {
                 let m = structure.facets[facet].face.normal.into_inner();
                 (Matrix3::identity() - m * m.transpose() * 2.0) * turn
@@ -117,6 +125,7 @@ impl FacetSequences {
             FacetSequence {
                 facets,
                 turn,
+                stretch,
                 below,
                 beams,
                 scan: *scan,
@@ -126,9 +135,29 @@ impl FacetSequences {
     }
 }
 
+impl FacetSequences {
+    /// Factor by which mirrors enlarge the cell of a beam.
+    pub(crate) fn growth(&self, beam: usize) -> f64 {
+        let own = self.0.iter().find(|s| s.stretch.is_some() && s.beams == [beam]);
+        own.and_then(|s| s.stretch)
+            .map_or(1.0, |stretch| stretch.growth())
+    }
+}
+
 impl FacetSequence {
     fn holds(&self, beam: usize) -> bool {
         self.below[beam + 1] > self.below[beam]
+    }
+
+    /// Exit direction of a direction in the scan, in the cell of one of its elements, and the solid angle there.
+    fn out(&self, cell: &Cell, in_scan: &Vector3<f64>, weight: f64) -> (Vector3<f64>, f64) {
+        let Some(stretch) = &self.stretch else {
+            return (self.turn * in_scan, weight);
+        };
+        let along = libm::atan2(in_scan.y, in_scan.x) - cell.azimuth;
+        let along = along - TAU * (along / TAU).round();
+        let out = stretch.exit(along, libm::asin(in_scan.z));
+        (out, weight * stretch.growth())
     }
 
     /// Returns the sine of the elevation in the scan of an exit direction.
@@ -144,6 +173,12 @@ impl FacetSequence {
 
     /// Whether one of its cells holds an exit direction.
     fn sees(&self, direction: &Vector3<f64>, cells: &[Cell], highest: f64) -> bool {
+        if let (Some(stretch), [beam]) = (&self.stretch, self.beams.as_slice()) {
+            let cell = &cells[*beam];
+            return stretch.in_scan(direction).is_some_and(|[along, across]| {
+                along.abs() <= 0.5 * cell.width && across.abs() <= cell.half_height
+            });
+        }
         let sin = self.sin_elevation(direction);
         if sin.abs() > highest {
             return false;
@@ -154,6 +189,9 @@ impl FacetSequence {
 
     /// Whether one of its beams is within an angle, given by its sine and cosine, of an exit direction.
     fn is_near(&self, direction: &Vector3<f64>, sin_near: f64, cos_near: f64) -> bool {
+        if let Some(stretch) = &self.stretch {
+            return stretch.cos_to(direction) >= cos_near;
+        }
         let sin = self.sin_elevation(direction);
         if sin.abs() > sin_near {
             return false;
@@ -187,7 +225,7 @@ pub(crate) fn field(sequences: &FacetSequences, cells: &[Cell], traced: &[&Trace
     let seen_by = |(own, beam): &(usize, usize)| -> f64 {
         let (sequence, before) = (&sequences.0[*own], &sequences.0[..*own]);
         let seen = part_directions(&cells[*beam]).map(|(in_scan, weight)| {
-            let direction = sequence.turn * in_scan;
+            let (direction, weight) = sequence.out(&cells[*beam], &in_scan, weight);
             let counted = before.iter().any(|w| w.sees(&direction, cells, highest));
             if counted { 0.0 } else { weight }
         });

@@ -1,7 +1,7 @@
 //! Footprints: the 1/e² contour of a beam on each facet that its chief ray hits, and its distance from the facet's
 //! edges.
 //!
-//! The rays of the contour are reflected by the chief ray's facets as if those were unbounded planes, so that the
+//! The rays of the contour are reflected by the chief ray's facets as if those were unbounded, so that the
 //! outline of a footprint is complete even where an edge cuts it, and its margin is then negative. Glass moves a
 //! footprint by less than its own thickness; this is neglected.
 
@@ -9,13 +9,16 @@ use super::traced::Traced;
 use catoptric_cast::Polygon;
 use catoptric_cast::Ray;
 use catoptric_model::mirror;
-use catoptric_sim::build::Structure;
+use catoptric_sim::build::{BuiltFacet, Structure};
 use catoptric_sim::light::footprint::{SubRay, ray};
 use catoptric_sim::receive::Sensor;
 use nalgebra::{Point3, Vector3};
 
 /// Number of rays of a contour.
 pub const OUTLINE: usize = 16;
+
+/// Shortest distance to a curved surface that a ray does not just leave, in meters.
+const LEAVES: f64 = 1e-9;
 
 /// The footprint of a beam on a facet.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,7 +86,7 @@ impl<'a> Outlines<'a> {
         let mut center = ray(shape, azimuth, &chief);
         let mut neighbor = ray(shape, azimuth + self.sensor.scan().step(), &chief);
         let of_bounce = |(bounce, &facet): (usize, &usize)| {
-            let face = &self.structure.facets[facet].face;
+            let face = &self.structure.facets[facet];
             for ray in rays.iter_mut().chain([&mut center, &mut neighbor]) {
                 *ray = reflected(ray, face);
             }
@@ -137,8 +140,19 @@ fn edges(face: &Polygon) -> Vec<Edge> {
         .collect()
 }
 
-/// Reflects a ray in the unbounded plane of a face.
-fn reflected(ray: &Ray, face: &Polygon) -> Ray {
+/// Reflects a ray in the unbounded plane or surface of a facet; one that misses a curved surface, in the plane that it
+/// touches.
+pub(super) fn reflected(ray: &Ray, facet: &BuiltFacet) -> Ray {
+    if let Some(bent) = &facet.bent {
+        let surface = &bent.face.surface;
+        let ahead = surface.roots(&ray.origin, &ray.direction).into_iter().flatten();
+        if let Some(distance) = ahead.into_iter().find(|t| *t > LEAVES) {
+            let origin = ray.origin + ray.direction.into_inner() * distance;
+            let direction = mirror::reflect(&ray.direction, &surface.normal_at(&origin));
+            return Ray { origin, direction };
+        }
+    }
+    let face = &facet.face;
     let closing = face.normal.dot(&ray.direction);
     let distance = face.normal.dot(&(face.origin - ray.origin)) / closing;
     Ray {

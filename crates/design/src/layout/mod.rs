@@ -43,6 +43,7 @@ mod incremental;
 mod require;
 mod sensitivity;
 mod size;
+mod stretch;
 mod traced;
 
 pub use accuracy::{Accuracy, FacetAccuracy, predict};
@@ -59,6 +60,7 @@ pub use require::{Requirement, RequirementError, Unmet, figures, judge};
 pub use sensitivity::center;
 pub(crate) use size::plate_thickness;
 pub use size::{MIRROR_DENSITY, POST_DENSITY, Size};
+pub use stretch::Stretch;
 pub use traced::Class;
 pub(crate) use traced::{Traced, exit, trace};
 

@@ -44,6 +44,8 @@ pub(crate) fn size(scene: &Scene, structure: &Structure) -> Size {
         .iter()
         .flat_map(|f| f.face.corners.iter().chain(&f.backing.corners).copied())
         .collect();
+    let bent = structure.facets.iter().filter_map(|f| f.bent.as_ref());
+    points.extend(bent.flat_map(|bent| bent.face.rim().into_iter().chain(bent.backing.rim())));
     let mut post_volume = 0.0;
     for part in &structure.parts {
         let skin = part.shape.triangles();

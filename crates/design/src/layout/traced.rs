@@ -7,10 +7,12 @@
 //! ```text
 //! R = R_t·√(g·ρ/ρ_t)         limited by the scanner's maximum range, along the whole path from the scanner
 //! ```
+//!
+//! Behind a curved mirror it is the longest path from which as much light comes back as from that R behind a flat one.
 
 use catoptric_sim::Scene;
 use catoptric_sim::build::color;
-use catoptric_sim::light::{End, RayPath, Setting, Trail};
+use catoptric_sim::light::{End, RayPath, Setting, Spread, Trail};
 use catoptric_sim::receive::{Sensor, class};
 use catoptric_sim::truth::BeamClass;
 use nalgebra::{Unit, Vector3};
@@ -85,6 +87,8 @@ pub(crate) struct Traced {
     pub(crate) chief_energy: f64,
     /// What two passes leave of the light on the chief ray's path.
     pub(crate) light: f64,
+    /// How curved mirrors spread the light of the chief ray.
+    spread: Option<Spread>,
     pub(crate) sees: bool,
     /// Where its light passed the structure.
     pub(crate) trail: Trail,
@@ -158,6 +162,7 @@ pub(crate) fn trace_one(sensor: &Sensor, bare: &Setting<'_>, scene: &Scene, beam
         chief_energy,
         light: light.sum::<f64>() * shown,
         sees: false,
+        spread: bare.spread_along(&rays[rays.len() - 1], &chief),
         chief,
         trail,
     };
@@ -181,6 +186,7 @@ pub(super) fn farthest(scene: &Scene, traced: &Traced, reflectivity: f64) -> f64
     let seen = detection.threshold_range_m * brightness.sqrt();
     // Without a threshold everything is detected, except where there is no light at all (0/0).
     let seen = if seen.is_nan() { 0.0 } else { seen };
+    let seen = traced.spread.map_or(seen, |spread| spread.reach(seen));
     seen.min(scene.scanner.limits().range_max_m)
 }
 

@@ -1,7 +1,9 @@
 //! A layout as pages and pictures draw it: its analysis, and its geometry.
 
 use catoptric_design::layout::{Analysis, Depth, Drawing};
+use catoptric_sim::build::BuiltFacet;
 use catoptric_sim::{Scene, SimError};
+use nalgebra::Point3;
 
 /// A layout: its analysis, and the geometry to draw.
 #[derive(Debug, Clone)]
@@ -36,6 +38,12 @@ impl Drawn {
         name.clone_into(&mut self.analysis.name);
         self
     }
+}
+
+/// Returns the outline of a facet's face: its corners, or more points of a curved rim.
+pub(super) fn rim(facet: &BuiltFacet) -> Vec<Point3<f64>> {
+    let bent = facet.bent.as_ref().map(|bent| bent.face.rim());
+    bent.unwrap_or_else(|| facet.face.corners.clone())
 }
 
 /// Returns the radius about the scanner of everything built, in meters.

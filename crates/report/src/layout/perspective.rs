@@ -1,7 +1,7 @@
 //! The structure with its beams in perspective: triangles and lines with a depth buffer, shaded, as PNG.
 
 use super::canvas::{Canvas, SIZE, mixed};
-use super::drawn::{Drawn, radius};
+use super::drawn::{Drawn, radius, rim};
 use super::views::{DIRECT, is_drawn, ray_color};
 use crate::figure::{color, css};
 use crate::page::escape;
@@ -99,8 +99,9 @@ pub(super) fn perspective(drawn: &Drawn) -> Perspective {
         }
     }
     for (number, facet) in drawing.facets.iter().enumerate() {
-        let facing = (camera.turn * facet.face.normal.into_inner()).z;
-        for triangle in facet.face.triangles() {
+        for triangle in facet.face_shape().triangles() {
+            let normal = (triangle[1] - triangle[0]).cross(&(triangle[2] - triangle[0]));
+            let facing = (camera.turn * normal).z;
             let fill = shaded(color(number), &triangle, &camera);
             // The back of a mirror does not reflect.
             let fill = if facing > 0.0 {
@@ -110,7 +111,7 @@ pub(super) fn perspective(drawn: &Drawn) -> Perspective {
             };
             canvas.triangle(triangle.map(|p| camera.place(&p)), fill);
         }
-        let corners = &facet.face.corners;
+        let corners = rim(facet);
         for (a, b) in corners.iter().zip(corners.iter().cycle().skip(1)) {
             let dark = mixed(color(number), RGBColor(0, 0, 0), 0.5);
             canvas.line(camera.place(a), camera.place(b), 1.5, dark);

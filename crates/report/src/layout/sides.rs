@@ -1,6 +1,6 @@
 //! The structure with its beams from three sides.
 
-use super::drawn::{Drawn, radius};
+use super::drawn::{Drawn, radius, rim};
 use super::views::{DIRECT, is_drawn, ray_color};
 use crate::figure::{self, Axes, Stroke, color};
 use nalgebra::Point3;
@@ -68,7 +68,7 @@ pub(super) fn side(drawn: &Drawn, side: &Side) -> String {
         strokes.extend(points.into_iter().map(|p| line(p, color, 1, opacity)));
     }
     for (number, facet) in drawing.facets.iter().enumerate() {
-        let mut outline: Vec<(f64, f64)> = facet.face.corners.iter().map(flat).collect();
+        let mut outline: Vec<(f64, f64)> = rim(facet).iter().map(flat).collect();
         outline.extend(outline.first().copied());
         strokes.push(line(outline, color(number), 3, 1.0));
     }

@@ -121,6 +121,12 @@ pub(super) fn cell(drawn: &Drawn, ray: &DrawnRay) -> Vec<Vec<(f64, f64)>> {
     };
     let cell = drawn.drawing.cells[ray.beam];
     let half = 0.5 * drawn.drawing.scan.step();
+    if let Some(stretch) = &ray.stretch {
+        let corners = [(-half, -1.0), (half, -1.0), (half, 1.0), (-half, 1.0)];
+        return on_map(
+            corners.map(|(along, across)| degrees(&stretch.exit(along, across * cell.half_height))),
+        );
+    }
     let corners = [(-half, -1.0), (half, -1.0), (half, 1.0), (-half, 1.0)].map(|(along, across)| {
         let v = turn * beam::spherical(cell.azimuth + along, across * cell.half_height).into_inner();
         degrees(&v)

@@ -11,5 +11,5 @@ pub(crate) mod trajectory;
 
 pub use room::room_from_rig;
 pub use stage::Stage;
-pub use structure::{Back, BuiltFacet, OpaquePart, Structure, nominal_mount};
+pub use structure::{Back, Bent, BuiltFacet, OpaquePart, Structure, nominal_mount};
 pub use trajectory::Trajectory;

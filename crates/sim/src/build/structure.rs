@@ -47,6 +47,15 @@ pub struct Bent {
     pub backing: Arc<Curved>,
 }
 
+impl Bent {
+    /// How far its face reaches behind the plane that it touches, in meters; 0 for a concave mirror.
+    pub fn behind(&self) -> f64 {
+        let outline = &self.face.outline;
+        let depth = |p: &Point3<f64>| outline.normal.dot(&(outline.origin - p));
+        self.face.rim().iter().map(depth).fold(0.0, f64::max)
+    }
+}
+
 /// The second reflecting side of a mirror.
 #[derive(Debug, Clone)]
 pub enum Back {

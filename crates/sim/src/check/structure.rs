@@ -34,6 +34,17 @@ pub(super) fn check(scene: &Scene, scan: &ScanGeometry, found: &mut Findings) {
             facet.check_bend(&scene.superstructure.mirror, scan, &path, found);
         }
     }
+    let curved = scene.superstructure.facet.iter().find(|f| f.curve.is_some());
+    if let Some(facet) = curved.filter(|_| scene.light.vignetting) {
+        found.add(
+            &KeyPath::of("light").key("vignetting"),
+            format_args!(
+                "is set, but facet {:?} has a `curve`; the outlines through which the lens looks are those of flat mirrors",
+                facet.name
+            ),
+            "omit one of the two".to_owned(),
+        );
+    }
     // Of an invalid facet this would only repeat what has been reported.
     if found.0.len() == before {
         overlap::check(scene, &obstacles, found);

@@ -8,5 +8,6 @@ pub mod power;
 pub(crate) mod view;
 
 pub use optics::{
-    Bounce, Course, Edit, End, MAX_BOUNCES, Meeting, Mirrors, RayPath, Rig, Role, Setting, Target, Trail,
+    Bounce, Course, Edit, End, MAX_BOUNCES, Meeting, Mirrors, RayPath, Rig, Role, Setting, Spread, Target,
+    Trail,
 };

@@ -15,3 +15,4 @@ pub use rig::Rig;
 pub(crate) use rig::{BeamPaths, Run, Then};
 pub(crate) use setting::Beyond;
 pub use setting::{Mirrors, Role, Setting, Target};
+pub use spread::Spread;

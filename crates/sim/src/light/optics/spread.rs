@@ -15,6 +15,7 @@
 //! Coddington, without their restriction to symmetric planes. Near a focus A vanishes, and no more light can come back than
 //! the mirror itself lets through from there.
 
+use super::path::RayPath;
 use super::setting::Setting;
 use catoptric_cast::Ray;
 use catoptric_model::curve::CurvedSurface;
@@ -22,7 +23,7 @@ use nalgebra::{Matrix3, Point3, Unit, Vector3};
 
 /// How the light of a path spreads after its last mirror.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Spread {
+pub struct Spread {
     /// Length of the path up to there, in meters.
     length: f64,
     /// A at that mirror, in square meters.
@@ -86,12 +87,35 @@ impl Spread {
 
     /// Factor on the light that comes back from a spot at a path length, compared with flat mirrors; `lens` is the area of
     /// the receiver's lens, in square meters.
-    pub(crate) fn gain(&self, range: f64, lens: f64) -> f64 {
+    pub fn gain(&self, range: f64, lens: f64) -> f64 {
         let leg = range - self.length;
         let spread = (self.area * (1.0 + leg * (self.trace + leg * self.determinant))).abs();
         // All light through the mirror, if it all reached the lens; flat mirrors are taken for large enough.
         let most = (self.window * range * range / (leg * leg * lens)).max(1.0);
         (range * range / spread).min(most)
+    }
+}
+
+impl Spread {
+    /// Longest path from which as much light comes back as by flat mirrors over `flat` meters.
+    pub fn reach(&self, flat: f64) -> f64 {
+        let most = flat * flat / self.area;
+        // 1 + leg·tr W + leg²·det W reaches ± that: the larger root of each.
+        let last = |size: f64| {
+            let (a, b, c) = (self.determinant, self.trace, 1.0 - size);
+            let root = (b * b - 4.0 * a * c).sqrt();
+            let sum = -0.5 * (b + f64::copysign(root, b));
+            let roots = [sum / a, c / sum];
+            roots
+                .into_iter()
+                .filter(|leg| leg.is_finite() && *leg > 0.0)
+                .fold(0.0, f64::max)
+        };
+        let endless = self.trace == 0.0 && self.determinant == 0.0 && most >= 1.0;
+        if endless || most.is_infinite() {
+            return f64::INFINITY;
+        }
+        self.length + last(most).max(last(-most))
     }
 }
 
@@ -107,8 +131,17 @@ fn invariants(tensor: &Matrix3<f64>) -> (f64, f64) {
 }
 
 impl Setting<'_> {
+    /// How the light of a ray's path spreads after its last mirror; `None` if all its mirrors are flat.
+    pub fn spread_along(&self, start: &Ray, path: &RayPath) -> Option<Spread> {
+        let met = path.facets().iter().zip(path.points()).zip(path.meetings());
+        self.spread(
+            start,
+            met.map(|((facet, point), meeting)| (*facet, *point, meeting.after)),
+        )
+    }
+
     /// How the light of a path spreads after its last mirror; `None` if all its mirrors are flat.
-    pub(crate) fn spread(
+    pub(super) fn spread(
         &self,
         start: &Ray,
         met: impl Iterator<Item = (usize, Point3<f64>, Unit<Vector3<f64>>)>,

@@ -144,9 +144,7 @@ impl Sensor {
         path: &RayPath,
     ) -> Option<Arrival> {
         let End::Hit(hit) = path.end else { return None };
-        let met = path.facets().iter().zip(path.points()).zip(path.meetings());
-        let met = met.map(|((facet, point), meeting)| (*facet, *point, meeting.after));
-        let spread = within.setting.spread(ray, met);
+        let spread = within.setting.spread_along(ray, path);
         let overlap = within.overlap(sub_ray, path.length);
         Some(Arrival {
             surface: hit.surface,

@@ -13,7 +13,7 @@ use nalgebra::{Matrix3, Point3, Rotation3, Unit, Vector3};
 /// Steepest slope of a mirror against the plane of its outline, in degrees: a steeper one is drawn as several facets.
 const STEEPEST_DEG: f64 = 60.0;
 
-/// Points of an edge at which a slope is looked at: it is the largest at a corner, except on a cone.
+/// Points of an edge at which a slope is evaluated: it is the largest at a corner, except on a cone.
 const STEPS: u32 = 16;
 
 /// Digits to which the angles and places of copies are rounded, in degrees and millimeters.

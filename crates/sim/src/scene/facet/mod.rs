@@ -48,7 +48,7 @@ pub struct Facet {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub curve: Option<Curve>,
     /// How far a mirror that is meant to be flat has bent along its longer side: depth of its middle below its ends, in
-    /// micrometers, negative if its middle is raised. The session does not tell it.
+    /// micrometers, negative if its middle is raised. The session does not have it.
     #[serde(default, skip_serializing_if = "is_zero")]
     #[schemars(range(min = -10000.0, max = 10000.0))]
     pub bow_um: f64,

@@ -64,9 +64,9 @@ fn a_sphere_spreads_light_as_coddington_says() {
     }
 }
 
-/// Against rays beside the path, traced themselves: the area that a small bundle from the lens takes at the target.
+/// Against rays beside the path, traced themselves: the area that neighboring rays from the lens enclose at the target.
 #[test]
-fn light_spreads_as_a_bundle_of_rays_does() {
+fn light_spreads_as_neighboring_rays_do() {
     let cone = ConeCurve {
         radius_mm: 60.0,
         half_angle_deg: 30.0,
@@ -156,6 +156,30 @@ fn in_a_focus_no_more_returns_than_the_mirror_lets_through() {
     let exact = (4e-4 / (focus * focus)) / (3e-4 / ((1.0 + focus) * (1.0 + focus)));
     assert!((most / exact - 1.0).abs() < 1e-12, "{most} {exact}");
     assert!(spread.gain(1.0 + 2.0 * focus, 3e-4) < most);
+}
+
+/// At its longest reach a target returns what a flat mirror would at the distance that was asked for.
+#[test]
+fn a_reach_is_where_as_much_light_comes_back() {
+    for radius_mm in [-150.0, 700.0, 90.0] {
+        let mirrors = [surface(
+            Curve::Sphere(round(radius_mm)),
+            Point3::new(0.07, 0.0, 0.0),
+            [-1.0, 0.0, 0.8],
+        )];
+        let start = Ray {
+            origin: Point3::origin(),
+            direction: Vector3::x_axis(),
+        };
+        let spread = Spread::after(&start, turns(&start, &mirrors).into_iter()).expect("it is curved");
+        let range = spread.reach(6.0);
+        assert!(
+            (range * range / spread.gain(range, LENS) / 36.0 - 1.0).abs() < 1e-11,
+            "{range}"
+        );
+        assert!(spread.gain(1.001 * range, LENS) / (1.001 * range).powi(2) < 1.0 / 36.0);
+        assert_eq!(spread.reach(f64::INFINITY), f64::INFINITY);
+    }
 }
 
 #[test]
