@@ -100,6 +100,7 @@ fn compare(sets: &[&str], beams: usize, rays: usize, seed: u64) -> Vec<Compared>
 ///
 /// Beams of which even random rays do not say within a millimeter what they read, since an echo is about as high as the
 /// threshold, are left out, and so is nothing else.
+#[expect(clippy::print_stdout, reason = "the evidence shows it")]
 fn errors_mm(beams: usize, rays: usize) -> [(f64, f64); 2] {
     [&[][..], &["detection.detector=constant_fraction"]].map(|sets| {
         let compared = compare(sets, beams, rays, 1);

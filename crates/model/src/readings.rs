@@ -296,6 +296,7 @@ impl fmt::Debug for Readings {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut shown = f.debug_struct("Readings");
         shown.field("beams", &self.beams).field("len", &self.len());
+        shown.field("intensities", &self.intensities);
         match &self.place {
             Place::Memory(ranges) => shown.field("ranges", ranges).finish(),
             Place::Recording(..) | Place::Nowhere(_) => {
