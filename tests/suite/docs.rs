@@ -561,7 +561,10 @@ moved_mm = [0, 0, 4]
     );
     same(
         "truth.json",
-        &json(serde_json::to_value(&truth)),
+        &json(serde_json::to_value(&sim::Truth {
+            detector_errors: true,
+            ..truth.clone()
+        })),
         &["bias.color", "poses[].mishap"],
     );
 

@@ -221,10 +221,15 @@ fn whole_turns_are_recognized_and_are_no_degrees() {
 #[test]
 fn straight_up_and_down_are_elevations() {
     use std::f64::consts::FRAC_PI_2;
-    for elevation in [FRAC_PI_2, -FRAC_PI_2, 1.570796327, -1.570796327] {
+    // Nine digits round it up.
+    let rounded = (FRAC_PI_2 * 1e9).round() / 1e9;
+    for elevation in [FRAC_PI_2, -FRAC_PI_2, rounded, -rounded] {
         assert_eq!(after(|c, i| c.beams[i].elevation_rad = Some(elevation)), []);
     }
-    assert_eq!(after(|c, i| c.beams[i].elevation_rad = Some(-1.5708)).len(), 1);
+    assert_eq!(
+        after(|c, i| c.beams[i].elevation_rad = Some(-FRAC_PI_2 - 1e-6)).len(),
+        1
+    );
 }
 
 #[test]
