@@ -510,6 +510,8 @@ fn plates_of_curved_mirrors_are_closed_and_as_thick_as_drawn() {
         (volume / (4.0 * HALF[0] * HALF[1] * 2e-3) - 1.0).abs() < 1e-9,
         "{volume}"
     );
+    // Picometers, of coordinates below a meter.
+    #[allow(clippy::cast_possible_truncation)]
     let key = |p: &Point3<f64>| p.coords.map(|c| (c * 1e12).round() as i64);
     let mut edges = std::collections::BTreeMap::new();
     for t in triangles {

@@ -5,10 +5,12 @@
 
 use crate::common::{run, stdout};
 use catoptric::files::scene::{self, Template};
+use catoptric::model::Curve;
 use catoptric::model::assessment::{
     Assessment, Cause, ComponentTest, Doubt, HeldOut, SharedParameter, VarianceComponent,
 };
 use catoptric::model::calibration::{FacetEstimate, MountEstimate};
+use catoptric::model::curve::RoundCurve;
 use catoptric::model::glass::GlassSheet;
 use catoptric::model::{AngleTable, BeamEstimate, Calibration, RangeBias, ScanGeometry, Status};
 use catoptric::{calib, score, sim};
@@ -542,7 +544,7 @@ moved_mm = [0, 0, 4]
     let small = Template::TwoMirror.text().to_owned() + flight;
     let small = scene::parse(&small, "two-mirror.toml", &quick).unwrap();
     let laboratory = sim::Laboratory::new(&small, small.seed).unwrap();
-    let (dataset, truth) = (laboratory.dataset().unwrap(), laboratory.truth().unwrap());
+    let (dataset, mut truth) = (laboratory.dataset().unwrap(), laboratory.truth().unwrap());
     let mut session = dataset.session.clone();
     session.believed.element_sd_mm = 0.5;
     session.bare_structure.noise_sd_mm = 0.5;
@@ -552,12 +554,18 @@ moved_mm = [0, 0, 4]
         thickness_sd_mm: 0.1,
         ..GlassSheet::default()
     });
+    let curve = Curve::Sphere(RoundCurve {
+        radius_mm: 400.0,
+        touches_mm: [0.0; 2],
+    });
+    session.facets[0].curve = Some(curve);
+    truth.facets[0].curve = Some(curve);
     let noise = session.believed.noise.clone().unwrap();
     session.believed.noise_of.insert("grey".to_owned(), noise);
     same(
         "session.toml",
         &json(serde_json::to_value(&session)),
-        &["believed.bias.color", "believed.noise_of"],
+        &["believed.bias.color", "believed.noise_of", "facets[].curve"],
     );
     same(
         "truth.json",
@@ -565,7 +573,7 @@ moved_mm = [0, 0, 4]
             detector_errors: true,
             ..truth.clone()
         })),
-        &["bias.color", "poses[].mishap"],
+        &["bias.color", "poses[].mishap", "facets[].curve"],
     );
 
     let calibration = calib::calibrate(&dataset, calib::Method::Beam, &calib::Options::default()).unwrap();

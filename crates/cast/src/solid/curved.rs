@@ -1,7 +1,6 @@
 //! Exact intersection of a ray with a curved mirror: the part of a quadric over a convex plane outline.
 
 use crate::ray::{FARTHEST, Ray};
-use crate::skin::Triangle;
 use crate::solid::{Polygon, area_vector};
 use catoptric_model::CurvedSurface;
 use nalgebra::{Point3, Unit, Vector3};
@@ -71,9 +70,9 @@ impl Curved {
     }
 
     /// Returns the surface as triangles whose corners are on it; they deviate from it by at most [`Curved::chord_error`].
-    pub fn triangles(&self) -> Vec<Triangle> {
+    pub fn triangles(&self) -> Vec<[Point3<f64>; 3]> {
         let steps = self.steps();
-        let of_fan = |[a, b, c]: Triangle| {
+        let of_fan = |[a, b, c]: [Point3<f64>; 3]| {
             let at = move |i: usize, j: usize| {
                 // The same points along the side that two triangles of the fan share.
                 let share = |n: usize| n as f64 / steps as f64;

@@ -1,3 +1,5 @@
+//! Curves against finite differences, circles and each other.
+
 use super::*;
 use crate::beam;
 

@@ -1,3 +1,5 @@
+//! The spread of light against Coddington's equations and neighboring rays.
+
 use super::*;
 use catoptric_model::Curve;
 use catoptric_model::curve::{ConeCurve, CylinderCurve, RoundCurve};

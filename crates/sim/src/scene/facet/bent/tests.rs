@@ -1,3 +1,5 @@
+//! Copies of curved mirrors, and refused radii.
+
 use super::*;
 use crate::build::pattern::{mirrored, turned};
 use crate::scene::facet::tests::samples;
