@@ -62,7 +62,9 @@ fn assert_equals_the_truth(scene: &Scene, analysis: &Analysis, name: &str) {
         assert_eq!(true_beam.beam, element.beam, "{at}");
         assert_eq!(true_beam.status, element.status, "{at}");
         assert_eq!(true_beam.facets, element.facets, "{at}");
-        assert_eq!(true_beam.chief_energy, element.chief_energy, "{at}");
+        // Of a beam that an edge divides, shares of the same energies are added up, in another number of parts.
+        let apart = (true_beam.chief_energy - element.chief_energy).abs();
+        assert!(apart < 1e-12, "{at}: {apart}");
         let of_class = match element.class {
             Class::Direct => BeamClass::Direct,
             Class::Deflected => BeamClass::Deflected,

@@ -303,8 +303,9 @@ fn a_median_of_beams_correlates_neighbors_as_in_real_recordings() {
     }
     let equal = |s: &&[f64]| beams.clone().filter(|b| s[*b] == s[b + 1]).count();
     let equal = scans.iter().map(equal).sum::<usize>() as f64 / n / beams.len() as f64;
-    // 43 % behind a mirror and 26 % directly in those recordings, 7 % without the median.
-    assert!((0.25..0.5).contains(&equal), "{equal}");
+    // 43 % behind a mirror in those recordings. Here ranges hardly change from beam to beam: medians of white noise are equal
+    // in 4 of 9 cases, and rounding makes some more equal.
+    assert!((0.42..0.55).contains(&equal), "{equal}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The light on one path, gathered into a few cells of about equal energy.
 
+use super::gauss::{Place, REACH, density, within};
 use super::lines::Piece;
-use super::{Place, REACH, density, within};
 
 /// Longest part of a line that becomes one node if there is one ray, in units of the 1/e² half-axes; with more of them it
 /// is shorter, so that a ray stands for several nodes.

@@ -1,6 +1,6 @@
 //! Lines across the spot of a beam, cut where its light takes another path.
 
-use super::{REACH, density, within};
+use super::gauss::{REACH, density, within};
 use std::rc::Rc;
 
 /// Panels of lines to begin with, and points of a line where its path is looked up.

@@ -9,15 +9,14 @@
 //! The beam ends at [`REACH`]; its energy out to there counts as all of it.
 
 mod cells;
+mod gauss;
 mod lines;
 
 use super::footprint::SubRay;
 use cells::{LONGEST_NODE, Node, add_nodes, gather};
+pub use gauss::{Place, REACH};
 use lines::{Panel, panels};
-use std::f64::consts::{FRAC_PI_4, SQRT_2};
-
-/// Where a beam ends, in units of the 1/e² half-axes: four standard deviations, which leave out 0.03 % of a Gaussian.
-pub const REACH: f64 = 2.0;
+use std::f64::consts::FRAC_PI_4;
 
 /// Energy beyond an edge three standard deviations from the chief ray: Φ(−3). A beam that loses less counts as whole.
 pub const NEGLIGIBLE: f64 = 0.001_349_898_031_630_1;
@@ -51,9 +50,6 @@ impl FromIterator<Option<Vec<SubRay>>> for EdgeRays {
         Self { of_beams }
     }
 }
-
-/// A place in the spot, along its long and its short axis in units of the 1/e² half-axes.
-pub type Place = [f64; 2];
 
 /// Places on the contour where the beam ends: if its light takes one path there and within, the beam is whole.
 pub fn around() -> impl Iterator<Item = Place> {
@@ -151,19 +147,11 @@ fn across_edges<K: PartialEq>(paths: &mut impl FnMut(&[Place]) -> Vec<K>) -> Pla
     [cos, sin]
 }
 
-/// Density of a Gaussian with a standard deviation of one half.
-fn density(at: f64) -> f64 {
-    libm::sqrt(std::f64::consts::FRAC_2_PI) * libm::exp(-2.0 * at * at)
-}
-
-/// Its integral.
-fn within(from: f64, to: f64) -> f64 {
-    0.5 * (libm::erf(SQRT_2 * to) - libm::erf(SQRT_2 * from))
-}
-
 #[cfg(test)]
 mod tests {
+    use super::gauss::{density, within};
     use super::*;
+    use std::f64::consts::SQRT_2;
 
     /// Φ of a standard deviation of one half.
     fn below(at: f64) -> f64 {
